@@ -21,6 +21,7 @@ from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material, material_names, named_material
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
+from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 
@@ -44,6 +45,7 @@ __all__ = [
     "PointLoad",
     "Profile",
     "RadialMuscle",
+    "RestShape",
     "Resultants",
     "Ring",
     "RingIntegrals",

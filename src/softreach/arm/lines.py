@@ -40,6 +40,8 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     """
     arm = a_manipulator("arm", arm)
     gamma = as_rows("activations", activations, arm.bundles, "of shape (n, bundles)")
+    bundles, arm = arm.bundles, arm.inner
+    gamma = np.concatenate([gamma, np.ones((len(gamma), arm.bundles - bundles))], axis=1)
     z, weights, step = quadrature(arm)
     table = tables(arm, z)
     zeta = 1.0 + gamma @ table.extension.T
@@ -53,7 +55,7 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     speed = np.sqrt(
         (dx - three * y) ** 2 + (dy + three * x) ** 2 + (zeta[..., None] + one * y - two * x) ** 2
     )
-    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
+    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))[:, :bundles]
 
 
 def line_strains(arm: Manipulator) -> Array:

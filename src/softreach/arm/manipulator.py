@@ -19,6 +19,7 @@ from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.rest_shape import STRAIGHT, RestShape, RestStrains
 from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.support.arguments import (
@@ -63,6 +64,8 @@ class Manipulator:
     """Loads beside them; None for nothing, not even its weight."""
     base: Base = UPRIGHT
     """Pose of its clamped end in the world; upright at the origin."""
+    rest: RestShape = STRAIGHT
+    """Curvature and twist of the arm that nothing drives; straight."""
     display_unit: str | None = field(default=None, compare=False)
     """Unit that the command line shows it in, "m", "cm", "mm" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
@@ -206,7 +209,9 @@ class Manipulator:
 
     @cached_property
     def _toml(self) -> str:
-        return design_file.render(self.profile, self.section, self.actuators, self.loads, self.base)
+        return design_file.render(
+            self.profile, self.section, self.actuators, self.loads, self.base, self.rest
+        )
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
@@ -288,6 +293,22 @@ class Manipulator:
         apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
         inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
         return tuple(inside.tolist())
+
+    @cached_property
+    def inner(self) -> Manipulator:
+        """The arm as tables and kernels see it: a rest shape is a bundle held at 1.
+
+        The arm itself where it is straight. `rod.driven` maps activations of the arm to those of
+        this one.
+        """
+        if self.rest.is_straight:
+            return self
+        held = RestStrains(
+            name=_unused("rest shape", self.bundle_names),
+            shape=self.rest,
+            activation_bounds=(1.0, 1.0),
+        )
+        return self.replace(actuators=(*self.actuators, held), rest=STRAIGHT)
 
     @property
     def bundle_courses(self) -> tuple[str, ...]:
@@ -379,6 +400,8 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("loads", arm.loads, "must be Loads or None")
     if not isinstance(arm.base, Base):
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
+    if not isinstance(arm.rest, RestShape):
+        yield Fault("rest", arm.rest, "must be a RestShape, such as RestShape(curvature_x=2.0)")
     unit = arm.display_unit
     if unit is not None and not (isinstance(unit, str) and unit in UNITS):
         yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
@@ -434,3 +457,8 @@ def _shared_names(arm: Manipulator) -> Iterator[Fault]:
     if not faults and len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         yield Fault("actuators", twice, "names two bundles: rename an actuator")
+
+
+def _unused(name: str, taken: Sequence[str]) -> str:
+    """The name, with a mark for each time that it is taken."""
+    return _unused(name + "'", taken) if name in taken else name

@@ -56,6 +56,7 @@ _SUFFIXES = {
     "m/s²": "_m_s2",
     "N m": "_n_m",
     "N/m": "_n_per_m",
+    "1/m": "_per_m",
 }
 
 

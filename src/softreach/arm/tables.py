@@ -19,6 +19,7 @@ from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import fields_of
+from softreach.arm.rest_shape import RestStrains
 from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [
@@ -56,6 +57,8 @@ class Tables:
 def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     """z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
 
+    U of a rest shape is its curvature; what an arm is at rest, its `inner` arm has.
+
     Args:
         arm: The design.
         stations: Z [m], shape (station,).
@@ -70,6 +73,9 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
+    for k, actuator in enumerate(arm.bundle_actuators):
+        if isinstance(actuator, RestStrains):
+            curvature[..., k] = actuator.curvature(arm.profile, z)
     is_force = [actuator.is_force for actuator in arm.bundle_actuators]
     growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
     return Tables(z, extension, curvature, growth)
@@ -115,6 +121,9 @@ def compliance(arm: Manipulator, stations: ArrayLike) -> Compliance:
 def check_extension(arm: Manipulator) -> None:
     """The theory ends where an activation would shorten the arm to nothing.
 
+    Args:
+        arm: The inner arm.
+
     Raises:
         InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, dimensions too
             large or too small for numbers of double precision, or more than a hundred turns.
@@ -149,6 +158,7 @@ def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
+    arm = arm.inner
     return _extension_range(arm, tables(arm, strain_stations(arm)).extension)
 
 

@@ -29,6 +29,7 @@ from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
 from softreach.support.files.text import read_text
@@ -48,6 +49,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "actuators": (list, True),
     "loads": (dict, False),
     "base": (dict, False),
+    "rest": (dict, False),
     "display": (dict, False),
 }
 """Keys at the top of a file, their types, and whether they are required."""
@@ -61,6 +63,7 @@ class Parts(NamedTuple):
     actuators: tuple[Actuator, ...]
     loads: Loads | None
     base: Base
+    rest: RestShape
     display_unit: str | None
 
 
@@ -154,6 +157,8 @@ class _DesignReader(TableReader):
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
         base = Base() if raw is None else self.part(Base, raw, "base")
+        raw = self._table("rest")
+        rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
         unit = self._display_unit()
         names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
@@ -163,7 +168,8 @@ class _DesignReader(TableReader):
         self._check_fit(profile, section, sound)
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
-        return Parts(profile, section, tuple(actuator for _, actuator in sound), loads, base, unit)
+        made = tuple(actuator for _, actuator in sound)
+        return Parts(profile, section, made, loads, base, rest, unit)
 
     def _display_unit(self) -> str | None:
         """Unit that the table of the display names, if there is one."""

@@ -13,6 +13,7 @@ from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_uni
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number
+from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
@@ -38,6 +39,7 @@ def json_schema() -> dict[str, Any]:
         "section": _table(Section, "Inside of the arm"),
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
+        "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
@@ -70,6 +72,7 @@ def json_schema() -> dict[str, Any]:
         },
         "loads": _of("loads"),
         "base": _of("base"),
+        "rest": _of("rest"),
         "display": {
             "description": "How the design is shown; it changes nothing about the arm",
             **_object(

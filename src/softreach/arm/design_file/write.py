@@ -21,6 +21,7 @@ from softreach.arm.design_file.keys import (
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import Profile
+from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
@@ -48,6 +49,7 @@ def render(
     actuators: Sequence[Actuator],
     loads: Loads | None,
     base: Base,
+    rest: RestShape,
 ) -> str:
     """TOML text of a design, of version 2.
 
@@ -68,6 +70,8 @@ def render(
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
     if not base.is_identity:
         blocks.append(["[base]", *_lines(base)])
+    if not rest.is_straight:
+        blocks.append(["[rest]", *_lines(rest)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 

@@ -72,6 +72,8 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["loads",] = arm.loads
     if not arm.base.is_identity:
         keyed["base",] = arm.base
+    if not arm.rest.is_straight:
+        keyed["rest",] = arm.rest
     for k, ring in enumerate(arm.section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
@@ -204,8 +206,9 @@ class Draft:
         changes: dict[str, Any] = {"profile": self._made(("profile",)), "section": self._section()}
         if self.arm.loads is not None:
             changes["loads"] = self._made(("loads",))
-        if ("base",) in self._parts:
-            changes["base"] = self._made(("base",))
+        for part in ("base", "rest"):
+            if (part,) in self._parts:
+                changes[part] = self._made((part,))
         keys = [("actuators", actuator.name) for actuator in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
         if not self._faults:
