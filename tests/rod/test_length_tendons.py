@@ -18,8 +18,11 @@ from softreach.arm import (
     Ring,
     Section,
 )
-from softreach.arm.tensions import LengthLaw, tensions_of_lengths
+from softreach.arm.lines import tensions_of_lengths
+from softreach.arm.tensions import LengthLaw
+from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign
+from tests.oracles.pulled_tendons import PulledArm
 
 LENGTH, RADIUS, MODULUS, DISTANCE = 0.3, 0.01, 1e6, 0.008
 K0, K1 = math.pi * MODULUS * RADIUS**2, math.pi / 4 * MODULUS * RADIUS**4
@@ -129,3 +132,23 @@ def test_slopes_are_those_of_differences_where_the_taut_stay_taut(arm):
 def test_a_pretension_needs_a_cable_that_stretches():
     with pytest.raises(InvalidDesign, match=r"pretension = 2.*tendon_stiffness"):
         tendons(1, pretension=2.0)
+
+
+def tip_misses(arm, count, seed=0):
+    """Distances of tips from those of least energy [m]."""
+    pulled = random_activations(arm, count, seed)
+    tips = tip_map(arm, 1e-10).tips(pulled)
+    return [math.dist(tip, PulledArm(arm, x).tip()) for tip, x in zip(tips, pulled, strict=True)]
+
+
+@settings(max_examples=4)
+@given(arm=pulled_arms())
+def test_tips_are_those_of_least_energy(arm):
+    assert max(tip_misses(arm, 2)) < 1e-7 * LENGTH
+
+
+@pytest.mark.large
+@settings(max_examples=50)
+@given(arm=pulled_arms(), seed=st.integers(0, 2**32 - 1))
+def test_tips_of_many_arms_are_those_of_least_energy(arm, seed):
+    assert max(tip_misses(arm, 3, seed)) < 1e-7 * LENGTH

@@ -11,19 +11,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon
-from softreach.arm.lines import quadrature
-from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.tables import tables
+from softreach.arm.rest_shape import RestStrains
+from softreach.arm.tables import quadrature, tables
 from softreach.kernels.box.complementarity import complementary
-from softreach.support.arrays import as_rows
 
-__all__ = ["LengthLaw", "Tensions", "tensions_of_lengths"]
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
+
+__all__ = ["LengthLaw", "Tensions"]
 
 Array = NDArray[np.float64]
 
@@ -37,24 +38,6 @@ class Tensions(NamedTuple):
     """Tendons whose tension follows the displacements, shape (n, tendon)."""
 
 
-def tensions_of_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
-    """Tensions of the tendons that are driven by length, without loads [N].
-
-    Args:
-        arm: The design.
-        activations: Of all bundles, displacements in m among them, shape (n, bundles).
-
-    Returns:
-        τ >= 0, shape (n, tendons driven by length), in the order of their bundles.
-
-    Raises:
-        InvalidInput: No finite activations of that shape.
-    """
-    arm = a_manipulator("arm", arm)
-    gamma = as_rows("activations", activations, arm.bundles, "of shape (n, bundles)")
-    return LengthLaw(arm).tensions(gamma).tension
-
-
 @dataclass(frozen=True, eq=False)
 class LengthLaw:
     """Shortening of the paths of tendons that are driven by length, and the tensions it takes.
@@ -64,6 +47,7 @@ class LengthLaw:
     """
 
     arm: Manipulator
+    """With its rest shape as a bundle: see `body_of`."""
 
     @cached_property
     def columns(self) -> NDArray[np.intp]:
@@ -91,6 +75,19 @@ class LengthLaw:
         """Bundles that change the length of matter at rest."""
         return np.flatnonzero([not each.is_force for each in self.arm.bundle_actuators])
 
+    def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:
+        """N and M of one unit of each tension at nodes, times their weights.
+
+        Returns:
+            Shapes (node, tendon) and (node, 3, tendon).
+        """
+        table = tables(self.arm, z)
+        stiffness = self.arm.section.stiffness(self.arm.profile.radius(z))
+        resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
+        force = table.extension[:, self.columns] * (weights * stiffness.axial)[:, None]
+        moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]
+        return force, moment
+
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
         """Work of one unit of tension on the strains of one unit of each activation.
@@ -100,11 +97,8 @@ class LengthLaw:
             each bundle that changes the length of matter, shape (tendon, bundle, such).
         """
         z, weights, _ = quadrature(self.arm)
+        force, moment = self.loads_at(z, weights)
         table = tables(self.arm, z)
-        stiffness = self.arm.section.stiffness(self.arm.profile.radius(z))
-        resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
-        force = table.extension[:, self.columns] * (weights * stiffness.axial)[:, None]
-        moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]
         bent = np.einsum("sct,scb->stb", moment, table.curvature)
         axial = np.einsum("st,sb->tb", force, table.extension)
         growth = table.growth[:, self._growing]
@@ -112,6 +106,15 @@ class LengthLaw:
 
     def shortening(self, inner: Array) -> Array:
         """s of the path of each tendon [m] at activations with tensions, shape (n, tendon)."""
+        return self._from_straight(inner) - self.at_rest
+
+    @cached_property
+    def at_rest(self) -> Array:
+        """s of the arm at rest from the straight one [m], shape (1, tendon)."""
+        shape = [[float(isinstance(each, RestStrains)) for each in self.arm.bundle_actuators]]
+        return self._from_straight(np.array(shape))
+
+    def _from_straight(self, inner: Array) -> Array:
         return self._sum(self._work(inner), inner)
 
     def shortening_slopes(self, inner: Array) -> Array:
