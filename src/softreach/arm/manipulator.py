@@ -13,13 +13,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import design_file
-from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
+from softreach.arm.actuators import (
+    Actuator,
+    FiberArchitecture,
+    LengthTendon,
+    Outline,
+    SectorActuator,
+)
 from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distance_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.rest_shape import STRAIGHT, RestShape, RestStrains
+from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import Stations, placed
@@ -307,19 +313,21 @@ class Manipulator:
 
     @cached_property
     def inner(self) -> Manipulator:
-        """The arm as tables and kernels see it: a rest shape is a bundle held at 1.
+        """The arm as tables and kernels see it; itself where activations load its sections.
 
-        The arm itself where it is straight. `rod.driven` maps activations of the arm to those of
-        this one.
+        A rest shape is a bundle held at 1, and tendons that are driven by length have tensions.
+        `arm.driving` maps activations of the arm to those of this one.
+
+        Raises:
+            InvalidDesign: Displacements within the bounds shorten the arm to nothing.
         """
-        if self.rest.is_straight:
+        if self.rest.is_straight and not any(
+            isinstance(actuator, LengthTendon) for actuator in self.actuators
+        ):
             return self
-        held = RestStrains(
-            name=_unused("rest shape", self.bundle_names),
-            shape=self.rest,
-            activation_bounds=(1.0, 1.0),
-        )
-        return self.replace(actuators=(*self.actuators, held), rest=STRAIGHT)
+        from softreach.arm.driving import inner_arm
+
+        return inner_arm(self)
 
     @property
     def bundle_courses(self) -> tuple[str, ...]:
@@ -498,8 +506,3 @@ def _shared_names(arm: Manipulator) -> Iterator[Fault]:
     if not faults and len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         yield Fault("actuators", twice, "names two bundles: rename an actuator")
-
-
-def _unused(name: str, taken: Sequence[str]) -> str:
-    """The name, with a mark for each time that it is taken."""
-    return _unused(name + "'", taken) if name in taken else name

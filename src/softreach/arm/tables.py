@@ -10,17 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
-from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import fields_of
 from softreach.arm.rest_shape import RestStrains
 from softreach.support.errors import Fault, InvalidDesign
+
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = [
     "Compliance",
@@ -30,6 +32,7 @@ __all__ = [
     "compliance",
     "ends_over",
     "extension_range",
+    "quadrature",
     "strain_stations",
     "tables",
 ]
@@ -37,6 +40,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _STATIONS = 101
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_PIECES = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,3 +194,11 @@ def both_sides(arm: Manipulator, stations: Array) -> Array:
 def strain_stations(arm: Manipulator) -> Array:
     """Stations Z [m] at which it is seen how far strains go."""
     return both_sides(arm, np.linspace(0.0, arm.length, _STATIONS))
+
+
+def quadrature(arm: Manipulator, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
+    """Gauss nodes between all breakpoints, their weights, and half the gap that each is in [m]."""
+    knots = np.union1d(np.linspace(0.0, arm.length, pieces + 1), arm.breakpoints)
+    half = np.diff(knots)[:, None] / 2.0
+    z = knots[:-1, None] + half * (1.0 + _NODES)
+    return z.ravel(), (half * _WEIGHTS).ravel(), np.repeat(half.ravel(), len(_NODES))

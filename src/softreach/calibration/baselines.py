@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import Actuator
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.measurements import Measurements

@@ -25,7 +25,7 @@ from softreach.calibration.errors import (
     repeatability,
 )
 from softreach.calibration.fit import Fit, fitted, started
-from softreach.calibration.free_numbers import FreeNumbers, free_numbers
+from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.calibration.uncertainty import Uncertainty, uncertainty

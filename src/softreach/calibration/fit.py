@@ -127,9 +127,8 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
         raise InvalidInput("free", f"{len(free)} numbers", allowed)
     if values[-1] > _SAME * values[0]:
         return
-    share = np.abs(axes[-1]) * free.scale / np.maximum(np.abs(free.start), free.scale)
-    share = np.abs(axes[-1]) if not share.any() else np.abs(axes[-1])
-    trading = [name for name, part in zip(free.names, share, strict=True) if part > 0.05]
+    shares = zip(free.names, np.abs(axes[-1]), strict=True)
+    trading = [name for name, share in shares if share > 0.05]
     allowed = (
         "numbers that the data can tell apart: these change together without moving any marker, "
         f"as only their ratio or their sum shows; leave out one, such as {trading[-1]}, or give "
@@ -257,7 +256,7 @@ class _Problem:
         miss = (self._at(values).places - self.places)[self.seen]
         self.unit = self.noise or robust_width(miss)
 
-    def solved(self, values: Array):  # noqa: ANN201
+    def solved(self, values: Array):
         """The end of SciPy's trust region, from these values."""
         from scipy.optimize import least_squares
 

@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.driving import Driving
-from softreach.arm.manipulator import Manipulator, body_of
+from softreach.arm.driving import Driving, body_of
+from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
 from softreach.calibration.free_numbers import FreeNumbers
 from softreach.calibration.measurements import Measurements
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.driven import DrivenRod
 from softreach.rod.free import FreeRod
+from softreach.rod.loaded.pulled import LoadedLengths
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.response import (
     NodeTables,
@@ -163,7 +163,7 @@ class MarkerModel:
         inputs = self.inputs[rows]
         at = self._explicit(arm, grid, inputs)
         rod = _rod(arm, grid)
-        gamma = DrivenRod(rod, arm).activations(inputs) if arm.inner_differs else inputs
+        gamma = _activations(arm, rod, at.bundles)
         lost = ~np.isfinite(gamma).all(axis=1)
         gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
         state = rod_state(rod, gamma, at.table)
@@ -200,6 +200,15 @@ def _rod(arm: Manipulator, grid: StepGrid) -> ArmRod:
     inner = body.with_bounds(bounds)
     rod = (FreeRod if arm.loads is None else LoadedRod)(inner, _TOL)
     return rod.in_steps(int(grid.counts.sum()))
+
+
+def _activations(arm: Manipulator, rod: ArmRod, bundles: Array) -> Array:
+    """Activations of the inner arm: tensions in place of displacements."""
+    law = LengthLaw(body_of(arm))
+    if not len(law.columns):
+        return bundles
+    lengths = law if arm.loads is None else LoadedLengths(law, rod)
+    return law.inner(bundles, lengths.tensions(bundles).tension)
 
 
 def _some(state: RodState, rows: NDArray[np.bool_]) -> RodState:

@@ -165,7 +165,7 @@ def _dead_force(arm: Manipulator, loads: Loads, z: Array, length: Array) -> Arra
     gravity = np.array(loads.gravity)
     mass = np.zeros(z.shape)
     if gravity.any():
-        mass = arm.section.mass_per_length(arm.profile.radius(z)) * length
+        mass = arm.section.mass_per_length_at(arm.profile, z) * length
     steps = mass @ WEIGHTS
     beyond = np.cumsum(steps[::-1])[::-1] - steps
     beyond = beyond[:, None] + (steps[:, None] - mass @ GAUSS.T)

@@ -20,6 +20,7 @@ from softreach.arm.actuators import (
     Actuator,
     Chamber,
     FiberArchitecture,
+    LengthTendon,
     ObliqueMuscle,
     RadialMuscle,
     Tendon,
@@ -69,6 +70,7 @@ ACTUATORS: Mapping[str, type[Actuator]] = MappingProxyType(
         "oblique_muscle": ObliqueMuscle,
         "radial_muscle": RadialMuscle,
         "tendon": Tendon,
+        "length_tendon": LengthTendon,
         "chamber": Chamber,
     }
 )

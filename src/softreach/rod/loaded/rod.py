@@ -41,6 +41,7 @@ from softreach.rod.tip_map import (
     loads_too_heavy,
     no_equilibrium_message,
     position_slopes,
+    sampled_range,
 )
 from softreach.support import parallel
 
@@ -243,13 +244,4 @@ class LoadedRod(ArmRod):
         strains = self.strains_at(stations)(gamma)
         if np.isnan(strains.extension).all():
             raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
-        bend = np.hypot(strains.curvature[..., 0], strains.curvature[..., 1])
-        return StrainRange(
-            np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),
-            _range(strains.curvature[..., 2]),
-            _range(strains.extension),
-        )
-
-
-def _range(values: Array) -> Array:
-    return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
+        return sampled_range(strains)
