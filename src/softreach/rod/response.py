@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.loads import Loads
+from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
@@ -28,6 +28,7 @@ __all__ = [
     "Response",
     "RodState",
     "StepGrid",
+    "dead_force",
     "linear_response",
     "node_tables",
     "rod_state",
@@ -135,13 +136,10 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
     # Steps without length stand where something ends: the inside of the arm decides.
     length = width[:, None] * profile.radius(z)
     table = tables(arm, z.ravel())
-    loads, soft = arm.loads, np.zeros((*z.shape, 4))
-    force = np.zeros((*z.shape, 3))
-    if loads is not None:
-        loads = loads.seen_from(arm.base)
+    soft = np.zeros((*z.shape, 4))
+    if arm.loads is not None:
         axial, bending, torsion = (c.reshape(z.shape) for c in compliance(arm, z.ravel()))
         soft = np.stack([axial, bending, bending, torsion], axis=-1)
-        force = _dead_force(arm, loads, z, length)
     shape, bundles = z.shape, arm.bundles
     return NodeTables(
         stations=z,
@@ -150,13 +148,23 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         growth=table.growth.reshape(*shape, bundles),
         curvature=table.curvature.reshape(*shape, 3, bundles),
         compliance=soft,
-        force=force,
+        force=dead_force(arm, arm.base, z, length),
         asked=np.asarray(stations, float),
     )
 
 
-def _dead_force(arm: Manipulator, loads: Loads, z: Array, length: Array) -> Array:
-    """n [N] at the nodes: all dead forces beyond, theory (60)."""
+def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
+    """n [N] at the nodes in the frame of a base, shape (step, 3, 3): dead forces beyond, (60).
+
+    Args:
+        arm: The arm, wherever its own base is.
+        base: Pose of the base.
+        z: Z of the nodes [m], shape (step, 3).
+        length: dZ there [m], likewise.
+    """
+    if arm.loads is None:
+        return np.zeros((*z.shape, 3))
+    loads = arm.loads.seen_from(base)
     others = [loads.follower_force, loads.follower_moment, loads.tip_moment]
     others += [load.moment for load in loads.point_loads]
     if any(map(any, others)):
