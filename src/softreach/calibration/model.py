@@ -80,7 +80,7 @@ def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
     """
     if not arm.markers:
         return np.array([arm.length]), np.zeros((1, 3))
-    places = np.array([marker.place_on(arm) for marker in arm.markers])
+    places = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
     return places, np.array([marker.offset for marker in arm.markers])
 
 

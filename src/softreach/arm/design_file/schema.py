@@ -11,6 +11,7 @@ from softreach.arm.along import Samples
 from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.measured import Measured
 from softreach.arm.number import Number
@@ -43,6 +44,7 @@ def json_schema() -> dict[str, Any]:
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
+        "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
@@ -76,6 +78,11 @@ def json_schema() -> dict[str, Any]:
             "description": "In the order of the activations; [] for a passive rod",
             "type": "array",
             "items": _one_of({**ACTUATORS, "own_actuator": None}, "What drives the arm"),
+        },
+        "markers": {
+            "description": "Points that go with sections of the arm",
+            "type": "array",
+            "items": _of("marker"),
         },
         "loads": _of("loads"),
         "base": _of("base"),

@@ -19,6 +19,7 @@ from softreach.arm.design_file.keys import (
     value_text,
 )
 from softreach.arm.loads import Loads
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.number import Station
 from softreach.arm.profile import Profile
@@ -54,6 +55,7 @@ def render(
     base: Base,
     rest: RestShape,
     stations: Mapping[str, float],
+    markers: Sequence[Marker],
 ) -> str:
     """TOML text of a design, of version 2.
 
@@ -72,6 +74,7 @@ def render(
         blocks.append(["[stations]", *places])
     for actuator in actuators:
         blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
+    blocks += [["[[markers]]", *_lines(marker)] for marker in markers]
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
