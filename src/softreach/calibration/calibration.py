@@ -332,7 +332,8 @@ class Calibration:
             "residual": (place, self.residuals, {"units": "m"}),
             "held_out": ("sample", self.held),
             "run": ("sample", self.data.runs),
-            "input": (("sample", "input"), self.data.inputs),
+            "rank": ("sample", np.argsort(self.data.order)),
+            "input_value": (("sample", "input"), self.data.inputs),
         }
         names = {
             "number": list(self.names),
@@ -341,8 +342,9 @@ class Calibration:
             "marker": list(self.data.marker_names),
             "axis": ["x", "y", "z"],
             "input": list(self.arm.bundle_names),
+            "input_unit": ("input", list(self.arm.bundle_units)),
         }
-        return xr.Dataset(values, names, self.provenance)
+        return xr.Dataset(values, names, {**self.provenance, "length": self.arm.length})
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -383,6 +385,37 @@ class Calibration:
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
             stream.write(text.encode())
+
+    def save_table(
+        self, path: str | PathLike[str], *, unit: str = "m", overwrite: bool = False
+    ) -> None:
+        """Write inputs, measured and predicted places and their distances, a row for each sample.
+
+        Args:
+            path: A .csv file.
+            unit: Of lengths: m, cm, mm or L.
+            overwrite: Whether it may replace any file, and not only such a table.
+        """
+        from softreach.calibration.residual_table import write_table
+
+        write_table(self, path, unit, overwrite=overwrite)
+
+    def save_report(
+        self, path: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
+    ) -> None:
+        """Write a report in one .html file: numbers, errors, verdict and pictures.
+
+        Args:
+            path: The file.
+            unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
+            overwrite: Whether it may replace any file, and not only an older report.
+
+        Raises:
+            MissingExtra: matplotlib or Jinja2 is not installed.
+        """
+        from softreach.calibration.html_report import write_report
+
+        write_report(self, path, unit, overwrite=overwrite)
 
     def __repr__(self) -> str:
         from softreach.calibration.report import summary_text
