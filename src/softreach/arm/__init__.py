@@ -22,6 +22,7 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import Material, material_names, named_material
 from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 
@@ -47,6 +48,7 @@ __all__ = [
     "Profile",
     "RadialMuscle",
     "Resultants",
+    "RigidPiece",
     "Ring",
     "RingIntegrals",
     "SampledTaper",

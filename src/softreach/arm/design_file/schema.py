@@ -15,6 +15,7 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.measured import Measured
 from softreach.arm.number import Number
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
@@ -42,6 +43,7 @@ def json_schema() -> dict[str, Any]:
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
+        "rigid_piece": _table(RigidPiece, "Stretch that neither bends nor changes its length"),
         "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
@@ -76,6 +78,11 @@ def json_schema() -> dict[str, Any]:
             "description": "In the order of the activations; [] for a passive rod",
             "type": "array",
             "items": _one_of({**ACTUATORS, "own_actuator": None}, "What drives the arm"),
+        },
+        "rigid_pieces": {
+            "description": "Where the arm is not deformed",
+            "type": "array",
+            "items": _of("rigid_piece"),
         },
         "markers": {
             "description": "Points that go with sections of the arm",

@@ -23,6 +23,7 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.number import Station
 from softreach.arm.profile import Profile
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
@@ -53,6 +54,7 @@ def render(
     loads: Loads | None,
     base: Base,
     stations: Mapping[str, float],
+    rigid_pieces: Sequence[RigidPiece],
     markers: Sequence[Marker],
 ) -> str:
     """TOML text of a design, of version 2.
@@ -72,6 +74,7 @@ def render(
         blocks.append(["[stations]", *places])
     for actuator in actuators:
         blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
+    blocks += [["[[rigid_pieces]]", *_lines(piece)] for piece in rigid_pieces]
     blocks += [["[[markers]]", *_lines(marker)] for marker in markers]
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
