@@ -198,7 +198,10 @@ def _number(number: Number) -> _Schema:
         "interpolation": {"enum": kinds},
     }
     along = _object(properties, ["stations_over_length", "values"])
-    return {**about, **along} if number.shape == "along" else {**about, "anyOf": [single, along]}
+    if number.shape == "along":
+        return {**about, **along}
+    pair = [{"type": "array", "items": single, "minItems": 2, "maxItems": 2}] if number.pair else []
+    return {**about, "anyOf": [single, *pair, along]}
 
 
 def _limits(allowed: Range) -> dict[str, float]:

@@ -299,6 +299,7 @@ def _element(number: Number, k: int) -> Number:
         meaning=f"{number.meaning}, number {k}",
         shape="single",
         along=None,
+        pair=False,
     )
 
 
