@@ -111,9 +111,9 @@ actuators[7].radius_m = 0: must be a finite number > 0 m
 actuators[7].pressure_bounds_pa = [0, '1 bar']: must be a pair (lower, upper)
 actuators[7].end_over_length = 0.4: must be above start_over_length = 0.5
 actuators[8].kind: required key is missing: one of fiber
-actuators[9].kind = 'fibre': must be one of fiber, oblique_muscle, radial_muscle, tendon, chamber
+actuators[9].kind = 'fibre': must be one of fiber, oblique_muscle, radial_muscle, tendon, length_tendon, chamber
 actuators[2].name = 'a': must differ from actuators[1].name
-"""
+"""  # noqa: E501
 
 
 def faults_of(text: str) -> list[str]:

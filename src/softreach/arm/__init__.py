@@ -5,6 +5,7 @@ from softreach.arm.actuators import (
     Actuator,
     Chamber,
     FiberArchitecture,
+    LengthTendon,
     ObliqueMuscle,
     Outline,
     RadialMuscle,
@@ -22,6 +23,7 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import Material, material_names, named_material
 from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
+from softreach.arm.rest_shape import RestShape
 from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
@@ -34,6 +36,7 @@ __all__ = [
     "DesignSummary",
     "FiberArchitecture",
     "Layer",
+    "LengthTendon",
     "LinearTaper",
     "Loads",
     "Manipulator",
@@ -47,6 +50,7 @@ __all__ = [
     "PointLoad",
     "Profile",
     "RadialMuscle",
+    "RestShape",
     "Resultants",
     "RigidPiece",
     "Ring",

@@ -13,13 +13,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import design_file
-from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
+from softreach.arm.actuators import (
+    Actuator,
+    FiberArchitecture,
+    LengthTendon,
+    Outline,
+    SectorActuator,
+)
 from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distance_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.loads import Loads
 from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.rigid import RigidPiece
 from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Ring, Section, Stiffness, name_faults
@@ -66,6 +73,8 @@ class Manipulator:
     """Loads beside them; None for nothing, not even its weight."""
     base: Base = UPRIGHT
     """Pose of its clamped end in the world; upright at the origin."""
+    rest: RestShape = STRAIGHT
+    """Curvature and twist of the arm that nothing drives; straight."""
     stations: Mapping[str, float] = Stations()
     """Z [m] of stations by name, at which actuators, rigid pieces and markers may be."""
     rigid_pieces: tuple[RigidPiece, ...] = ()
@@ -228,6 +237,7 @@ class Manipulator:
             self.actuators,
             self.loads,
             self.base,
+            self.rest,
             self.stations,
             self.rigid_pieces,
             self.markers,
@@ -329,6 +339,24 @@ class Manipulator:
         rigid = np.any(inside, axis=0)
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
+    @cached_property
+    def inner(self) -> Manipulator:
+        """The arm as tables and kernels see it; itself where activations load its sections.
+
+        A rest shape is a bundle held at 1, and tendons that are driven by length have tensions.
+        `arm.driving` maps activations of the arm to those of this one.
+
+        Raises:
+            InvalidDesign: Displacements within the bounds shorten the arm to nothing.
+        """
+        if self.rest.is_straight and not any(
+            isinstance(actuator, LengthTendon) for actuator in self.actuators
+        ):
+            return self
+        from softreach.arm.driving import inner_arm
+
+        return inner_arm(self)
+
     @property
     def bundle_courses(self) -> tuple[str, ...]:
         """Direction of contraction within each bundle; see `Actuator.course`."""
@@ -419,14 +447,20 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("loads", arm.loads, "must be Loads or None")
     if not isinstance(arm.base, Base):
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
-    for name, kind in (("rigid_pieces", RigidPiece), ("markers", Marker)):
-        parts = getattr(arm, name)
-        if not isinstance(parts, tuple | list) or not all(isinstance(x, kind) for x in parts):
-            yield Fault(name, parts, f"must be {kind.__name__}s")
+    if not isinstance(arm.rest, RestShape):
+        yield Fault("rest", arm.rest, "must be a RestShape, such as RestShape(curvature_x=2.0)")
+    yield from _sequence_faults(arm)
     unit = arm.display_unit
     if unit is not None and not (isinstance(unit, str) and unit in UNITS):
         yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
     yield from _kind_faults(arm.actuators)
+
+
+def _sequence_faults(arm: Manipulator) -> Iterator[Fault]:
+    for name, kind in (("rigid_pieces", RigidPiece), ("markers", Marker)):
+        parts = getattr(arm, name)
+        if not isinstance(parts, tuple | list) or not all(isinstance(x, kind) for x in parts):
+            yield Fault(name, parts, f"must be {kind.__name__}s")
 
 
 def _kind_faults(actuators: Any) -> Iterator[Fault]:

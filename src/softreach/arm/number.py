@@ -58,6 +58,7 @@ _SUFFIXES = {
     "N m": "_n_m",
     "N m²": "_n_m2",
     "N/m": "_n_per_m",
+    "1/m": "_per_m",
     "kg/m": "_kg_per_m",
 }
 

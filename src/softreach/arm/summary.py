@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -193,7 +192,8 @@ def load_number(arm: Manipulator) -> float:
     """
     if faults := load_number_faults(arm):
         raise InvalidDesign(faults)
-    per_length, force = (_own_weight(arm), 0.0) if arm.loads is None else _of_loads(arm, arm.loads)
+    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
+    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
     stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
 
@@ -212,26 +212,6 @@ def load_number_faults(arm: Manipulator) -> list[Fault]:
     faults = arm.section.modulus_faults("where weight counts")
     weighs = arm.loads is None or any(arm.loads.gravity)
     return faults + (arm.section.density_faults("where weight counts") if weighs else [])
-
-
-def _own_weight(arm: Manipulator, gravity: float = GRAVITY) -> float:
-    """Weight per length at the base [N/m]."""
-    return gravity * float(arm.section.mass_per_length_at(arm.profile, 0.0))
-
-
-def _of_loads(arm: Manipulator, loads: Loads) -> tuple[float, float]:
-    """Force per length at the base [N/m], and other forces with moments over the length [N]."""
-    gravity = math.hypot(*loads.gravity)
-    payload = loads.payload * gravity
-    per_length = math.hypot(*loads.force_per_length)
-    per_length += _own_weight(arm, gravity) if gravity else 0.0
-    force = payload + math.hypot(*loads.tip_force) + math.hypot(*loads.follower_force)
-    moment = payload * math.hypot(*loads.payload_arm)
-    moment += math.hypot(*loads.tip_moment) + math.hypot(*loads.follower_moment)
-    for load in loads.point_loads:
-        force += math.hypot(*load.force)
-        moment += math.hypot(*load.moment)
-    return per_length, force + moment / arm.length
 
 
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:

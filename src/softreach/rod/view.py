@@ -32,6 +32,7 @@ from softreach.rod.tip_map import (
 from softreach.support.arguments import as_instance
 
 __all__ = [
+    "DerivedMap",
     "PlacedRod",
     "View",
     "activation_measures",
@@ -88,7 +89,7 @@ def _view(rod: TipMap) -> View:
 
 
 @dataclass(frozen=True, repr=False)
-class _DerivedMap(TipMap):
+class DerivedMap(TipMap):
     """A tip map made of another one, which answers where nothing changes."""
 
     base: TipMap
@@ -149,7 +150,7 @@ class _DerivedMap(TipMap):
 
 
 @dataclass(frozen=True, repr=False)
-class PlacedRod(_DerivedMap):
+class PlacedRod(DerivedMap):
     """A free or loaded rod as the world sees it: r = r(0) + R r', with r' in the base's frame.
 
     Its base stands, hangs or leans anywhere.
@@ -216,7 +217,7 @@ class PlacedRod(_DerivedMap):
 
 
 @dataclass(frozen=True, repr=False)
-class View(_DerivedMap):
+class View(DerivedMap):
     """A tip map in other coordinates x of its activations, γ = offset + scale ∘ x.
 
     A search that takes NaN for a failed step ends at places that the arm can hold, where unstable

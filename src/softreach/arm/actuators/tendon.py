@@ -56,6 +56,8 @@ class Tendon(PolarActuator):
     activation: ClassVar[str] = "tension"
     is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "tendon"
+    least: ClassVar[float] = 0.0
+    """Least activation that a bound may be."""
     validity: ClassVar[str] = (
         "Linear material: real silicone (neo-Hookean) bends less than this, by about 2.3 τ/K0. "
         "Tendons that are not parallel to the axis pull along their direction before activation, "
@@ -175,7 +177,7 @@ class Tendon(PolarActuator):
     def _faults(self) -> list[Fault]:
         faults = super()._faults() + length_or_ratio_faults(vars(self), "distance")
         tensions = as_numbers(self.activation_bounds)
-        if tensions.size and tensions.min() < 0:
+        if tensions.size and tensions.min() < self.least:
             allowed = "must be at least 0 N: a tendon pulls and cannot push"
             faults.append(Fault("activation_bounds", self.activation_bounds, allowed))
         turns_evenly = all(fault.path != "revolution" for fault in faults) and self.revolution != 0

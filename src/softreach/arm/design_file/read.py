@@ -30,6 +30,7 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import PLACE, Located, Stations, placed
@@ -54,6 +55,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "markers": (list, False),
     "loads": (dict, False),
     "base": (dict, False),
+    "rest": (dict, False),
     "display": (dict, False),
 }
 """Keys at the top of a file, their types, and whether they are required."""
@@ -67,6 +69,7 @@ class Parts(NamedTuple):
     actuators: tuple[Actuator, ...]
     loads: Loads | None
     base: Base
+    rest: RestShape
     stations: Mapping[str, float]
     rigid_pieces: tuple[RigidPiece, ...]
     markers: tuple[Marker, ...]
@@ -163,6 +166,8 @@ class _DesignReader(TableReader):
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
         base = Base() if raw is None else self.part(Base, raw, "base")
+        raw = self._table("rest")
+        rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
         stations = self._stations()
         others = {
             key: [(k, self.part(kind, raw, f"{key}[{k}]")) for k, raw in self._tables(key)]
@@ -183,7 +188,7 @@ class _DesignReader(TableReader):
             self.faults += self._of_section(loads.section_faults(section, profile.length))
         actuators = tuple(actuator for _, actuator in sound)
         rigid, markers = (tuple(part for _, part in each) for each in made.values())
-        return Parts(profile, section, actuators, loads, base, stations, rigid, markers, unit)
+        return Parts(profile, section, actuators, loads, base, rest, stations, rigid, markers, unit)
 
     def _stations(self) -> Stations | None:
         """Places of stations by name; None where there are faults."""

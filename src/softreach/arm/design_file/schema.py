@@ -15,6 +15,7 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.measured import Measured
 from softreach.arm.number import Number
+from softreach.arm.rest_shape import RestShape
 from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import Range
@@ -42,6 +43,7 @@ def json_schema() -> dict[str, Any]:
         "measured": _table(Measured, "What was measured, in place of what follows from materials"),
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
+        "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
         "rigid_piece": _table(RigidPiece, "Stretch that neither bends nor changes its length"),
         "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
@@ -91,6 +93,7 @@ def json_schema() -> dict[str, Any]:
         },
         "loads": _of("loads"),
         "base": _of("base"),
+        "rest": _of("rest"),
         "display": {
             "description": "How the design is shown; it changes nothing about the arm",
             **_object(

@@ -23,6 +23,7 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.number import Station
 from softreach.arm.profile import Profile
+from softreach.arm.rest_shape import RestShape
 from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
@@ -53,6 +54,7 @@ def render(
     actuators: Sequence[Actuator],
     loads: Loads | None,
     base: Base,
+    rest: RestShape,
     stations: Mapping[str, float],
     rigid_pieces: Sequence[RigidPiece],
     markers: Sequence[Marker],
@@ -81,6 +83,8 @@ def render(
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
     if not base.is_identity:
         blocks.append(["[base]", *_lines(base)])
+    if not rest.is_straight:
+        blocks.append(["[rest]", *_lines(rest)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 

@@ -74,6 +74,8 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["loads",] = arm.loads
     if not arm.base.is_identity:
         keyed["base",] = arm.base
+    if not arm.rest.is_straight:
+        keyed["rest",] = arm.rest
     if arm.stations:
         keyed["stations",] = arm.stations
     keyed |= {("rigid_pieces", k): piece for k, piece in enumerate(arm.rigid_pieces)}
@@ -212,10 +214,9 @@ class Draft:
         changes: dict[str, Any] = {"profile": self._made(("profile",)), "section": self._section()}
         if self.arm.loads is not None:
             changes["loads"] = self._made(("loads",))
-        if ("base",) in self._parts:
-            changes["base"] = self._made(("base",))
-        if ("stations",) in self._parts:
-            changes["stations"] = self._made(("stations",))
+        for part in ("base", "rest", "stations"):
+            if (part,) in self._parts:
+                changes[part] = self._made((part,))
         pieces = (self._made(("rigid_pieces", k)) for k in range(len(self.arm.rigid_pieces)))
         changes["rigid_pieces"] = tuple(pieces)
         markers = (self._made(("markers", marker.name)) for marker in self.arm.markers)
