@@ -20,6 +20,7 @@ from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material, material_names, named_material
+from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Layer, Ring, Section, Stiffness
@@ -38,6 +39,7 @@ __all__ = [
     "Loads",
     "Manipulator",
     "Material",
+    "Measured",
     "ObliqueMuscle",
     "Outline",
     "Pieces",

@@ -159,8 +159,7 @@ def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:
     ends = (rates[..., None] * bounds).min(-1)
     others = 1.0 + np.delete(ends, columns, axis=1).sum(1)
     pulled = -ends[:, columns].sum(1)
-    with np.errstate(divide="ignore"):
-        share = float(((1.0 - _LEAST_EXTENSION) * others / pulled).min())
+    share = float(((1.0 - _LEAST_EXTENSION) * others / np.maximum(pulled, 1e-300)).min())
     fitting = bounds.copy()
     fitting[columns] *= min(1.0, share)
     return fitting

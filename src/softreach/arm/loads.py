@@ -112,7 +112,7 @@ class Loads(Part):
         payload = self.payload * gravity
         per_length = math.hypot(*self.force_per_length)
         if gravity:
-            per_length += gravity * float(section.mass_per_length(profile.radius(0.0)))
+            per_length += gravity * float(section.mass_per_length_at(profile, 0.0))
         force = payload + math.hypot(*self.tip_force) + math.hypot(*self.follower_force)
         moment = payload * math.hypot(*self.payload_arm)
         moment += math.hypot(*self.tip_moment) + math.hypot(*self.follower_moment)

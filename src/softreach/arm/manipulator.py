@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -28,6 +28,7 @@ from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.stations import Stations, placed
 from softreach.support.arguments import (
     as_flag,
     as_given,
@@ -72,6 +73,8 @@ class Manipulator:
     """Pose of its clamped end in the world; upright at the origin."""
     rest: RestShape = STRAIGHT
     """Curvature and twist of the arm that nothing drives; straight."""
+    stations: Mapping[str, float] = Stations()
+    """Z [m] of stations by name, at which actuators may begin and end."""
     display_unit: str | None = field(default=None, compare=False)
     """Unit that the command line shows it in, "m", "cm", "mm" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
@@ -79,7 +82,8 @@ class Manipulator:
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):
             raise InvalidDesign(faults)
-        object.__setattr__(self, "actuators", tuple(_named(self.actuators)))
+        object.__setattr__(self, "stations", _stations(self.stations))
+        object.__setattr__(self, "actuators", _placed(_named(self.actuators), self.stations))
         if faults := list(_shared_names(self)) or list(_fit_faults(self)):
             raise InvalidDesign(faults)
 
@@ -216,7 +220,13 @@ class Manipulator:
     @cached_property
     def _toml(self) -> str:
         return design_file.render(
-            self.profile, self.section, self.actuators, self.loads, self.base, self.rest
+            self.profile,
+            self.section,
+            self.actuators,
+            self.loads,
+            self.base,
+            self.rest,
+            self.stations,
         )
 
     @classmethod
@@ -291,8 +301,9 @@ class Manipulator:
 
     @cached_property
     def breakpoints(self) -> tuple[float, ...]:
-        """Stations inside (0, L) where profile or actuators are not smooth, ascending [m]."""
+        """Stations inside (0, L) where profile, section or actuators are not smooth [m]."""
         places = {0.0, self.length, *self.profile.breakpoints}
+        places.update(self.length * x for x in self.section.breaks)
         places.update(z for actuator in self.actuators for z in actuator.breakpoints(self.profile))
         ascending = np.array(sorted(places))
         # Two that differ by rounding alone are one.
@@ -429,13 +440,43 @@ def _kind_faults(actuators: Any) -> Iterator[Fault]:
         yield Fault("actuators", f"{count} bundles", f"must be at most {MOST_BUNDLES} in all")
 
 
+def _stations(places: Any) -> Stations:
+    """Stations by name, with their faults under the arm's path."""
+    try:
+        return places if isinstance(places, Stations) else Stations(places)
+    except InvalidDesign as error:
+        paths = [f"stations.{fault.path}".rstrip(".") for fault in error.faults]
+        raise InvalidDesign(list(map(_renamed, error.faults, paths))) from None
+
+
+def _placed(actuators: Iterable[Actuator], stations: Mapping[str, float]) -> tuple[Actuator, ...]:
+    """The actuators where the stations that they name are."""
+    made, faults = [], []
+    for actuator in actuators:
+        try:
+            made.append(placed(actuator, stations))
+        except InvalidDesign as error:
+            faults += [_renamed(fault, f"{actuator.name}.{fault.path}") for fault in error.faults]
+    if faults:
+        raise InvalidDesign(faults)
+    return tuple(made)
+
+
+def _renamed(fault: Fault, path: str) -> Fault:
+    return fault._replace(path=path)
+
+
 def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
     """Faults that keep actuators and loads from acting on this profile and section."""
+    for name, z in arm.stations.items():
+        if z > arm.length:
+            yield Fault(f"stations.{name}", z, f"must be on the arm, at most {arm.length:g} m")
     if arm.loads is not None:
         yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:
         parts = arm.profile, arm.section
-        faults = actuator.section_faults(*parts) or distance_faults(actuator, *parts)
+        faults = actuator.place_faults(arm.length) or actuator.section_faults(*parts)
+        faults = faults or distance_faults(actuator, *parts)
         yield from (
             fault
             if fault.path.startswith(("rings", "core"))

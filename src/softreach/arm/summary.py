@@ -121,9 +121,9 @@ def _pairs(values: Iterator[tuple[float, float]]) -> Array:
 def _of_matter(arm: Manipulator) -> dict[str, Any]:
     """Stiffness, mass and load number, as far as moduli and densities are known."""
     moduli, densities = arm.section.modulus_faults(""), arm.section.density_faults("")
-    ends = arm.profile.radius(np.array([0.0, arm.length]))
+    ends = np.array([0.0, arm.length])
     return {
-        "stiffness": None if moduli else arm.section.stiffness(ends),
+        "stiffness": None if moduli else arm.section.stiffness_at(arm.profile, ends),
         "mass": None if densities else mass(arm),
         "load_number": None if load_number_faults(arm) else load_number(arm),
         "lacking": (
@@ -165,7 +165,8 @@ def _slender_bending(arm: Manipulator) -> tuple[float, float]:
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
     angle = fiber.helical_angle_on(arm.profile, arm.section)
-    return float(angle(fiber.start_over_length)) if isinstance(angle, AlongArm) else angle
+    start, _ = fiber.ends_over_length(arm.length)
+    return float(angle(start)) if isinstance(angle, AlongArm) else angle
 
 
 def mass(arm: Manipulator) -> float:
@@ -189,12 +190,11 @@ def load_number(arm: Manipulator) -> float:
     Raises:
         InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
     """
-    base = arm.profile.radius(0.0)
     if faults := load_number_faults(arm):
         raise InvalidDesign(faults)
     own = Loads(gravity=(0.0, 0.0, -GRAVITY))
     per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
-    stiffness = arm.section.stiffness(base).bending
+    stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
 
 

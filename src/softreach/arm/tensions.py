@@ -82,7 +82,7 @@ class LengthLaw:
             Shapes (node, tendon) and (node, 3, tendon).
         """
         table = tables(self.arm, z)
-        stiffness = self.arm.section.stiffness(self.arm.profile.radius(z))
+        stiffness = self.arm.section.stiffness_at(self.arm.profile, z)
         resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
         force = table.extension[:, self.columns] * (weights * stiffness.axial)[:, None]
         moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]

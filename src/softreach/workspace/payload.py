@@ -262,7 +262,7 @@ def _check(arm: Manipulator) -> None:
 def _usual_payloads(arm: Manipulator) -> Array:
     """Payloads between those that hardly bend the arm and those that bend it far [kg]."""
     assert arm.loads is not None
-    stiffness = arm.section.stiffness(arm.profile.radius(np.array([0.5 * arm.length])))
+    stiffness = arm.section.stiffness_at(arm.profile, np.array([0.5 * arm.length]))
     weight = float(stiffness.bending[0]) / arm.length**2
     mass = weight / float(np.linalg.norm(arm.loads.gravity))
     rounded = float(f"{mass:.1g}")

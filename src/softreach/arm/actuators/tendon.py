@@ -137,15 +137,14 @@ class Tendon(PolarActuator):
 
         The revolution of a routing is its rotation from where the tendon begins to its anchor.
         """
-        del section
         if field == "revolution" and self.routing is not None:
-            return float(np.diff(self.routing([self.start_over_length, self.end_over_length]))[0])
+            return float(np.diff(self.routing(self.ends_over_length(profile.length)))[0])
         base = float(profile.radius(0.0))
         if field == "distance" and self.distance is None:
             return (self.distance_ratio or 0.0) * base
         if field == "distance_ratio" and isinstance(self.distance, int | float):
             return self.distance / base
-        return getattr(self, field)
+        return super().value_on(field, profile, section)
 
     def _route(self, profile: Profile, z: Array) -> _Route:
         column = z[:, None]
@@ -166,8 +165,9 @@ class Tendon(PolarActuator):
         x = z / profile.length
         if self.routing is not None:
             return self.routing(x), self.routing.derivative(x) / profile.length
-        rate = self.revolution / (self.end_over_length - self.start_over_length)
-        return rate * (x - self.start_over_length), np.full(z.shape, rate / profile.length)
+        start, end = self.ends_over_length(profile.length)
+        rate = self.revolution / (end - start)
+        return rate * (x - start), np.full(z.shape, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults() + length_or_ratio_faults(vars(self), "distance")

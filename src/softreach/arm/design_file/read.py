@@ -31,6 +31,7 @@ from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.stations import PLACE, Stations, placed
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
 from softreach.support.files.text import read_text
 from softreach.support.units import UNITS
@@ -46,6 +47,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "materials": (dict, False),
     "section": (dict, False),
     "rings": (list, True),
+    "stations": (dict, False),
     "actuators": (list, True),
     "loads": (dict, False),
     "base": (dict, False),
@@ -64,6 +66,7 @@ class Parts(NamedTuple):
     loads: Loads | None
     base: Base
     rest: RestShape
+    stations: Mapping[str, float]
     display_unit: str | None
 
 
@@ -159,17 +162,33 @@ class _DesignReader(TableReader):
         base = Base() if raw is None else self.part(Base, raw, "base")
         raw = self._table("rest")
         rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
+        stations = self._stations()
         unit = self._display_unit()
         names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
-        if profile is None or section is None:
+        if profile is None or section is None or stations is None:
             return None
         sound = [(k, actuator) for k, actuator in actuators if actuator is not None]
-        self._check_fit(profile, section, sound)
+        self._check_fit(profile, section, stations, sound)
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
         made = tuple(actuator for _, actuator in sound)
-        return Parts(profile, section, made, loads, base, rest, unit)
+        return Parts(profile, section, made, loads, base, rest, stations, unit)
+
+    def _stations(self) -> Stations | None:
+        """Places of stations by name; None where there are faults."""
+        before = len(self.faults)
+        places = {
+            name: self.number(PLACE, raw, f"stations.{key_text(name)}")
+            for name, raw in (self._table("stations") or {}).items()
+        }
+        try:
+            stations = Stations({name: z for name, z in places.items() if z is not WRONG})
+        except InvalidDesign as error:
+            for fault in error.faults:
+                self.refused(f"stations.{key_text(fault.path)}", fault.value, fault.allowed)
+            return None
+        return stations if len(self.faults) == before else None
 
     def _display_unit(self) -> str | None:
         """Unit that the table of the display names, if there is one."""
@@ -330,18 +349,33 @@ class _DesignReader(TableReader):
             return None
 
     def _check_fit(
-        self, profile: Profile, section: Section, actuators: list[tuple[int, Actuator]]
+        self,
+        profile: Profile,
+        section: Section,
+        stations: Stations,
+        actuators: list[tuple[int, Actuator]],
     ) -> None:
         """Faults that keep actuators from driving this body."""
         lacking: list[Fault] = []
         for k, actuator in actuators:
             named = dataclasses.replace(actuator, name=actuator.name or f"actuators[{k}]")
-            for fault in named.section_faults(profile, section):
+            for fault in _fit_faults(named, profile, section, stations):
                 if fault.path.startswith(("rings", "core")):
                     lacking.append(fault)
                 else:
                     self.faults.append(fault._replace(path=f"actuators[{k}].{fault.path}"))
         self.faults += self._of_section(lacking)
+
+
+def _fit_faults(
+    actuator: Actuator, profile: Profile, section: Section, stations: Stations
+) -> list[Fault]:
+    """Faults that keep one actuator from driving a body."""
+    try:
+        there = placed(actuator, stations)
+    except InvalidDesign as error:
+        return list(error.faults)
+    return there.place_faults(profile.length) or there.section_faults(profile, section)
 
 
 def _of_own_kind(kind: type[Kind], table: Mapping[str, Any]) -> Kind:

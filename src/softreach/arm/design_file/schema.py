@@ -12,6 +12,7 @@ from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
+from softreach.arm.measured import Measured
 from softreach.arm.number import Number
 from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Ring, Section
@@ -37,6 +38,7 @@ def json_schema() -> dict[str, Any]:
         "inline_material": _table(Material, "Material where it is used"),
         "ring": _table(Ring, "Layer between two radii"),
         "section": _table(Section, "Inside of the arm"),
+        "measured": _table(Measured, "What was measured, in place of what follows from materials"),
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
@@ -64,6 +66,11 @@ def json_schema() -> dict[str, Any]:
             "type": "array",
             "items": _of("ring"),
             "minItems": 1,
+        },
+        "stations": {
+            "description": "Places along the arm by name, Z [m]",
+            "type": "object",
+            "additionalProperties": {"type": "number", "minimum": 0},
         },
         "actuators": {
             "description": "In the order of the activations; [] for a passive rod",
@@ -136,6 +143,8 @@ def _table(
 
 def _value(part: type, key: Key) -> _Schema:
     """The schema of one key."""
+    if key.of_names:
+        return {**_TEXT, "description": f"Name of a station, in place of {key.field}_m"}
     if key.number is not None:
         return _number(key.number)
     if key.field == "activation_bounds":
@@ -146,6 +155,7 @@ def _value(part: type, key: Key) -> _Schema:
     others: dict[str, _Schema] = {
         "ring": {"type": ["integer", "string"], "description": "Index or name of its ring"},
         "material": {"anyOf": [_TEXT, _of("inline_material")]},
+        "measured": _of("measured"),
         "core": {"anyOf": [_TEXT, _of("inline_material")]},
         "points": {
             "description": "The way the straight arm points, or a rotation",

@@ -13,6 +13,7 @@ from softreach.arm.along import Pieces, Samples
 from softreach.arm.design_file.keys import Key, field_keys, in_file_units, keys_of, radians
 from softreach.arm.loads import PointLoad
 from softreach.arm.material import Material
+from softreach.arm.measured import Measured
 from softreach.arm.number import Number, series_faults
 from softreach.arm.profile import Profile
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
@@ -80,9 +81,12 @@ class TableReader:
         keys = {name: key for name, key in keys_of(kind).items() if name not in without}
         values: dict[str, Any] = {}
         for name, key in keys.items():
-            if name in raw:
+            if name in raw and key.field in values:
+                allowed = f"give exactly one of {key.field} (a name) and {name}"
+                values[key.field] = self.refused(f"{path}.{name}", raw[name], allowed)
+            elif name in raw:
                 values[key.field] = self.value(key, raw[name], f"{path}.{name}")
-            elif key.required:
+            elif key.required and key.field not in values:
                 values[key.field] = self.refused(f"{path}.{name}", None, "required key is missing")
         fields = {key.field: name for name, key in keys.items()}
         for name in raw:
@@ -103,6 +107,9 @@ class TableReader:
             return self.material(raw, path)
         if key.field == "points":  # words or a rotation, which the base judges
             return raw
+        if key.field == "measured":
+            made = self.part(Measured, raw, path)
+            return WRONG if made is None else made
         if key.field == "point_loads":
             return self._point_loads(raw, path)
         return raw if isinstance(raw, str) else self.refused(path, raw, "must be text")

@@ -74,10 +74,14 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["base",] = arm.base
     if not arm.rest.is_straight:
         keyed["rest",] = arm.rest
+    if arm.stations:
+        keyed["stations",] = arm.stations
     for k, ring in enumerate(arm.section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
         keyed["core",] = arm.section.core
+    if arm.section.measured is not None:
+        keyed["measured",] = arm.section.measured
     return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
 
 
@@ -206,7 +210,7 @@ class Draft:
         changes: dict[str, Any] = {"profile": self._made(("profile",)), "section": self._section()}
         if self.arm.loads is not None:
             changes["loads"] = self._made(("loads",))
-        for part in ("base", "rest"):
+        for part in ("base", "rest", "stations"):
             if (part,) in self._parts:
                 changes[part] = self._made((part,))
         keys = [("actuators", actuator.name) for actuator in self.arm.actuators]
@@ -230,8 +234,9 @@ class Draft:
             material = self._made(("rings", k, "material"))
             rings.append(self._made(("rings", k), **({"material": material} if material else {})))
         core = self._made(("core",)) if ("core",) in self._parts else None
+        measured = self._made(("measured",)) if ("measured",) in self._parts else None
         if len(self._faults) == before:
-            return self._made(("section",), rings=tuple(rings), core=core)
+            return self._made(("section",), rings=tuple(rings), core=core, measured=measured)
         for (name, _), value in self._parts["section",].values.items():
             # by themselves, as the parts around them are faulty
             self._faults += fields_of(Section)[name].faults(value)

@@ -19,6 +19,7 @@ from softreach.arm.number import Number, fields_of
 from softreach.arm.parameters.draft import Draft, PartKey, Path, part_of, parts
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
+from softreach.arm.stations import PLACE, Stations
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, Range
 
@@ -130,6 +131,15 @@ class OwnParameter(Parameter):
             return
         for k, value in enumerate(values):
             draft.set(self.name, path._replace(place=(*path.place, k)), value + amount)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Place(OwnParameter):
+    """The place of a named station: what begins, ends or stands there moves with it."""
+
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Z [m]."""
+        return (arm.stations[self.path.field],)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,6 +264,11 @@ def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
 
 def _of_part(key: PartKey, part: Any) -> Iterator[OwnParameter]:
     """Its numbers, first those that stand alone, and the bounds of an actuator."""
+    if isinstance(part, Stations):
+        for name in part:
+            yield _Place(
+                name=f"stations.{name}", owner="stations", number=PLACE, path=Path(key, name)
+            )
     numbers = fields_of(type(part)).values()
     for number in numbers:
         if number.shape == "single":
