@@ -25,6 +25,7 @@ from softreach.arm.design_file.keys import (
     own_kind,
 )
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
+from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
@@ -49,6 +50,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "rings": (list, True),
     "stations": (dict, False),
     "actuators": (list, True),
+    "drives": (list, False),
     "loads": (dict, False),
     "base": (dict, False),
     "rest": (dict, False),
@@ -67,6 +69,7 @@ class Parts(NamedTuple):
     base: Base
     rest: RestShape
     stations: Mapping[str, float]
+    drives: tuple[Drive, ...]
     display_unit: str | None
 
 
@@ -156,6 +159,7 @@ class _DesignReader(TableReader):
             self.refused("actuators", f"{len(tables):,} tables", f"must be at most {MOST_BUNDLES}")
             return None
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
+        drives = [self.part(Drive, raw, f"drives[{k}]") for k, raw in self._tables("drives")]
         raw = self._table("loads")
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
@@ -173,7 +177,8 @@ class _DesignReader(TableReader):
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
         made = tuple(actuator for _, actuator in sound)
-        return Parts(profile, section, made, loads, base, rest, stations, unit)
+        known = tuple(drive for drive in drives if drive is not None)
+        return Parts(profile, section, made, loads, base, rest, stations, known, unit)
 
     def _stations(self) -> Stations | None:
         """Places of stations by name; None where there are faults."""

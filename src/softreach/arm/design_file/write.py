@@ -18,6 +18,7 @@ from softreach.arm.design_file.keys import (
     keys_of,
     value_text,
 )
+from softreach.arm.drives import BundleNumbers, Drive
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.number import Station
@@ -31,7 +32,7 @@ __all__ = ["display_text", "render"]
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 
-_FIRST = ("name", "ring", "length", "revolution")
+_FIRST = ("name", "unit", "ring", "length", "revolution")
 _LAST = (
     "taper",
     "offset",
@@ -54,6 +55,7 @@ def render(
     base: Base,
     rest: RestShape,
     stations: Mapping[str, float],
+    drives: Sequence[Drive],
 ) -> str:
     """TOML text of a design, of version 2.
 
@@ -72,6 +74,7 @@ def render(
         blocks.append(["[stations]", *places])
     for actuator in actuators:
         blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
+    blocks += [["[[drives]]", *_lines(drive)] for drive in drives]
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
@@ -171,6 +174,8 @@ def _rank(field: str) -> int:
 
 
 def _text(key: str, value: Any) -> str:
+    if isinstance(value, BundleNumbers):
+        return inline_table((key_text(name), value_text(x)) for name, x in value.items())
     if isinstance(value, Station):
         return value_text(value.name)
     number = degrees_text if key.endswith("_deg") else value_text
