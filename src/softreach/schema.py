@@ -62,6 +62,7 @@ _CONFIGURATION = {
     "radius": (("station",), "m", "outer radius R2 before activation"),
     "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
+_MARKERS = {"marker_position": (("sample", "marker", "axis"), "m", "place of each marker")}
 
 
 def cloud_dataset(
@@ -109,19 +110,22 @@ def configuration_dataset(
     frame: str = "world",
     **arrays: Array,
 ) -> xr.Dataset:
-    """Shapes of an arm at stations Z, one for each row of `activation`.
+    """Shapes of an arm at stations Z, and its markers, one for each row of `activation`.
 
     `names` are those of the bundles with a column there; by default all. `frame` is that of the
     arrays.
     """
     import xarray as xr
 
-    variables = _variables(_CONFIGURATION, arm, {**arrays, "activation": activation}, names)
+    marked = "marker_position" in arrays
+    table = _CONFIGURATION | (_MARKERS if marked else {})
+    variables = _variables(table, arm, {**arrays, "activation": activation}, names)
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "axis": list(AXES),
         "director": ["d1", "d2", "d3"],
         "component": ["u1", "u2", "u3"],
+        **({"marker": [marker.name for marker in arm.markers]} if marked else {}),
         **bundle_coordinates(arm, names),
     }
     return xr.Dataset(variables, coordinates, provenance(arm, frame))

@@ -116,7 +116,7 @@ def test_a_place_in_meters_is_no_name():
         (lambda: arm(stations={"a": "b"}), "stations.a = 'b': must be a finite number"),
         (lambda: arm(stations={"a.b": 0.1}), "stations.a.b = 0.1: must be named by one line"),
         (lambda: arm(stations=3), "stations = 3: must be a mapping"),
-        (lambda: sr.FiberArchitecture(revolution=0, extent=1, end="x").ends(1.0), "in an arm"),
+        (lambda: sr.FiberArchitecture(revolution=0, extent=1, end="x").span(1.0), "in an arm"),
         (lambda: changed(arm(stations=STATIONS), {"stations.low": 9.0}), "stations.low = 9"),
     ],
 )

@@ -20,6 +20,7 @@ from softreach.arm.drives import Drive
 from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material, material_names, named_material
 from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
@@ -40,6 +41,7 @@ __all__ = [
     "LinearTaper",
     "Loads",
     "Manipulator",
+    "Marker",
     "Material",
     "Measured",
     "ObliqueMuscle",

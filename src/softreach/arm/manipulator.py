@@ -24,6 +24,7 @@ from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distan
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.drives import Drive, drive_faults
 from softreach.arm.loads import Loads
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
@@ -77,7 +78,9 @@ class Manipulator:
     drives: tuple[Drive, ...] = ()
     """Inputs that activate bundles; bundles that none of them names are inputs themselves."""
     stations: Mapping[str, float] = Stations()
-    """Z [m] of stations by name, at which actuators may begin and end."""
+    """Z [m] of stations by name, at which actuators and markers may be."""
+    markers: tuple[Marker, ...] = ()
+    """Points that go with its sections; they change nothing about the arm."""
     display_unit: str | None = field(default=None, compare=False)
     """Unit that the command line shows it in, "m", "cm", "mm" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
@@ -87,6 +90,8 @@ class Manipulator:
             raise InvalidDesign(faults)
         object.__setattr__(self, "stations", _stations(self.stations))
         object.__setattr__(self, "actuators", _placed(_named(self.actuators), self.stations))
+        markers = _placed(self.markers, self.stations, "markers.")
+        object.__setattr__(self, "markers", markers)
         names = [actuator.name for actuator in self.actuators], self.bundle_names
         faults = list(_shared_names(self)) or list(_fit_faults(self))
         if faults := faults or list(drive_faults(self.drives, *names)):
@@ -234,6 +239,7 @@ class Manipulator:
             self.rest,
             self.stations,
             self.drives,
+            self.markers,
         )
 
     @classmethod
@@ -461,6 +467,10 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
     if not isinstance(arm.rest, RestShape):
         yield Fault("rest", arm.rest, "must be a RestShape, such as RestShape(curvature_x=2.0)")
+    if not isinstance(arm.markers, tuple | list) or not all(
+        isinstance(marker, Marker) for marker in arm.markers
+    ):
+        yield Fault("markers", arm.markers, "must be Markers")
     unit = arm.display_unit
     if unit is not None and not (isinstance(unit, str) and unit in UNITS):
         yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
@@ -489,14 +499,20 @@ def _stations(places: Any) -> Stations:
         raise InvalidDesign(list(map(_renamed, error.faults, paths))) from None
 
 
-def _placed(actuators: Iterable[Actuator], stations: Mapping[str, float]) -> tuple[Actuator, ...]:
-    """The actuators where the stations that they name are."""
+LocatedPart = TypeVar("LocatedPart", Actuator, Marker)
+
+
+def _placed(
+    parts: Iterable[LocatedPart], stations: Mapping[str, float], owner: str = ""
+) -> tuple[LocatedPart, ...]:
+    """The parts where the stations that they name are; `owner` begins their paths."""
     made, faults = [], []
-    for actuator in actuators:
+    for part in parts:
         try:
-            made.append(placed(actuator, stations))
+            made.append(placed(part, stations))
         except InvalidDesign as error:
-            faults += [_renamed(fault, f"{actuator.name}.{fault.path}") for fault in error.faults]
+            path = f"{owner}{part.name}"
+            faults += [_renamed(fault, f"{path}.{fault.path}") for fault in error.faults]
     if faults:
         raise InvalidDesign(faults)
     return tuple(made)
@@ -511,6 +527,9 @@ def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
     for name, z in arm.stations.items():
         if z > arm.length:
             yield Fault(f"stations.{name}", z, f"must be on the arm, at most {arm.length:g} m")
+    for marker in arm.markers:
+        for fault in marker.place_faults(arm.length):
+            yield _renamed(fault, f"markers.{marker.name}.{fault.path}")
     if arm.loads is not None:
         yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:
@@ -539,7 +558,8 @@ def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
 
 
 def _shared_names(arm: Manipulator) -> Iterator[Fault]:
-    """Names that two actuators or two bundles share."""
+    """Names that two actuators, two bundles or two markers share."""
+    yield from name_faults([marker.name for marker in arm.markers], "markers")
     names = [actuator.name for actuator in arm.actuators]
     yield from (faults := list(name_faults(names, "actuators")))
     names = arm.bundle_names

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from softreach.arm.number import Number, Station, fields_of, number
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 
-__all__ = ["PLACE", "Span", "Stations", "placed", "station_of"]
+if TYPE_CHECKING:
+    from softreach.arm.profile import Profile
+    from softreach.arm.section import Section
+
+__all__ = ["PLACE", "Located", "Span", "Stations", "placed"]
 
 Made = TypeVar("Made", bound=Part)
 
@@ -71,13 +75,85 @@ def _is_line(name: str) -> bool:
     return name.isprintable() and name == name.strip()
 
 
+class Located(Part):
+    """A part at one place along the arm or more, each given over L, in m, or by a station's name.
+
+    Raises:
+        InvalidDesign: A place off the arm, or given twice.
+    """
+
+    _places: ClassVar[tuple[str, ...]]
+    """Its places: the fields in m or by name, beside each of which one is over L."""
+
+    def station_at(self, field: str, length: float) -> float:
+        """Z [m] of a place on an arm of a length [m].
+
+        Raises:
+            InvalidDesign: The name of a station, while it is part of no arm.
+        """
+        place = getattr(self, field)
+        if isinstance(place, str):
+            allowed = "must be Z in m: names of stations are known in an arm alone"
+            raise InvalidDesign([Fault(field, place, allowed)])
+        ratio = getattr(self, f"{field}_over_length")
+        return length * ratio if place is None else float(place)
+
+    def station_over_length_at(self, field: str, length: float) -> float:
+        """The same over L [-]."""
+        if getattr(self, field) is None:
+            return getattr(self, f"{field}_over_length")
+        return self.station_at(field, length) / length
+
+    def place_faults(self, length: float) -> list[Fault]:
+        """Faults of places that an arm of a length [m] does not have."""
+        allowed = f"must be on the arm, at most {length:g} m"
+        return [
+            Fault(field, z, allowed)
+            for field in self._places
+            # of a named station, the arm refuses that
+            if (z := self.station_at(field, length)) > length
+            and not isinstance(getattr(self, field), Station)
+        ]
+
+    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
+        """Value of a number when this part belongs to an arm with this profile and section."""
+        del section
+        if field in self._places:
+            return self.station_at(field, profile.length)
+        if (place := field.removesuffix("_over_length")) in self._places:
+            return self.station_over_length_at(place, profile.length)
+        return getattr(self, field)
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed; a new place takes that of the one given otherwise."""
+        for field in self._places:
+            ratio = f"{field}_over_length"
+            if changes.get(field) is not None:
+                changes.setdefault(ratio, _default(type(self), ratio))
+            if changes.get(ratio) is not None:
+                changes.setdefault(field, None)
+        return super().replace(**changes)
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        for field in self._places:
+            ratio = f"{field}_over_length"
+            value = getattr(self, field), getattr(self, ratio)
+            if value[0] is not None and value[1] != _default(type(self), ratio):
+                allowed = f"give exactly one of {field} and {ratio}"
+                faults.append(Fault(f"{field}, {ratio}", value, allowed))
+        return faults
+
+
 @dataclass(frozen=True, kw_only=True)
-class Span(Part):
-    """A part between two places along the arm, each given over L, in m, or by a station's name.
+class Span(Located):
+    """A part between two places along the arm.
 
     Raises:
         InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
     """
+
+    _places: ClassVar[tuple[str, ...]] = ("start", "end")
 
     start_over_length: float = number(
         "Z0/L", "", "where it begins", low=0.0, high=1.0, open_high=True, default=0.0
@@ -96,76 +172,35 @@ class Span(Part):
     )
     """Z1 [m], or the name of a station of the arm, in place of `end_over_length`."""
 
-    def ends(self, length: float) -> tuple[float, float]:
-        """Stations [m] between which it is on an arm of a length [m].
+    def span(self, length: float) -> tuple[float, float]:
+        """Stations [m] between which it is on an arm of a length [m]."""
+        return self.station_at("start", length), self.station_at("end", length)
 
-        Raises:
-            InvalidDesign: The name of a station, while it is part of no arm.
-        """
-        return (
-            station_of(self, "start", length, self.start_over_length),
-            station_of(self, "end", length, self.end_over_length),
-        )
-
-    def ends_over_length(self, length: float) -> tuple[float, float]:
+    def span_over_length(self, length: float) -> tuple[float, float]:
         """The same over L [-]."""
-        start, end = self.ends(length)
-        return (
-            self.start_over_length if self.start is None else start / length,
-            self.end_over_length if self.end is None else end / length,
+        return self.station_over_length_at("start", length), self.station_over_length_at(
+            "end", length
         )
 
     def place_faults(self, length: float) -> list[Fault]:
         """Faults of ends that an arm of a length [m] does not have."""
-        start, end = self.ends(length)
-        allowed = f"must be on the arm, at most {length:g} m"
-        faults = [
-            Fault(field, z, allowed)
-            for field, z in (("start", start), ("end", end))
-            # of a named station, the arm refuses that
-            if z > length and not isinstance(getattr(self, field), Station)
-        ]
+        faults = super().place_faults(length)
+        start, end = self.span(length)
         if faults or start < end:
             return faults
         if self.end is None:
             return [Fault("start", start, f"must be below its end at Z = {end:g} m")]
         return [Fault("end", end, f"must be above its start at Z = {start:g} m")]
 
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed; a new place takes that of the one given otherwise."""
-        for field in ("start", "end"):
-            ratio = f"{field}_over_length"
-            if changes.get(field) is not None:
-                changes.setdefault(ratio, _default(type(self), ratio))
-            if changes.get(ratio) is not None:
-                changes.setdefault(field, None)
-        return super().replace(**changes)
-
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
-        blamed = {fault.path for fault in faults}
-        given: list[bool] = []
-        for field in ("start", "end"):
-            ratio = f"{field}_over_length"
-            value = getattr(self, field), getattr(self, ratio)
-            given.append(value[0] is not None)
-            if given[-1] and value[1] != _default(type(self), ratio):
-                allowed = f"give exactly one of {field} and {ratio}"
-                faults.append(Fault(f"{field}, {ratio}", value, allowed))
         start, end = self.start_over_length, self.end_over_length
-        if any(given) or blamed & {"start_over_length", "end_over_length"} or start < end:
+        in_meters = self.start is not None or self.end is not None
+        blamed = any(fault.path.endswith("_over_length") for fault in faults)
+        if in_meters or blamed or start < end:
             return faults
         allowed = f"must be above start_over_length = {start:g}"
         return [*faults, Fault("end_over_length", end, allowed)]
-
-
-def station_of(part: Part, field: str, length: float, ratio: float) -> float:
-    """Z [m] of a place in m or by name, or of one over L where there is none."""
-    place = getattr(part, field)
-    if isinstance(place, str):
-        allowed = "must be Z in m: names of stations are known in an arm alone"
-        raise InvalidDesign([Fault(field, place, allowed)])
-    return length * ratio if place is None else float(place)
 
 
 def placed(part: Made, stations: Mapping[str, float]) -> Made:

@@ -165,7 +165,7 @@ def _slender_bending(arm: Manipulator) -> tuple[float, float]:
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
     angle = fiber.helical_angle_on(arm.profile, arm.section)
-    start, _ = fiber.ends_over_length(arm.length)
+    start, _ = fiber.span_over_length(arm.length)
     return float(angle(start)) if isinstance(angle, AlongArm) else angle
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ _SAME = 1e-7
 """Smallest singular value over the largest, in scales of the numbers, that data can tell."""
 _ROBUST = 3.0
 """Residuals beyond so many widths count less than their squares."""
+_FINE, _COARSE = 1e-7, 1e-3
+"""Least share by which a step must improve: of the last round, of those before."""
 _MOST = 60
 _FAR = 1.0  # m, what a sample without equilibrium misses
 
@@ -170,7 +173,7 @@ def fitted(
             problem.robust_at(values, width)
         if any(number.prior for number in model.free.numbers):
             problem.weigh_priors(values)
-        result = problem.solved(values)
+        result = problem.solved(values, _FINE if width == rounds[-1] else _COARSE)
         values, converged = result.x, bool(result.status > 0)
         count += int(result.nfev)
     prediction = model.predict(values, slopes=True)
@@ -256,7 +259,7 @@ class _Problem:
         miss = (self._at(values).places - self.places)[self.seen]
         self.unit = self.noise or robust_width(miss)
 
-    def solved(self, values: Array):
+    def solved(self, values: Array, fine: float) -> Any:
         """The end of SciPy's trust region, from these values."""
         from scipy.optimize import least_squares
 
@@ -268,8 +271,8 @@ class _Problem:
             x_scale=self.model.free.scale,
             loss=_loss(self.seen, self.width),
             f_scale=1.0,
-            ftol=1e-9,
-            xtol=1e-9,
+            ftol=fine,
+            xtol=fine,
             gtol=1e-14,
             max_nfev=_MOST,
         )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import Base, rotation_matrices
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Parameter, changed, find_parameters, parameters
+from softreach.arm.parameters import Parameter, find_parameters, parameters
+from softreach.arm.parameters.draft import Draft
+from softreach.arm.rest_shape import RestShape
 from softreach.support.arguments import as_names, plain
 from softreach.support.errors import InvalidInput, Range
 
@@ -24,6 +27,8 @@ Array = NDArray[np.float64]
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
 
+_UNSEEN = 1e-12
+"""Angle by which an arm that counts as bent is bent at least [rad]."""
 _STEP = 1e-3  # of the scale of a number, for derivatives of tables of fourth order
 _CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 12))
@@ -92,13 +97,26 @@ class FreeNumbers:
                 pose[number.name] = value
             else:
                 paths |= dict.fromkeys(_tied(number.name), value)
-        arm = changed(self.arm, paths)
+        arm = self._changed(paths)
         return arm.replace(base=_moved(arm.base, pose)) if pose else arm
+
+    def _changed(self, values: Mapping[str, float]) -> Manipulator:
+        """As `changed`, with parameters that were found before."""
+        draft = Draft(self.arm)
+        for name, parameter in self._parameters.items():
+            parameter.change(draft, values[name])
+        return draft.made() if values else self.arm
+
+    @cached_property
+    def _parameters(self) -> dict[str, Parameter]:
+        names = [number.name for number in self.numbers if number.name not in POSE]
+        return find_parameters(self.arm, tuple(path for name in names for path in _tied(name)))
 
     def neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator]]:
         """Arms around these values along one number, with the factors of a derivative by it.
 
-        Differences of fourth order, inside the range of the number.
+        Differences of fourth order, inside the range of the number. Those of the pose differ in
+        their base alone.
         """
         number, (low, high) = self.numbers[k], self.bounds
         step = _STEP * max(number.scale, abs(float(values[k])))
@@ -113,6 +131,22 @@ class FreeNumbers:
             other = values.copy()
             other[k] = value + sign * offset * step
             result.append((sign * factor / step, self.made(other)))
+        return result
+
+    def moves_base(self, k: int) -> bool:
+        """True of a number of the pose."""
+        return self.numbers[k].name in POSE
+
+    def base_neighbors(self, values: Array, k: int) -> list[tuple[float, Base]]:
+        """As `neighbors`, for a number of the pose: the bases alone."""
+        step = _STEP * self.numbers[k].scale
+        result = []
+        for offset, factor in _CENTRAL:
+            other = values.copy()
+            other[k] += offset * step
+            pairs = zip(self.numbers, other.tolist(), strict=True)
+            pose = {number.name: value for number, value in pairs if number.name in POSE}
+            result.append((factor / step, _moved(self.arm.base, pose)))
         return result
 
     def started_at(self, values: Mapping[str, float]) -> FreeNumbers:
@@ -145,6 +179,9 @@ def free_numbers(
         InvalidInput: A name that no number has, a number that counts something, or a prior that is
             no width above 0.
     """
+    if arm.rest.is_straight and any("rest." in name for name in as_names("free", free)):
+        # All arms on the way have a rest shape, were it of the size of rounding.
+        arm = arm.replace(rest=RestShape(curvature_x=_UNSEEN / arm.length))
     priors = dict(prior or {})
     numbers = tuple(
         replace(number, prior=_prior(number, priors.pop(number.name, None)))

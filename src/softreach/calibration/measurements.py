@@ -188,9 +188,15 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
             raise InvalidInput("data", str(error), "columns of one length") from None
     if hasattr(data, "to_dataframe"):
         return data.to_dataframe().reset_index(), "a dataset"
-    if not isinstance(data, str | PathLike):
-        raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
-    path = Path(data)
+    if isinstance(data, str | PathLike):
+        return _read(Path(data))
+    raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
+
+
+def _read(path: Path) -> tuple[pd.DataFrame, str]:
+    """The table of a file, and its name."""
+    import pandas as pd
+
     if not path.is_file():
         raise InvalidInput("data", str(path), "a file that exists")
     try:

@@ -6,12 +6,13 @@ equilibrium; all that follows from them, how the arm moves, is the linear respon
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.base import Base
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
@@ -25,8 +26,10 @@ from softreach.rod.response import (
     NodeTables,
     RodState,
     StepGrid,
+    dead_force,
     linear_response,
     node_tables,
+    payload_weight,
     rod_state,
     step_grid,
 )
@@ -78,7 +81,7 @@ def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
     """
     if not arm.markers:
         return np.array([arm.length]), np.zeros((1, 3))
-    places = np.array([marker.place_on(arm) for marker in arm.markers])
+    places = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
     return places, np.array([marker.offset for marker in arm.markers])
 
 
@@ -109,9 +112,9 @@ class MarkerModel:
     def of_arm(self, arm: Manipulator, values: Array | None = None) -> Prediction:
         """Places of the markers of an arm that has these values."""
         grid = self._grid(arm)
-        neighbors = []
+        neighbors: list[list[tuple[float, Manipulator | Base]]] = []
         if values is not None:
-            neighbors = [self.free.neighbors(values, k) for k in range(len(self.free))]
+            neighbors = [self._neighbors(values, k) for k in range(len(self.free))]
         blocks = [
             self._block(arm, neighbors, grid, rows, values is not None)
             for rows in parallel.blocks(len(self.inputs), _BLOCK)
@@ -122,6 +125,11 @@ class MarkerModel:
             None if values is None else np.concatenate([s for s in slopes if s is not None]),
             np.concatenate(status),
         )
+
+    def _neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator | Base]]:
+        if self.free.moves_base(k):
+            return [*self.free.base_neighbors(values, k)]
+        return [*self.free.neighbors(values, k)]
 
     def _grid(self, arm: Manipulator) -> StepGrid:
         stations, _ = marker_stations(arm)
@@ -155,7 +163,7 @@ class MarkerModel:
     def _block(
         self,
         arm: Manipulator,
-        neighbors: list[list[tuple[float, Manipulator]]],
+        neighbors: list[list[tuple[float, Manipulator | Base]]],
         grid: StepGrid,
         rows: slice,
         slopes: bool,
@@ -173,23 +181,44 @@ class MarkerModel:
         if not slopes:
             return places, None, state.status
         known = np.isfinite(places).all(axis=(1, 2))
-        changes = [self._change(one, grid, inputs) for one in neighbors]
+        changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
         result = np.full((*places.shape, len(changes)), np.nan)
         result[known] = _slopes(rod.arm, at, _some(state, known), changes, known)
         return places, result, state.status
 
     def _change(
-        self, neighbors: list[tuple[float, Manipulator]], grid: StepGrid, inputs: Array
+        self,
+        arm: Manipulator,
+        at: _Explicit,
+        neighbors: list[tuple[float, Manipulator | Base]],
+        grid: StepGrid,
+        inputs: Array,
     ) -> _Explicit:
         """Derivative of all that is explicit by one number."""
         factors = [factor for factor, _ in neighbors]
-        each = [self._explicit(arm, grid, inputs) for _, arm in neighbors]
+        each = [
+            self._explicit(other, grid, inputs)
+            if isinstance(other, Manipulator)
+            else _on_base(arm, at, other)
+            for _, other in neighbors
+        ]
         table = each[0].table.combined([one.table for one in each], factors)
         others = (
             sum(f * values for f, values in zip(factors, columns, strict=True))
             for columns in zip(*(one[1:] for one in each), strict=True)
         )
         return _Explicit(table, *others)
+
+
+def _on_base(arm: Manipulator, at: _Explicit, base: Base) -> _Explicit:
+    """The same on another base: gravity alone is another one in its frame."""
+    table = at.table
+    force = dead_force(arm, base, table.stations, table.length)
+    return at._replace(
+        table=replace(table, force=force, weight=payload_weight(arm, base)),
+        rotation=base.rotation,
+        position=np.array(base.position),
+    )
 
 
 def _rod(arm: Manipulator, grid: StepGrid) -> ArmRod:
@@ -237,7 +266,7 @@ def _slopes(
     """Derivatives of the places by all numbers, (n, marker, 3, number)."""
     bundles = state.gamma.shape[1]
     tables = [change.table for change in changes]
-    response = linear_response(arm, at.table, state, tables, at.measures)
+    response = linear_response(at.table, state, tables, at.measures)
     driven = np.stack([change.bundles[rows] for change in changes], axis=-1)
     if at.measures.shape[-1]:
         driven = _with_tensions(arm, at, state, changes, driven, response.works)

@@ -90,6 +90,8 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     if facts.breakpoints:
         rows["breakpoints"] = (list(facts.breakpoints), "m")
     rows |= {f"station {name}": (z, "m") for name, z in arm.stations.items()}
+    if arm.markers:
+        rows["markers"] = ([marker.name for marker in arm.markers], "")
     rows["extension"] = (list(facts.extension), "")
     rows["curvature times L"] = (list(facts.curvature), "")
     return rows | _measured_rows(arm) | _rows_of_matter(facts) | load_rows(arm) | _rest_rows(arm)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.loads import Loads
+from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
@@ -28,8 +28,10 @@ __all__ = [
     "Response",
     "RodState",
     "StepGrid",
+    "dead_force",
     "linear_response",
     "node_tables",
+    "payload_weight",
     "rod_state",
     "step_grid",
 ]
@@ -68,6 +70,10 @@ class NodeTables:
     """1/K0, 1/K1, 1/K1, 1/K3, shape (step, 3, 4); zero without loads."""
     force: Array
     """Dead force n in the frame of the base [N], shape (step, 3, 3)."""
+    lever: Array
+    """Of the payload in the directors of the tip [m], shape (3,)."""
+    weight: Array
+    """Force of the payload in the frame of the base [N], shape (3,)."""
     asked: Array
     """Z of the stations that were asked for [m], shape (station,)."""
 
@@ -95,9 +101,17 @@ class Response:
 
 
 def _places(arm: Manipulator, stations: Array) -> Array:
-    """All places where something begins or ends [m], unsorted, with repetitions."""
+    """All places where something begins or ends [m], unsorted, with repetitions.
+
+    An actuator that ends at the tip has its own place there, so that it may end before.
+    """
     profile = arm.profile
     breaks = [z for actuator in arm.actuators for z in actuator.breakpoints(profile)]
+    ends = [
+        (a.station_at("start", arm.length), a.station_at("end", arm.length)) for a in arm.actuators
+    ]
+    breaks += [0.0 for start, _ in ends if start <= 0.0]
+    breaks += [arm.length for _, end in ends if end >= arm.length]
     points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
     return np.array([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
 
@@ -135,13 +149,10 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
     # Steps without length stand where something ends: the inside of the arm decides.
     length = width[:, None] * profile.radius(z)
     table = tables(arm, z.ravel())
-    loads, soft = arm.loads, np.zeros((*z.shape, 4))
-    force = np.zeros((*z.shape, 3))
-    if loads is not None:
-        loads = loads.seen_from(arm.base)
+    soft = np.zeros((*z.shape, 4))
+    if arm.loads is not None:
         axial, bending, torsion = (c.reshape(z.shape) for c in compliance(arm, z.ravel()))
         soft = np.stack([axial, bending, bending, torsion], axis=-1)
-        force = _dead_force(arm, loads, z, length)
     shape, bundles = z.shape, arm.bundles
     return NodeTables(
         stations=z,
@@ -150,13 +161,32 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         growth=table.growth.reshape(*shape, bundles),
         curvature=table.curvature.reshape(*shape, 3, bundles),
         compliance=soft,
-        force=force,
+        force=dead_force(arm, arm.base, z, length),
+        lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
+        weight=payload_weight(arm, arm.base),
         asked=np.asarray(stations, float),
     )
 
 
-def _dead_force(arm: Manipulator, loads: Loads, z: Array, length: Array) -> Array:
-    """n [N] at the nodes: all dead forces beyond, theory (60)."""
+def payload_weight(arm: Manipulator, base: Base) -> Array:
+    """Force of the payload in the frame of a base [N], shape (3,)."""
+    if arm.loads is None:
+        return np.zeros(3)
+    return arm.loads.payload * np.array(arm.loads.seen_from(base).gravity)
+
+
+def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
+    """n [N] at the nodes in the frame of a base, shape (step, 3, 3): dead forces beyond, (60).
+
+    Args:
+        arm: The arm, wherever its own base is.
+        base: Pose of the base.
+        z: Z of the nodes [m], shape (step, 3).
+        length: dZ there [m], likewise.
+    """
+    if arm.loads is None:
+        return np.zeros((*z.shape, 3))
+    loads = arm.loads.seen_from(base)
     others = [loads.follower_force, loads.follower_moment, loads.tip_moment]
     others += [load.moment for load in loads.point_loads]
     if any(map(any, others)):
@@ -165,7 +195,7 @@ def _dead_force(arm: Manipulator, loads: Loads, z: Array, length: Array) -> Arra
     gravity = np.array(loads.gravity)
     mass = np.zeros(z.shape)
     if gravity.any():
-        mass = arm.section.mass_per_length(arm.profile.radius(z)) * length
+        mass = arm.section.mass_per_length_at(arm.profile, z) * length
     steps = mass @ WEIGHTS
     beyond = np.cumsum(steps[::-1])[::-1] - steps
     beyond = beyond[:, None] + (steps[:, None] - mass @ GAUSS.T)
@@ -224,7 +254,6 @@ def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
 
 
 def linear_response(
-    arm: Manipulator,
     table: NodeTables,
     state: RodState,
     changes: list[NodeTables],
@@ -233,16 +262,12 @@ def linear_response(
     """Movements of equilibria per unit of each activation and of each change of the tables.
 
     Args:
-        arm: The inner arm.
-        table: Its tables at the nodes.
+        table: Tables of the inner arm at the nodes.
         state: Its equilibria.
         changes: Changes of the tables, one for each column after those of the activations.
         measures: M and N at the nodes whose work is asked for, shape (step, 3, 4, work).
     """
     n, bundles = state.gamma.shape
-    loads = None if arm.loads is None else arm.loads.seen_from(arm.base)
-    weight = np.zeros(3) if loads is None else loads.payload * np.array(loads.gravity)
-    lever = np.zeros(3) if loads is None else np.array(loads.payload_arm)
     if measures is None:
         measures = np.zeros((*table.length.shape, 4, 0))
     job = _Job(
@@ -250,8 +275,8 @@ def linear_response(
         state,
         _at_rest_and_per_activation(table, changes),
         np.ascontiguousarray(measures),
-        np.einsum("c,nca->na", lever, state.tip_directors),
-        weight,
+        np.einsum("c,nca->na", table.lever, state.tip_directors),
+        _tipping(table, state, changes),
         np.searchsorted(table.stations[:, 1], np.sort(table.asked)),
     )
     asked, columns = len(table.asked), bundles + len(changes)
@@ -262,6 +287,18 @@ def linear_response(
     )
     back = np.argsort(np.argsort(table.asked, kind="stable"), kind="stable")
     return Response(moves[:, back], turns[:, back], works)
+
+
+def _tipping(table: NodeTables, state: RodState, changes: list[NodeTables]) -> Array:
+    """Change of the moment of the payload at the same directors, (n, 3, column)."""
+    n, bundles = state.gamma.shape
+    result = np.zeros((n, 3, bundles + len(changes)))
+    arm = np.einsum("c,nca->na", table.lever, state.tip_directors)
+    for k, change in enumerate(changes):
+        moved = np.einsum("c,nca->na", change.lever, state.tip_directors)
+        tipping = np.cross(arm, change.weight) + np.cross(moved, table.weight)
+        result[..., bundles + k] = tipping
+    return result
 
 
 class _Changes(NamedTuple):
@@ -311,7 +348,7 @@ class _Job:
     changes: _Changes
     measures: Array
     lever: Array
-    weight: Array
+    tipping: Array
     marks: NDArray[np.intp]
 
     def respond(self, rows: slice, moves: Array, turns: Array, works: Array) -> None:
@@ -365,7 +402,8 @@ class _Job:
             yielding,
             self.measures,
             self.lever[row],
-            self.weight,
+            table.weight,
+            self.tipping[row],
             self.marks,
             moves,
             turns,

@@ -167,7 +167,7 @@ class Actuator(Span, ABC):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations inside (0, L) where its load jumps or is not smooth [m]."""
-        return tuple(z for z in self.ends(profile.length) if 0.0 < z < profile.length)
+        return tuple(z for z in self.span(profile.length) if 0.0 < z < profile.length)
 
     def acts(self, profile: Profile, z: Array) -> NDArray[np.bool_]:
         """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
@@ -175,7 +175,7 @@ class Actuator(Span, ABC):
         Returns:
             Shape (station, bundle).
         """
-        start, end = self.ends(profile.length)
+        start, end = self.span(profile.length)
         inside = (z >= start) & ((z < end) | (end >= profile.length))
         return np.broadcast_to(inside[:, None], (len(z), self.bundles))
 
@@ -183,15 +183,6 @@ class Actuator(Span, ABC):
         """Faults that keep it from driving an arm with this profile and section."""
         del profile, section
         return []
-
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number when this actuator drives an arm with this profile and section."""
-        del section
-        if field in ("start", "end"):
-            return self.ends(profile.length)[field == "end"]
-        if field in ("start_over_length", "end_over_length"):
-            return self.ends_over_length(profile.length)[field == "end_over_length"]
-        return getattr(self, field)
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()

@@ -78,7 +78,7 @@ class FiberArchitecture(SectorActuator):
         """α at the outer radius of the ring [rad], which the revolution fixes."""
         if self.helical_angle is not None:
             return self.helical_angle
-        ratio, (start, end) = section.ring(self.ring).outer_ratio, self.ends(profile.length)
+        ratio, (start, end) = section.ring(self.ring).outer_ratio, self.span(profile.length)
         turn = profile.surface_coordinate(end, ratio)
         if start > 0.0:
             turn -= profile.surface_coordinate(start, ratio)
@@ -86,7 +86,7 @@ class FiberArchitecture(SectorActuator):
 
     def revolution_on(self, profile: Profile, section: Section) -> float:
         """Ω = Θ(L) [rad], which the helical angle fixes: theory (14)."""
-        end = np.asarray(self.ends(profile.length)[1:])
+        end = np.asarray(self.span(profile.length)[1:])
         return float(self.rotation(profile, section, end)[0])
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
@@ -106,7 +106,7 @@ class FiberArchitecture(SectorActuator):
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
         """Θ(Z) = ∫ tan α dZ/(R cos φ) from where it begins [rad]: theory (50)."""
         angle = self.helical_angle_on(profile, section)
-        start, _ = self.ends(profile.length)
+        start, _ = self.span(profile.length)
         return helical_rotation(profile, section.ring(self.ring).outer_ratio, angle, start, z)
 
     def _faults(self) -> list[Fault]:

@@ -138,7 +138,7 @@ class Tendon(PolarActuator):
         The revolution of a routing is its rotation from where the tendon begins to its anchor.
         """
         if field == "revolution" and self.routing is not None:
-            return float(np.diff(self.routing(self.ends_over_length(profile.length)))[0])
+            return float(np.diff(self.routing(self.span_over_length(profile.length)))[0])
         base = float(profile.radius(0.0))
         if field == "distance" and self.distance is None:
             return (self.distance_ratio or 0.0) * base
@@ -165,7 +165,7 @@ class Tendon(PolarActuator):
         x = z / profile.length
         if self.routing is not None:
             return self.routing(x), self.routing.derivative(x) / profile.length
-        start, end = self.ends_over_length(profile.length)
+        start, end = self.span_over_length(profile.length)
         rate = self.revolution / (end - start)
         return rate * (x - start), np.full(z.shape, rate / profile.length)
 

@@ -27,6 +27,7 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.measured import Measured
 from softreach.arm.number import Number, fields_of, unit_suffix
@@ -83,7 +84,7 @@ KINDS: Mapping[type, Mapping[str, type]] = {Actuator: ACTUATORS, Profile: PROFIL
 """Kinds by what they are."""
 _GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
 
-_BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape)
+_BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape, Marker)
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
 

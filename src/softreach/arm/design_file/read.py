@@ -27,12 +27,13 @@ from softreach.arm.design_file.keys import (
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.marker import Marker
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.section import Ring, Section, name_faults
-from softreach.arm.stations import PLACE, Stations, placed
+from softreach.arm.stations import PLACE, Located, Stations, placed
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
 from softreach.support.files.text import read_text
 from softreach.support.units import UNITS
@@ -51,6 +52,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "stations": (dict, False),
     "actuators": (list, True),
     "drives": (list, False),
+    "markers": (list, False),
     "loads": (dict, False),
     "base": (dict, False),
     "rest": (dict, False),
@@ -70,6 +72,7 @@ class Parts(NamedTuple):
     rest: RestShape
     stations: Mapping[str, float]
     drives: tuple[Drive, ...]
+    markers: tuple[Marker, ...]
     display_unit: str | None
 
 
@@ -167,6 +170,9 @@ class _DesignReader(TableReader):
         raw = self._table("rest")
         rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
         stations = self._stations()
+        markers = [
+            (k, self.part(Marker, raw, f"markers[{k}]")) for k, raw in self._tables("markers")
+        ]
         unit = self._display_unit()
         names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
@@ -174,11 +180,16 @@ class _DesignReader(TableReader):
             return None
         sound = [(k, actuator) for k, actuator in actuators if actuator is not None]
         self._check_fit(profile, section, stations, sound)
+        there = [(k, marker) for k, marker in markers if marker is not None]
+        for k, marker in there:
+            faults = _place_faults(marker, profile, stations)
+            self.faults += [fault._replace(path=f"markers[{k}].{fault.path}") for fault in faults]
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
         made = tuple(actuator for _, actuator in sound)
+        marked = tuple(marker for _, marker in there)
         known = tuple(drive for drive in drives if drive is not None)
-        return Parts(profile, section, made, loads, base, rest, stations, known, unit)
+        return Parts(profile, section, made, loads, base, rest, stations, known, marked, unit)
 
     def _stations(self) -> Stations | None:
         """Places of stations by name; None where there are faults."""
@@ -376,11 +387,16 @@ def _fit_faults(
     actuator: Actuator, profile: Profile, section: Section, stations: Stations
 ) -> list[Fault]:
     """Faults that keep one actuator from driving a body."""
+    faults = _place_faults(actuator, profile, stations)
+    return faults or placed(actuator, stations).section_faults(profile, section)
+
+
+def _place_faults(part: Located, profile: Profile, stations: Stations) -> list[Fault]:
+    """Faults of the places of a part along an arm."""
     try:
-        there = placed(actuator, stations)
+        return placed(part, stations).place_faults(profile.length)
     except InvalidDesign as error:
         return list(error.faults)
-    return there.place_faults(profile.length) or there.section_faults(profile, section)
 
 
 def _of_own_kind(kind: type[Kind], table: Mapping[str, Any]) -> Kind:

@@ -12,6 +12,7 @@ from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.measured import Measured
 from softreach.arm.number import Number
@@ -46,6 +47,7 @@ def json_schema() -> dict[str, Any]:
         "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
         "drive": _table(Drive, "Input that activates bundles"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
+        "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
@@ -84,6 +86,11 @@ def json_schema() -> dict[str, Any]:
             "description": "Inputs that activate bundles, before the bundles that none names",
             "type": "array",
             "items": _of("drive"),
+        },
+        "markers": {
+            "description": "Points that go with sections of the arm",
+            "type": "array",
+            "items": _of("marker"),
         },
         "loads": _of("loads"),
         "base": _of("base"),

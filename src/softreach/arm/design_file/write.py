@@ -20,6 +20,7 @@ from softreach.arm.design_file.keys import (
 )
 from softreach.arm.drives import BundleNumbers, Drive
 from softreach.arm.loads import Loads
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.number import Station
 from softreach.arm.profile import Profile
@@ -56,6 +57,7 @@ def render(
     rest: RestShape,
     stations: Mapping[str, float],
     drives: Sequence[Drive],
+    markers: Sequence[Marker],
 ) -> str:
     """TOML text of a design, of version 2.
 
@@ -75,6 +77,7 @@ def render(
     for actuator in actuators:
         blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
     blocks += [["[[drives]]", *_lines(drive)] for drive in drives]
+    blocks += [["[[markers]]", *_lines(marker)] for marker in markers]
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]

@@ -43,6 +43,8 @@ class Path(NamedTuple):
         kind, *path = self.part
         if kind in ("actuators", "drives"):
             return str(path[0])
+        if kind == "markers":
+            return f"markers.{path[0]}"
         if kind == "rings":
             return "".join((f"rings[{path[0]}]", *(f".{step}" for step in path[1:])))
         of_arm = kind == "section" or (kind == "profile" and not self.place)
@@ -76,6 +78,7 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["rest",] = arm.rest
     if arm.stations:
         keyed["stations",] = arm.stations
+    keyed |= {("markers", marker.name): marker for marker in arm.markers}
     for k, ring in enumerate(arm.section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
@@ -214,6 +217,8 @@ class Draft:
         for part in ("base", "rest", "stations"):
             if (part,) in self._parts:
                 changes[part] = self._made((part,))
+        markers = (self._made(("markers", marker.name)) for marker in self.arm.markers)
+        changes["markers"] = tuple(markers)
         keys = [("actuators", actuator.name) for actuator in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
         changes["drives"] = tuple(self._made(("drives", drive.name)) for drive in self.arm.drives)

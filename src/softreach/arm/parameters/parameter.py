@@ -20,7 +20,7 @@ from softreach.arm.number import Number, fields_of
 from softreach.arm.parameters.draft import Draft, PartKey, Path, part_of, parts
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
-from softreach.arm.stations import PLACE, Stations
+from softreach.arm.stations import PLACE, Located, Stations
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, Range
 
@@ -112,9 +112,9 @@ class OwnParameter(Parameter):
             *inner, k = place
             series = getattr(part, field)
             return (float(getattr(series, str(inner[0]))[k] if inner else series[k]),)
-        is_actuator = isinstance(part, Actuator)
-        value = part.value_on(field, arm.profile, arm.section) if is_actuator else None
-        return (_float(value if is_actuator else getattr(part, field)),)
+        if isinstance(part, Located):
+            return (_float(part.value_on(field, arm.profile, arm.section)),)
+        return (_float(getattr(part, field)),)
 
     def change(self, draft: Draft, value: float) -> None:
         """Change it; an element alone must be admitted, as its series names no places."""

@@ -287,7 +287,7 @@ def _check_expressible(arm: Manipulator) -> None:
         if not isinstance(actuator, FiberArchitecture):
             kind = type(actuator).__name__
             raise InvalidInput(actuator.name, kind, f"a FiberArchitecture {there}")
-        stretch = actuator.ends_over_length(arm.length)
+        stretch = actuator.span_over_length(arm.length)
         if stretch != (0.0, 1.0):
             raise InvalidInput(f"stretch of {actuator.name}", stretch, f"all of the arm {there}")
         angle = actuator.helical_angle
