@@ -16,6 +16,7 @@ from softreach.arm.actuators import (
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
+from softreach.arm.drives import Drive
 from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
@@ -34,6 +35,7 @@ __all__ = [
     "Base",
     "Chamber",
     "DesignSummary",
+    "Drive",
     "FiberArchitecture",
     "Layer",
     "LengthTendon",

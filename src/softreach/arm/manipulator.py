@@ -22,6 +22,7 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distance_faults
 from softreach.arm.base import UPRIGHT, Base
+from softreach.arm.drives import Drive, drive_faults
 from softreach.arm.loads import Loads
 from softreach.arm.marker import Marker
 from softreach.arm.material import Material
@@ -75,6 +76,8 @@ class Manipulator:
     """Pose of its clamped end in the world; upright at the origin."""
     rest: RestShape = STRAIGHT
     """Curvature and twist of the arm that nothing drives; straight."""
+    drives: tuple[Drive, ...] = ()
+    """Inputs that activate bundles; bundles that none of them names are inputs themselves."""
     stations: Mapping[str, float] = Stations()
     """Z [m] of stations by name, at which actuators, rigid pieces and markers may be."""
     rigid_pieces: tuple[RigidPiece, ...] = ()
@@ -96,8 +99,11 @@ class Manipulator:
         object.__setattr__(self, "rigid_pieces", _placed(self.rigid_pieces, self.stations, owners))
         owners = [f"markers.{marker.name}" for marker in self.markers]
         object.__setattr__(self, "markers", _placed(self.markers, self.stations, owners))
-        if faults := list(_shared_names(self)) or list(_fit_faults(self)):
+        names = [actuator.name for actuator in self.actuators], self.bundle_names
+        faults = list(_shared_names(self)) or list(_fit_faults(self))
+        if faults := faults or list(drive_faults(self.drives, *names)):
             raise InvalidDesign(faults)
+        object.__setattr__(self, "drives", tuple(self.drives))
 
     @classmethod
     def tapered(
@@ -240,6 +246,7 @@ class Manipulator:
             self.rest,
             self.stations,
             self.rigid_pieces,
+            self.drives,
             self.markers,
         )
 
@@ -314,6 +321,40 @@ class Manipulator:
         return read_only(np.concatenate([np.empty((0, 2)), *bounds]))
 
     @cached_property
+    def undriven(self) -> tuple[int, ...]:
+        """Bundles that no drive names."""
+        driven = {name for drive in self.drives for name in drive.gains}
+        return tuple(k for k, name in enumerate(self.bundle_names) if name not in driven)
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs: drives, then bundles that no drive names.
+
+        They are what is called the activations of the arm in all results.
+        """
+        return len(self.drives) + len(self.undriven)
+
+    @cached_property
+    def input_names(self) -> tuple[str, ...]:
+        """A name for each input."""
+        names = self.bundle_names
+        return (*(drive.name for drive in self.drives), *(names[k] for k in self.undriven))
+
+    @cached_property
+    def input_units(self) -> tuple[str, ...]:
+        """The unit of each input."""
+        units = self.bundle_units
+        return (*(drive.unit for drive in self.drives), *(units[k] for k in self.undriven))
+
+    @cached_property
+    def input_bounds(self) -> Array:
+        """Lower and upper bound of each input [unit], shape (inputs, 2), read-only."""
+        if not self.drives:
+            return self.bounds
+        of_drives = np.array([drive.bounds for drive in self.drives])
+        return read_only(np.concatenate([of_drives, self.bounds[list(self.undriven)]]))
+
+    @cached_property
     def breakpoints(self) -> tuple[float, ...]:
         """Stations inside (0, L) where profile, section or actuators are not smooth [m]."""
         places = {0.0, self.length, *self.profile.breakpoints}
@@ -349,9 +390,8 @@ class Manipulator:
         Raises:
             InvalidDesign: Displacements within the bounds shorten the arm to nothing.
         """
-        if self.rest.is_straight and not any(
-            isinstance(actuator, LengthTendon) for actuator in self.actuators
-        ):
+        by_length = any(isinstance(actuator, LengthTendon) for actuator in self.actuators)
+        if self.rest.is_straight and not self.drives and not by_length:
             return self
         from softreach.arm.driving import inner_arm
 

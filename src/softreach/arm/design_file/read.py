@@ -25,6 +25,7 @@ from softreach.arm.design_file.keys import (
     own_kind,
 )
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
+from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.marker import Marker
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
@@ -52,6 +53,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "stations": (dict, False),
     "actuators": (list, True),
     "rigid_pieces": (list, False),
+    "drives": (list, False),
     "markers": (list, False),
     "loads": (dict, False),
     "base": (dict, False),
@@ -72,6 +74,7 @@ class Parts(NamedTuple):
     rest: RestShape
     stations: Mapping[str, float]
     rigid_pieces: tuple[RigidPiece, ...]
+    drives: tuple[Drive, ...]
     markers: tuple[Marker, ...]
     display_unit: str | None
 
@@ -162,6 +165,7 @@ class _DesignReader(TableReader):
             self.refused("actuators", f"{len(tables):,} tables", f"must be at most {MOST_BUNDLES}")
             return None
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
+        drives = [self.part(Drive, raw, f"drives[{k}]") for k, raw in self._tables("drives")]
         raw = self._table("loads")
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
@@ -188,7 +192,19 @@ class _DesignReader(TableReader):
             self.faults += self._of_section(loads.section_faults(section, profile.length))
         actuators = tuple(actuator for _, actuator in sound)
         rigid, markers = (tuple(part for _, part in each) for each in made.values())
-        return Parts(profile, section, actuators, loads, base, rest, stations, rigid, markers, unit)
+        return Parts(
+            profile=profile,
+            section=section,
+            actuators=actuators,
+            loads=loads,
+            base=base,
+            rest=rest,
+            stations=stations,
+            rigid_pieces=rigid,
+            drives=tuple(drive for drive in drives if drive is not None),
+            markers=markers,
+            display_unit=unit,
+        )
 
     def _stations(self) -> Stations | None:
         """Places of stations by name; None where there are faults."""

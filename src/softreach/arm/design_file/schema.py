@@ -10,6 +10,7 @@ from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
 from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
+from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.marker import Marker
 from softreach.arm.material import Material
@@ -30,6 +31,7 @@ _PAIR: _Schema = {**_NUMBERS, "minItems": 2, "maxItems": 2}
 _PAIRS: _Schema = {"type": "array", "items": _PAIR, "minItems": 1}
 _TRIPLE: _Schema = {**_NUMBERS, "minItems": 3, "maxItems": 3}
 _ROTATION: _Schema = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItems": 3}
+_BY_NAME: _Schema = {"type": "object", "additionalProperties": {"type": "number"}}
 _TEXT: _Schema = {"type": "string"}
 
 
@@ -44,6 +46,7 @@ def json_schema() -> dict[str, Any]:
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
+        "drive": _table(Drive, "Input that activates bundles"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
         "rigid_piece": _table(RigidPiece, "Stretch that neither bends nor changes its length"),
         "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
@@ -85,6 +88,11 @@ def json_schema() -> dict[str, Any]:
             "description": "Where the arm is not deformed",
             "type": "array",
             "items": _of("rigid_piece"),
+        },
+        "drives": {
+            "description": "Inputs that activate bundles, before the bundles that none names",
+            "type": "array",
+            "items": _of("drive"),
         },
         "markers": {
             "description": "Points that go with sections of the arm",
@@ -175,6 +183,9 @@ def _value(part: type, key: Key) -> _Schema:
             "description": "The way the straight arm points, or a rotation",
             "anyOf": [{"enum": [*POINTS]}, _ROTATION, {**_NUMBERS, "minItems": 3, "maxItems": 4}],
         },
+        "bounds": _PAIR,
+        "gains": _BY_NAME,
+        "offsets": _BY_NAME,
         "point_loads": {"type": "array", "items": _of("point_load")},
     }
     return others.get(key.field, _TEXT)

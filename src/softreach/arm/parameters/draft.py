@@ -41,7 +41,7 @@ class Path(NamedTuple):
     def owner(self) -> str:
         """Start of names of numbers of this part; "" for the arm itself."""
         kind, *path = self.part
-        if kind == "actuators":
+        if kind in ("actuators", "drives"):
             return str(path[0])
         if kind == "markers":
             return f"markers.{path[0]}"
@@ -86,6 +86,7 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["core",] = arm.section.core
     if arm.section.measured is not None:
         keyed["measured",] = arm.section.measured
+    keyed |= {("drives", drive.name): drive for drive in arm.drives}
     return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
 
 
@@ -223,6 +224,7 @@ class Draft:
         changes["markers"] = tuple(markers)
         keys = [("actuators", actuator.name) for actuator in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
+        changes["drives"] = tuple(self._made(("drives", drive.name)) for drive in self.arm.drives)
         if not self._faults:
             made = self._tried(None, lambda: self.arm.replace(**changes))
             if made is not None:
