@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arm.actuators import LengthTendon
 from softreach.arm.manipulator import Manipulator
 from softreach.force_growth import Grown, Growth, Stop
 from softreach.inverse import solve_inverse
@@ -81,6 +82,9 @@ def blocked_force(
     family = as_integer("family", family, 1, 10_000)
     progress = as_progress(progress)
     rod = tip_map(arm, tol)
+    if rod.arm.drives or any(isinstance(part, LengthTendon) for part in rod.arm.actuators):
+        hint = "ask the arm whose tendons are driven by tension, without drives"
+        raise InvalidInput("arm", "driven", "one whose activations load its sections", hint)
     yielding = yielding_rod(rod)
     if rod.box.dimension < 3:
         allowed = "3 or more to keep the tip in its place"

@@ -45,9 +45,11 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     arm = a_manipulator("arm", arm)
     if arm.loads is None:
         raise InvalidInput("loads", None, "given", "arm.replace(loads=Loads(...)) gives some")
-    activation = np.clip(0.0, *arm.bounds.T)
+    activation = np.clip(0.0, *arm.input_bounds.T)
     # Nothing but rest is asked for, and the steps need suit no other activation.
-    held = arm.with_bounds(np.stack([activation, activation], axis=1)) if arm.bundles else arm
+    held = arm
+    if arm.bundles and not arm.drives:
+        held = arm.with_bounds(np.stack([activation, activation], axis=1))
     (tip,), (status,) = tip_map(held, tol, warn=False).tips_and_status(activation[None])
     free = tip_map(held.replace(loads=None), tol).tips(activation[None])[0]
     sag = float(np.linalg.norm(tip - free))

@@ -80,7 +80,7 @@ class PulledArm:
     def strains(self) -> Array:
         """(ζ, ω) of least energy at the nodes, shape (station, 4)."""
         before, growth = self.unpulled
-        stiffness = self.arm.section.stiffness(self.arm.profile.radius(self.nodes[0].ravel()))
+        stiffness = self.arm.section.stiffness_at(self.arm.profile, self.nodes[0].ravel())
         resists = np.stack(
             [
                 stiffness.axial,

@@ -16,6 +16,7 @@ from softreach.arm.actuators import (
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
+from softreach.arm.drives import Drive
 from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
@@ -24,6 +25,7 @@ from softreach.arm.material import Material, material_names, named_material
 from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 
@@ -33,6 +35,7 @@ __all__ = [
     "Base",
     "Chamber",
     "DesignSummary",
+    "Drive",
     "FiberArchitecture",
     "Layer",
     "LengthTendon",
@@ -51,6 +54,7 @@ __all__ = [
     "RadialMuscle",
     "RestShape",
     "Resultants",
+    "RigidPiece",
     "Ring",
     "RingIntegrals",
     "SampledTaper",

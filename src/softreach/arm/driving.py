@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import LengthTendon
+from softreach.arm.actuators import LengthTendon, Tendon
 from softreach.arm.rest_shape import STRAIGHT, RestStrains
-from softreach.arm.tables import strain_stations, tables
+from softreach.arm.tables import ends_over, strain_stations, tables
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.support.errors import Fault, InvalidDesign
 
@@ -58,39 +58,106 @@ class Driving:
         """True if tensions follow from displacements."""
         return any(isinstance(each, LengthTendon) for each in self.arm.actuators)
 
-    def held(self, x: Array) -> Array:
+    @cached_property
+    def is_affine(self) -> bool:
+        """True if γ(x) has no kinks."""
+        is_cut = self._pulls & (self._reached()[:, 0] < 0.0)
+        has_dead_zones = any(drive.dead_zone for drive in self.arm.drives)
+        return not (self.has_length_tendons or has_dead_zones or is_cut.any())
+
+    @cached_property
+    def ranges(self) -> Array:
+        """Bounds of the bundles of the inner arm, displacements among them, shape (bundle, 2)."""
+        reached = self._reached()
+        return np.where(self._pulls[:, None], np.maximum(reached, 0.0), reached)
+
+    def _reached(self) -> Array:
+        """Bounds of the bundles, if tendons could push."""
+        bounds = self.arm.input_bounds.copy()
+        for k, drive in enumerate(self.arm.drives):
+            bounds[k] = drive.effective(bounds[k])[0]
+        return self._offsets[:, None] + ends_over(self.gains, bounds)
+
+    @cached_property
+    def widths(self) -> Array:
+        """Largest |∂γ/∂x| of an affine map, shape (inner bundle, input)."""
+        return np.abs(self.gains)
+
+    @cached_property
+    def gains(self) -> Array:
+        """Activation of each bundle of the inner arm per effective input, (bundle, input)."""
+        names = self.arm.bundle_names
+        gains = np.zeros((self.law.arm.bundles, self.arm.inputs))
+        for k, drive in enumerate(self.arm.drives):
+            for name, gain in drive.gains.items():
+                gains[names.index(name), k] += gain
+        for k, bundle in enumerate(self.arm.undriven, start=len(self.arm.drives)):
+            gains[bundle, k] = 1.0
+        return gains
+
+    @cached_property
+    def _offsets(self) -> Array:
+        """Activation of each bundle of the inner arm at inputs of 0; 1 of the rest shape."""
+        offsets = np.zeros(self.law.arm.bundles)
+        offsets[self.arm.bundles :] = 1.0
+        for drive in self.arm.drives:
+            for name, offset in drive.offsets.items():
+                offsets[self.arm.bundle_names.index(name)] += offset
+        return offsets
+
+    @cached_property
+    def _pulls(self) -> NDArray[np.bool_]:
+        """Bundles that drives cannot push: tendons driven by tension, shape (inner bundle,)."""
+        pulls = np.zeros(self.law.arm.bundles, bool)
+        for k, actuator in enumerate(self.arm.bundle_actuators):
+            by_tension = isinstance(actuator, Tendon) and not isinstance(actuator, LengthTendon)
+            pulls[k] = by_tension and k not in self.arm.undriven
+        return pulls
+
+    def bundles(self, x: Array) -> Array:
         """Activations of all bundles of the inner arm, displacements among them."""
-        count = self.law.arm.bundles - x.shape[1]
-        return np.concatenate([x, np.ones((len(x), count))], axis=1)
+        return self._of_drives(x)[0]
+
+    def _of_drives(self, x: Array) -> tuple[Array, Array]:
+        """The same with their derivatives along x, shape (n, inner bundle, input)."""
+        effective, slopes = x.copy(), np.ones(x.shape)
+        for k, drive in enumerate(self.arm.drives):
+            effective[:, k], slopes[:, k] = drive.effective(x[:, k])
+        bundles = np.tile(self._offsets, (len(x), 1))
+        for k in range(x.shape[1]):  # in their order, whatever BLAS and its threads would do
+            bundles += effective[:, k, None] * self.gains[:, k]
+        slack = self._pulls & (bundles < 0.0)
+        bundles[slack] = 0.0
+        return bundles, np.where(slack[..., None], 0.0, slopes[:, None] * self.gains)
 
     def activations(self, x: Array) -> Array:
-        """γ at checked x (n, bundles)."""
-        bundles = self.held(x)
+        """γ at checked x (n, inputs)."""
+        bundles = self.bundles(x)
         if not self.has_length_tendons:
             return bundles
         return self.law.inner(bundles, self.law.tensions(bundles).tension)
 
     def with_slopes(self, x: Array) -> InnerActivations:
         """γ with ∂γ/∂x."""
-        bundles = self.held(x)
-        slopes = np.eye(bundles.shape[1], x.shape[1])
+        bundles, slopes = self._of_drives(x)
         if not self.has_length_tendons:
-            return InnerActivations(bundles, np.broadcast_to(slopes, (len(x), *slopes.shape)))
+            return InnerActivations(bundles, slopes)
         tensions = self.law.tensions(bundles)
         inner = self.law.inner(bundles, tensions.tension)
-        return self.on_taut(bundles, tensions, self.law.shortening_slopes(inner))
+        return self.on_taut(x, tensions, self.law.shortening_slopes(inner))
 
-    def on_taut(self, bundles: Array, tensions: Tensions, of_strains: Array) -> InnerActivations:
+    def on_taut(self, x: Array, tensions: Tensions, of_strains: Array) -> InnerActivations:
         """γ with ∂γ/∂x on the taut tendons.
 
         Args:
-            bundles: Activations of all bundles with displacements, shape (n, inner bundle).
+            x: Inputs, shape (n, inputs).
             tensions: Those that they lead to.
             of_strains: ∂s/∂γ there, shape (n or 1, tendon, inner bundle).
         """
+        bundles, of_drives = self._of_drives(x)
         inner = self.law.inner(bundles, tensions.tension)
         slopes = self.law.slopes(inner, tensions.is_taut, of_strains)
-        return InnerActivations(inner, slopes[..., : self.arm.bundles])
+        return InnerActivations(inner, slopes @ of_drives)
 
 
 def inner_arm(arm: Manipulator) -> Manipulator:
@@ -100,18 +167,18 @@ def inner_arm(arm: Manipulator) -> Manipulator:
         InvalidDesign: Displacements within the bounds shorten the arm to nothing.
     """
     driving, body = Driving(arm), body_of(arm)
+    bounds = driving.ranges.copy()
     if not driving.has_length_tendons:
-        return body
-    low, high = arm.bounds.T
-    gamma = driving.activations(low + pilot(arm.bundles) * (high - low))
+        return body.with_bounds(bounds)
+    low, high = arm.input_bounds.T
+    gamma = driving.activations(low + pilot(arm.inputs) * (high - low))
     rates = tables(body, strain_stations(body)).extension
     least = float(1.0 + (gamma @ rates.T).min())
     if not least > 0.0:
         allowed = f"reaches extension ζ = {least:.4g}; must keep ζ > 0: narrow the bounds"
-        bounds = body.bounds[driving.law.columns].tolist()
-        raise InvalidDesign([Fault("displacement_bounds", bounds, allowed)])
+        pulled = bounds[driving.law.columns].tolist()
+        raise InvalidDesign([Fault("displacement_bounds", pulled, allowed)])
     most = _SAFETY * gamma.max(axis=0) + _against_loads(arm)
-    bounds = body.bounds.copy()
     columns = driving.law.columns
     bounds[columns] = np.stack([np.zeros(len(columns)), most[columns]], axis=1)
     return body.replace(actuators=tuple(_by_tension(body, _fitting(bounds, columns, rates))))
@@ -129,7 +196,9 @@ def _against_loads(arm: Manipulator) -> float:
 
 
 def body_of(arm: Manipulator) -> Manipulator:
-    """The arm with its rest shape, if any, as a bundle held at 1 behind the others."""
+    """The arm without drives, its rest shape as a bundle held at 1 behind the others."""
+    if arm.drives:
+        arm = arm.replace(drives=())
     if arm.rest.is_straight:
         return arm
     held = RestStrains(
@@ -159,8 +228,7 @@ def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:
     ends = (rates[..., None] * bounds).min(-1)
     others = 1.0 + np.delete(ends, columns, axis=1).sum(1)
     pulled = -ends[:, columns].sum(1)
-    with np.errstate(divide="ignore"):
-        share = float(((1.0 - _LEAST_EXTENSION) * others / pulled).min())
+    share = float(((1.0 - _LEAST_EXTENSION) * others / np.maximum(pulled, 1e-300)).min())
     fitting = bounds.copy()
     fitting[columns] *= min(1.0, share)
     return fitting
@@ -172,7 +240,8 @@ def _by_tension(body: Manipulator, bounds: Array) -> Iterator[object]:
     for actuator in body.actuators:
         last = first + actuator.bundles
         is_pulled = isinstance(actuator, LengthTendon)
-        yield actuator.by_tension(bounds[first:last]) if is_pulled else actuator
+        own = bounds[first:last]
+        yield actuator.by_tension(own) if is_pulled else actuator.with_bounds(own)
         first = last
 
 

@@ -38,7 +38,7 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
         InvalidInput: No finite activations of that shape.
     """
     arm = a_manipulator("arm", arm)
-    gamma = as_rows("activations", activations, arm.bundles, "of shape (n, bundles)")
+    gamma = as_rows("activations", activations, arm.inputs, "of shape (n, inputs)")
     bundles, gamma = arm.bundles, Driving(arm).activations(gamma)
     arm = body_of(arm)
     z, weights, half = quadrature(arm)
@@ -72,7 +72,7 @@ def tensions_of_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
         InvalidInput: No finite activations of that shape.
     """
     driving = Driving(a_manipulator("arm", arm))
-    gamma = as_rows("activations", activations, arm.bundles, "of shape (n, bundles)")
+    gamma = as_rows("activations", activations, arm.inputs, "of shape (n, inputs)")
     return driving.activations(gamma)[:, driving.law.columns]
 
 
@@ -109,7 +109,7 @@ def limit_shortening(arm: Manipulator, most: float) -> Manipulator:
 
 def _strains_at(arm: Manipulator, ends: Array) -> Array:
     """Change of length of each bundle's line at activations of its own [-], shape (bundle, 2)."""
-    count = arm.bundles
+    arm, count = arm.replace(drives=()), arm.bundles
     alone = np.concatenate([np.zeros((1, count)), np.diag(ends[:, 0]), np.diag(ends[:, 1])])
     lengths = line_lengths(arm, alone)
     return (lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0).T

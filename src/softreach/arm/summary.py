@@ -147,7 +147,7 @@ def _validity(actuator: Actuator) -> str:
 def _alone(arm: Manipulator) -> Iterator[Manipulator]:
     """For each activation, the arm whose other activations stay zero, without their actuators."""
     for actuator in arm.actuators:
-        bare = arm.replace(actuators=(actuator,))
+        bare = arm.replace(actuators=(actuator,), drives=())
         for bundle in range(bare.bundles):
             bounds = np.zeros_like(bare.bounds)
             bounds[bundle] = bare.bounds[bundle]

@@ -16,6 +16,7 @@ from softreach.arm.base import Base, rotation_matrices
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, find_parameters, parameters
 from softreach.arm.parameters.draft import Draft
+from softreach.arm.rest_shape import RestShape
 from softreach.support.arguments import as_names, plain
 from softreach.support.errors import InvalidInput, Range
 
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
 
+_UNSEEN = 1e-12
+"""Angle by which an arm that counts as bent is bent at least [rad]."""
 _STEP = 1e-3  # of the scale of a number, for derivatives of tables of fourth order
 _CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 12))
@@ -176,6 +179,9 @@ def free_numbers(
         InvalidInput: A name that no number has, a number that counts something, or a prior that is
             no width above 0.
     """
+    if arm.rest.is_straight and any("rest." in name for name in as_names("free", free)):
+        # All arms on the way have a rest shape, were it of the size of rounding.
+        arm = arm.replace(rest=RestShape(curvature_x=_UNSEEN / arm.length))
     priors = dict(prior or {})
     numbers = tuple(
         replace(number, prior=_prior(number, priors.pop(number.name, None)))

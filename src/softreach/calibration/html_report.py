@@ -62,7 +62,7 @@ def write_report(
         picture=png_source(_picture(result, shown)),
         provenance=[(_WORDS.get(key, key), text) for key, text in result.provenance.items()],
         source=result.data.source,
-        inputs=list(zip(result.arm.bundle_names, result.data.input_names, strict=True)),
+        inputs=list(zip(result.arm.input_names, result.data.input_names, strict=True)),
         design=result.arm.to_toml(),
     )
     with writing(path, kind, overwrite=overwrite) as file:

@@ -29,6 +29,7 @@ from softreach.rod.response import (
     dead_force,
     linear_response,
     node_tables,
+    payload_weight,
     rod_state,
     step_grid,
 )
@@ -152,7 +153,7 @@ class MarkerModel:
             arm.base.rotation,
             np.array(arm.base.position),
             offsets[self.markers],
-            Driving(arm).held(inputs),
+            Driving(arm).bundles(inputs),
             law.taut_from,
             law.compliance,
             measures * stiffness[..., None],
@@ -214,7 +215,7 @@ def _on_base(arm: Manipulator, at: _Explicit, base: Base) -> _Explicit:
     table = at.table
     force = dead_force(arm, base, table.stations, table.length)
     return at._replace(
-        table=replace(table, force=force),
+        table=replace(table, force=force, weight=payload_weight(arm, base)),
         rotation=base.rotation,
         position=np.array(base.position),
     )
@@ -265,7 +266,7 @@ def _slopes(
     """Derivatives of the places by all numbers, (n, marker, 3, number)."""
     bundles = state.gamma.shape[1]
     tables = [change.table for change in changes]
-    response = linear_response(arm, at.table, state, tables, at.measures)
+    response = linear_response(at.table, state, tables, at.measures)
     driven = np.stack([change.bundles[rows] for change in changes], axis=-1)
     if at.measures.shape[-1]:
         driven = _with_tensions(arm, at, state, changes, driven, response.works)

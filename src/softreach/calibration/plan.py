@@ -98,10 +98,10 @@ class PosePlan:
 
     def _csv(self) -> str:
         arm = self.free.arm
-        sizes = [_WRITTEN.get(unit, ("", 1.0)) for unit in arm.bundle_units]
+        sizes = [_WRITTEN.get(unit, ("", 1.0)) for unit in arm.input_units]
         inputs = [
             "_".join([*name.split(), *([unit] if unit else [])])
-            for name, (unit, _) in zip(arm.bundle_names, sizes, strict=True)
+            for name, (unit, _) in zip(arm.input_names, sizes, strict=True)
         ]
         places = [f"{'_'.join(name.split())}_{axis}_mm" for name in self.markers for axis in "xyz"]
         values = self.activations * [size for _, size in sizes]
@@ -190,7 +190,7 @@ def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
 
 def _candidates(arm: Manipulator, count: int, seed: int) -> Array:
     """Activations all over the box, then corners of it, shape (n, input)."""
-    low, high = arm.bounds.T
+    low, high = arm.input_bounds.T
     free = np.flatnonzero(low < high)
     whole = 1 << (count - 1).bit_length()
     inside = sample_cube("sobol", whole, len(free), seed)[:count]
@@ -217,7 +217,7 @@ def _trusted(slopes: Array) -> Array:
 
 def _in_box(arm: Manipulator, inputs: Array) -> Array:
     """Inputs between 0 and 1, (n, free input)."""
-    low, high = arm.bounds.T
+    low, high = arm.input_bounds.T
     free = low < high
     return (inputs[:, free] - low[free]) / (high - low)[free]
 

@@ -52,7 +52,7 @@ def residual_table(result: Calibration, unit: LengthUnit) -> pd.DataFrame:
         "run": np.array(data.run_names)[data.runs],
         "held_out": result.held.astype(int),
     }
-    for k, (name, own) in enumerate(zip(arm.bundle_names, arm.bundle_units, strict=True)):
+    for k, (name, own) in enumerate(zip(arm.input_names, arm.input_units, strict=True)):
         columns[f"{name}{unit_suffix(own)}"] = data.inputs[:, k]
     predicted = data.places + result.residuals
     distance = np.linalg.norm(result.residuals, axis=2)

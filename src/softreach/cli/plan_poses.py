@@ -74,7 +74,7 @@ def plan_poses(
             for number in plan.free.numbers
         ]
         poses = plan.activations.tolist()
-        names = list(arm.bundle_names)
+        names = list(arm.input_names)
         console.json({"noise_m": width, "inputs": names, "poses": poses, "numbers": numbers})
     else:
         seen = ", ".join(plan.markers)

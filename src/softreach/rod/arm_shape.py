@@ -43,7 +43,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
     directors = np.tile(np.eye(3), (1, stations, 1, 1))
     shape = configuration_dataset(
         arm,
-        np.zeros((1, arm.bundles)),
+        np.zeros((1, arm.inputs)),
         z,
         position=arm.base.to_world(straight),
         directors=arm.base.directions_to_world(directors),

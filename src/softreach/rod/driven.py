@@ -60,7 +60,7 @@ class DrivenRod(DerivedMap):
     @cached_property
     def box(self) -> ActivationBox:
         """Bounds of x."""
-        return ActivationBox.between(self.outer.bounds, self.outer.bundle_names)
+        return ActivationBox.between(self.outer.input_bounds, self.outer.input_names)
 
     @cached_property
     def driving(self) -> Driving:
@@ -88,20 +88,20 @@ class DrivenRod(DerivedMap):
         """γ of the inner arm at checked x (n, bundles); NaN where no tensions are found."""
         if self.lengths is None:
             return self.driving.activations(x)
-        bundles = self.driving.held(x)
+        bundles = self.driving.bundles(x)
         return self.driving.law.inner(bundles, self.lengths.tensions(bundles).tension)
 
     def with_slopes(self, x: Array) -> InnerActivations:
         """γ of the inner arm with ∂γ/∂x."""
         if self.lengths is None:
             return self.driving.with_slopes(x)
-        bundles, law = self.driving.held(x), self.driving.law
+        bundles, law = self.driving.bundles(x), self.driving.law
         tensions = self.lengths.tensions(bundles)
         inner = law.inner(bundles, tensions.tension)
         of_strains = np.full((len(x), *law.columns.shape, inner.shape[1]), np.nan)
         known = ~np.isnan(inner).any(axis=1)
         of_strains[known] = self.lengths.slopes(inner[known])
-        return self.driving.on_taut(bundles, tensions, of_strains)
+        return self.driving.on_taut(x, tensions, of_strains)
 
     def fill(
         self,
@@ -152,15 +152,15 @@ class DrivenRod(DerivedMap):
 
         Infinite where γ(x) has kinks.
         """
-        if self.driving.has_length_tendons:
+        if not self.driving.is_affine:
             return np.inf
-        return self.base.linearization_error(np.append(half_widths, 0.0))
+        return self.base.linearization_error(self.driving.widths @ half_widths)
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
         """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
-        if self.driving.has_length_tendons:
+        if not self.driving.is_affine:
             return np.full(len(centers), np.inf)
-        widths = np.append(half_widths, 0.0)
+        widths = self.driving.widths @ half_widths
         return self.base.linearization_errors(self.activations(centers), widths)
 
     def frames(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
 from softreach.rod.arm_rod import ArmRod
@@ -31,6 +32,7 @@ __all__ = [
     "dead_force",
     "linear_response",
     "node_tables",
+    "payload_weight",
     "rod_state",
     "step_grid",
 ]
@@ -69,6 +71,10 @@ class NodeTables:
     """1/K0, 1/K1, 1/K1, 1/K3, shape (step, 3, 4); zero without loads."""
     force: Array
     """Dead force n in the frame of the base [N], shape (step, 3, 3)."""
+    lever: Array
+    """Of the payload in the directors of the tip [m], shape (3,)."""
+    weight: Array
+    """Force of the payload in the frame of the base [N], shape (3,)."""
     asked: Array
     """Z of the stations that were asked for [m], shape (station,)."""
 
@@ -96,11 +102,26 @@ class Response:
 
 
 def _places(arm: Manipulator, stations: Array) -> Array:
-    """All places where something begins or ends [m], unsorted, with repetitions."""
+    """All places where something begins or ends [m], unsorted, with repetitions.
+
+    An actuator that ends at the tip has its own place there, so that it may end before.
+    """
     profile = arm.profile
     breaks = [z for actuator in arm.actuators for z in actuator.breakpoints(profile)]
+    breaks += [arm.length * x for x in arm.section.breaks]
+    spans = [*arm.actuators, *arm.rigid_pieces]
+    ends = [(a.station_at("start", arm.length), a.station_at("end", arm.length)) for a in spans]
+    breaks += [z for piece in arm.rigid_pieces for z in _inside(piece, arm.length)]
+    breaks += [0.0 for start, _ in ends if start <= 0.0]
+    breaks += [arm.length for _, end in ends if end >= arm.length]
     points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
     return np.array([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
+
+
+def _inside(piece: RigidPiece, length: float) -> list[float]:
+    """Ends of a rigid piece between base and tip [m]."""
+    ends = piece.station_at("start", length), piece.station_at("end", length)
+    return [z for z in ends if 0.0 < z < length]
 
 
 def step_grid(arm: Manipulator, stations: Array, steps: int) -> StepGrid:
@@ -149,8 +170,17 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         curvature=table.curvature.reshape(*shape, 3, bundles),
         compliance=soft,
         force=dead_force(arm, arm.base, z, length),
+        lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
+        weight=payload_weight(arm, arm.base),
         asked=np.asarray(stations, float),
     )
+
+
+def payload_weight(arm: Manipulator, base: Base) -> Array:
+    """Force of the payload in the frame of a base [N], shape (3,)."""
+    if arm.loads is None:
+        return np.zeros(3)
+    return arm.loads.payload * np.array(arm.loads.seen_from(base).gravity)
 
 
 def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
@@ -232,7 +262,6 @@ def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
 
 
 def linear_response(
-    arm: Manipulator,
     table: NodeTables,
     state: RodState,
     changes: list[NodeTables],
@@ -241,16 +270,12 @@ def linear_response(
     """Movements of equilibria per unit of each activation and of each change of the tables.
 
     Args:
-        arm: The inner arm.
-        table: Its tables at the nodes.
+        table: Tables of the inner arm at the nodes.
         state: Its equilibria.
         changes: Changes of the tables, one for each column after those of the activations.
         measures: M and N at the nodes whose work is asked for, shape (step, 3, 4, work).
     """
     n, bundles = state.gamma.shape
-    loads = None if arm.loads is None else arm.loads.seen_from(arm.base)
-    weight = np.zeros(3) if loads is None else loads.payload * np.array(loads.gravity)
-    lever = np.zeros(3) if loads is None else np.array(loads.payload_arm)
     if measures is None:
         measures = np.zeros((*table.length.shape, 4, 0))
     job = _Job(
@@ -258,8 +283,8 @@ def linear_response(
         state,
         _at_rest_and_per_activation(table, changes),
         np.ascontiguousarray(measures),
-        np.einsum("c,nca->na", lever, state.tip_directors),
-        weight,
+        np.einsum("c,nca->na", table.lever, state.tip_directors),
+        _tipping(table, state, changes),
         np.searchsorted(table.stations[:, 1], np.sort(table.asked)),
     )
     asked, columns = len(table.asked), bundles + len(changes)
@@ -270,6 +295,18 @@ def linear_response(
     )
     back = np.argsort(np.argsort(table.asked, kind="stable"), kind="stable")
     return Response(moves[:, back], turns[:, back], works)
+
+
+def _tipping(table: NodeTables, state: RodState, changes: list[NodeTables]) -> Array:
+    """Change of the moment of the payload at the same directors, (n, 3, column)."""
+    n, bundles = state.gamma.shape
+    result = np.zeros((n, 3, bundles + len(changes)))
+    arm = np.einsum("c,nca->na", table.lever, state.tip_directors)
+    for k, change in enumerate(changes):
+        moved = np.einsum("c,nca->na", change.lever, state.tip_directors)
+        tipping = np.cross(arm, change.weight) + np.cross(moved, table.weight)
+        result[..., bundles + k] = tipping
+    return result
 
 
 class _Changes(NamedTuple):
@@ -319,7 +356,7 @@ class _Job:
     changes: _Changes
     measures: Array
     lever: Array
-    weight: Array
+    tipping: Array
     marks: NDArray[np.intp]
 
     def respond(self, rows: slice, moves: Array, turns: Array, works: Array) -> None:
@@ -373,7 +410,8 @@ class _Job:
             yielding,
             self.measures,
             self.lever[row],
-            self.weight,
+            table.weight,
+            self.tipping[row],
             self.marks,
             moves,
             turns,

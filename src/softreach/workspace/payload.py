@@ -254,7 +254,7 @@ def _check(arm: Manipulator) -> None:
         )
     if faults := arm.loads.section_faults(arm.section, arm.length):
         raise InvalidDesign(faults)
-    free = int(sum(low < high for low, high in arm.bounds))
+    free = int(sum(low < high for low, high in arm.input_bounds))
     if free < 3:
         raise InvalidInput("free bundles", free, "3 or more, which reach a volume")
 

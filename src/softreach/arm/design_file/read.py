@@ -25,12 +25,14 @@ from softreach.arm.design_file.keys import (
     own_kind,
 )
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
+from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.marker import Marker
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import PLACE, Located, Stations, placed
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
@@ -50,6 +52,8 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "rings": (list, True),
     "stations": (dict, False),
     "actuators": (list, True),
+    "rigid_pieces": (list, False),
+    "drives": (list, False),
     "markers": (list, False),
     "loads": (dict, False),
     "base": (dict, False),
@@ -69,6 +73,8 @@ class Parts(NamedTuple):
     base: Base
     rest: RestShape
     stations: Mapping[str, float]
+    rigid_pieces: tuple[RigidPiece, ...]
+    drives: tuple[Drive, ...]
     markers: tuple[Marker, ...]
     display_unit: str | None
 
@@ -159,6 +165,7 @@ class _DesignReader(TableReader):
             self.refused("actuators", f"{len(tables):,} tables", f"must be at most {MOST_BUNDLES}")
             return None
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
+        drives = [self.part(Drive, raw, f"drives[{k}]") for k, raw in self._tables("drives")]
         raw = self._table("loads")
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
@@ -166,9 +173,10 @@ class _DesignReader(TableReader):
         raw = self._table("rest")
         rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
         stations = self._stations()
-        markers = [
-            (k, self.part(Marker, raw, f"markers[{k}]")) for k, raw in self._tables("markers")
-        ]
+        others = {
+            key: [(k, self.part(kind, raw, f"{key}[{k}]")) for k, raw in self._tables(key)]
+            for key, kind in (("rigid_pieces", RigidPiece), ("markers", Marker))
+        }
         unit = self._display_unit()
         names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
@@ -176,15 +184,27 @@ class _DesignReader(TableReader):
             return None
         sound = [(k, actuator) for k, actuator in actuators if actuator is not None]
         self._check_fit(profile, section, stations, sound)
-        there = [(k, marker) for k, marker in markers if marker is not None]
-        for k, marker in there:
-            faults = _place_faults(marker, profile, stations)
-            self.faults += [fault._replace(path=f"markers[{k}].{fault.path}") for fault in faults]
+        made = {key: [(k, part) for k, part in each if part] for key, each in others.items()}
+        for path, part in ((f"{key}[{k}]", part) for key, each in made.items() for k, part in each):
+            faults = _place_faults(part, profile, stations)
+            self.faults += [fault._replace(path=f"{path}.{fault.path}") for fault in faults]
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
         actuators = tuple(actuator for _, actuator in sound)
-        marked = tuple(marker for _, marker in there)
-        return Parts(profile, section, actuators, loads, base, rest, stations, marked, unit)
+        rigid, markers = (tuple(part for _, part in each) for each in made.values())
+        return Parts(
+            profile=profile,
+            section=section,
+            actuators=actuators,
+            loads=loads,
+            base=base,
+            rest=rest,
+            stations=stations,
+            rigid_pieces=rigid,
+            drives=tuple(drive for drive in drives if drive is not None),
+            markers=markers,
+            display_unit=unit,
+        )
 
     def _stations(self) -> Stations | None:
         """Places of stations by name; None where there are faults."""

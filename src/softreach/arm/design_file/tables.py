@@ -105,8 +105,8 @@ class TableReader:
             return self._judged(raw, path, ring_name_faults(raw))
         if key.field in ("material", "core"):
             return self.material(raw, path)
-        if key.field == "points":  # words or a rotation, which the base judges
-            return raw
+        if key.field in ("points", "gains", "offsets", "bounds"):  # which base and drive judge
+            return raw if key.field == "points" else _floats(raw)
         if key.field == "measured":
             made = self.part(Measured, raw, path)
             return WRONG if made is None else made
@@ -118,6 +118,9 @@ class TableReader:
         """A number in SI units, a function along the arm, or a tuple of numbers."""
         if number.along is not None and isinstance(raw, dict):
             return self.along(number, raw, path)
+        if number.pair and isinstance(raw, list):
+            values = self._all(number, raw, path)
+            return values if len(raw) == 2 else self.refused(path, raw, "must be a number, or two")
         if number.shape == "along":
             return self.refused(path, raw, "must be a table")
         if number.shape == "single":
@@ -228,10 +231,19 @@ def _in_keys(fault: Fault, keys: Mapping[str, str], raw: Mapping[str, Any], path
 def _example(key: Key) -> Any:
     """A sound value of a required key."""
     if key.number is None:
-        return (0.0, 1.0)  # bounds
+        return {"name": "drive", "gains": {"bundle": 1.0}}.get(key.field, (0.0, 1.0))  # or bounds
     if key.number.shape in ("series", "stations"):
         return (0.0, 1.0) if key.number.shape == "stations" else (1.0, 1.0)
     return next(value for value in (1.0, 0.5, 0.0) if key.number.allowed.admits(value))
+
+
+def _floats(raw: Any) -> Any:
+    """Numbers in lists and tables as Python's own."""
+    if isinstance(raw, dict):
+        return {name: _floats(value) for name, value in raw.items()}
+    if isinstance(raw, list):
+        return tuple(map(_floats, raw))
+    return float(raw) if _is_number(raw) else raw
 
 
 def _is_number(raw: Any) -> bool:

@@ -18,12 +18,14 @@ from softreach.arm.design_file.keys import (
     keys_of,
     value_text,
 )
+from softreach.arm.drives import BundleNumbers, Drive
 from softreach.arm.loads import Loads
 from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.number import Station
 from softreach.arm.profile import Profile
 from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
@@ -32,7 +34,7 @@ __all__ = ["display_text", "render"]
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 
-_FIRST = ("name", "ring", "length", "revolution")
+_FIRST = ("name", "unit", "ring", "length", "revolution")
 _LAST = (
     "taper",
     "offset",
@@ -55,6 +57,8 @@ def render(
     base: Base,
     rest: RestShape,
     stations: Mapping[str, float],
+    rigid_pieces: Sequence[RigidPiece],
+    drives: Sequence[Drive],
     markers: Sequence[Marker],
 ) -> str:
     """TOML text of a design, of version 2.
@@ -74,6 +78,8 @@ def render(
         blocks.append(["[stations]", *places])
     for actuator in actuators:
         blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
+    blocks += [["[[rigid_pieces]]", *_lines(piece)] for piece in rigid_pieces]
+    blocks += [["[[drives]]", *_lines(drive)] for drive in drives]
     blocks += [["[[markers]]", *_lines(marker)] for marker in markers]
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
@@ -174,6 +180,8 @@ def _rank(field: str) -> int:
 
 
 def _text(key: str, value: Any) -> str:
+    if isinstance(value, BundleNumbers):
+        return inline_table((key_text(name), value_text(x)) for name, x in value.items())
     if isinstance(value, Station):
         return value_text(value.name)
     number = degrees_text if key.endswith("_deg") else value_text

@@ -13,6 +13,7 @@ import numpy as np
 
 from softreach.arm.actuators import Actuator, FiberArchitecture
 from softreach.arm.along import AlongArm
+from softreach.arm.drives import Drive
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.number import Number, fields_of
@@ -143,6 +144,15 @@ class _Place(OwnParameter):
 
 
 @dataclass(frozen=True, kw_only=True)
+class _OfDrive(OwnParameter):
+    """A bound, a gain or an offset of a drive."""
+
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Its value [unit]."""
+        return (part_of(arm, self.path.part).value_of(self.path.field),)
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Taper(OwnParameter):
     """The taper angle: when it changes, revolutions stay and helical angles follow."""
 
@@ -228,7 +238,8 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
     """
     arm = a_manipulator("arm", arm)
     own = [parameter for key, part in parts(arm).items() for parameter in _of_part(key, part)]
-    every = [*_of_arm(arm, own), *(parameter for parameter in own if parameter.owner)]
+    of_body = [parameter for parameter in own if parameter.path.part[0] != "drives"]
+    every = [*_of_arm(arm, of_body), *(parameter for parameter in own if parameter.owner)]
     return {parameter.name: parameter for parameter in every}
 
 
@@ -264,11 +275,7 @@ def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
 
 def _of_part(key: PartKey, part: Any) -> Iterator[OwnParameter]:
     """Its numbers, first those that stand alone, and the bounds of an actuator."""
-    if isinstance(part, Stations):
-        for name in part:
-            yield _Place(
-                name=f"stations.{name}", owner="stations", number=PLACE, path=Path(key, name)
-            )
+    yield from _of_names(key, part)
     numbers = fields_of(type(part)).values()
     for number in numbers:
         if number.shape == "single":
@@ -278,6 +285,19 @@ def _of_part(key: PartKey, part: Any) -> Iterator[OwnParameter]:
             yield _own(Path(key, number.field, place), element)
     if isinstance(part, Actuator):
         yield from _bounds(key, part)
+
+
+def _of_names(key: PartKey, part: Any) -> Iterator[OwnParameter]:
+    """Places of stations, and numbers of a drive for each of its bundles."""
+    if isinstance(part, Stations):
+        for name in part:
+            yield _Place(
+                name=f"stations.{name}", owner="stations", number=PLACE, path=Path(key, name)
+            )
+    if isinstance(part, Drive):
+        for name, number in part.numbers.items():
+            path = Path(key, name)
+            yield _OfDrive(name=f"{part.name}.{name}", owner=part.name, number=number, path=path)
 
 
 def _elements(number: Number, value: Any) -> Iterator[tuple[tuple[str | int, ...], Number]]:
@@ -299,6 +319,7 @@ def _element(number: Number, k: int) -> Number:
         meaning=f"{number.meaning}, number {k}",
         shape="single",
         along=None,
+        pair=False,
     )
 
 
