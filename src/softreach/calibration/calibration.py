@@ -115,6 +115,7 @@ def calibrate(
         if isinstance(data, Measurements)
         else read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
     )
+    _warn_of_copies(table)
     held = _held_out(table, hold_out, as_integer("seed", seed))
     train = table.of(~held)
     numbers = free_numbers(arm, free, prior)
@@ -144,8 +145,16 @@ def calibrate(
 def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
     held = np.zeros(len(data), bool)
     count = round(share * len(data))
+    if count == len(data):
+        raise InvalidInput("hold_out", share, f"such that some of {len(data)} samples are left")
     held[np.random.default_rng(seed).permutation(len(data))[:count]] = True
     return held
+
+
+def _warn_of_copies(data: Measurements) -> None:
+    rows = np.concatenate([data.inputs, data.places.reshape(len(data), -1)], axis=1)
+    if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
+        warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
 
 
 def _rivals(arm: Manipulator, data: Measurements, held: NDArray[np.bool_]) -> tuple[Rival, ...]:
@@ -234,8 +243,9 @@ class Calibration:
     @cached_property
     def verdict(self) -> Verdict:
         """What limits the fit."""
-        known = self.held_out if self.held.any() else self.train
-        return judged(self.data, self.residuals, known.rms, self.repeatability)
+        held = bool(self.held.any())
+        known, name = (self.held_out, "held-out") if held else (self.train, "fitted")
+        return judged(self.data, self.residuals, known.rms, self.repeatability, f"{name} error")
 
     @property
     def outliers(self) -> NDArray[np.intp]:

@@ -132,8 +132,9 @@ def error_cells(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, ..
     """The same in words: law, samples, and errors in a unit and in L."""
     for law, samples, errors in error_rows(result):
         values = (errors.rms, errors.median, errors.most)
-        texts = (f"{value / unit.size:.3g}" for value in values)
-        yield law, samples, *texts, f"{100.0 * errors.rms / result.arm.length:.2g} %"
+        texts = (f"{value / unit.size:.3g}" if math.isfinite(value) else "-" for value in values)
+        share = f"{100.0 * errors.rms / result.arm.length:.2g} %"
+        yield law, samples, *texts, share if math.isfinite(errors.rms) else "-"
 
 
 def remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
