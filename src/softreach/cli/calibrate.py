@@ -85,8 +85,7 @@ def calibrate(
         Parameter(
             name="--marker",
             group=_COLUMNS,
-            help="Start of the columns of a marker: tip=disk3. Only those that are named are used. "
-            "May be repeated.",
+            help="Start of the columns of a marker: tip=disk3. May be repeated.",
         ),
     ] = None,
     run: Annotated[
