@@ -158,7 +158,7 @@ def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:
     """
     ends = (rates[..., None] * bounds).min(-1)
     others = 1.0 + np.delete(ends, columns, axis=1).sum(1)
-    pulled = -ends[:, columns].sum(1)
+    pulled = 0.0 - ends[:, columns].sum(1)  # no -0.0 where nothing pulls
     with np.errstate(divide="ignore"):
         share = float(((1.0 - _LEAST_EXTENSION) * others / pulled).min())
     fitting = bounds.copy()

@@ -119,13 +119,9 @@ class _Arcs:
         stations, offsets = marker_stations(arm)
         names = [marker.name for marker in arm.markers] or ["tip"]
         measured = [names.index(name) for name in data.marker_names]
-        ends = [actuator.end_over_length * arm.length for actuator in arm.bundle_actuators]
-        whole = np.unique(np.round([*ends, arm.length], 9))
+        spans = [actuator.span(arm.length) for actuator in arm.bundle_actuators]
+        whole = np.unique(np.round([*(end for _, end in spans), arm.length], 9))
         middles = 0.5 * (np.append(0.0, whole[:-1]) + whole)
-        spans = [
-            (a.start_over_length * arm.length, a.end_over_length * arm.length)
-            for a in arm.bundle_actuators
-        ]
         acts = np.array([[low <= z <= high for low, high in spans] for z in middles])
         scale = np.where(np.ptp(data.inputs, axis=0) > 0, np.abs(data.inputs).max(axis=0), 1.0)
         moves = np.ptp(data.inputs, axis=0) > 0
