@@ -79,8 +79,8 @@ def repeatability(data: Measurements) -> Repeatability:
     from scipy.spatial import KDTree
 
     scaled = data.inputs[:, moving] / spans[moving]
-    distance, partner = KDTree(scaled).query(scaled, k=2)
-    distance, partner = distance[:, 1], partner[:, 1]
+    near = KDTree(scaled).query(scaled, k=2)
+    distance, partner = (np.asarray(values)[:, 1] for values in near)
     for limit, exact in ((1e-9, True), (_NEAR, False)):
         rows = np.flatnonzero(distance <= limit)
         apart = (data.places[rows] - data.places[partner[rows]])[..., :]

@@ -65,8 +65,8 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
     start = np.array(free.arm.base.position)
     if len(turning) < 3 or len(moving) < 3:
         shift = np.median(measured - predicted, axis=0)
-        places = zip(POSE[:3], start + shift, strict=True)
-        return free.started_at({name: place for name, place in places if name in moving})
+        moved = zip(POSE[:3], start + shift, strict=True)
+        return free.started_at({name: place for name, place in moved if name in moving})
     rotation, shift = _kabsch(predicted, measured)
     _refuse_mirror(predicted, measured)
     vector = _rotation_vector(rotation)

@@ -44,6 +44,19 @@ _BLOCK = 1024
 """Samples at once: their shapes at all nodes are kept."""
 _TOL = 1e-6
 _STEPS = 24
+_BODY = (
+    "profile",
+    "section",
+    "actuators",
+    "loads",
+    "rest",
+    "stations",
+    "rigid_pieces",
+    "markers",
+)
+"""Parts of an arm that are more than its drives and the pose of its base."""
+_ENDS = ("start", "end", "stations.")
+"""In names of numbers that move ends of actuators."""
 
 
 class Prediction(NamedTuple):
@@ -133,11 +146,13 @@ class MarkerModel:
 
     def _grid(self, arm: Manipulator) -> StepGrid:
         stations, _ = marker_stations(arm)
-        return step_grid(body_of(arm), stations[self.markers], _STEPS)
+        moving = any(word in name for name in self.free.names for word in _ENDS)
+        return step_grid(body_of(arm), stations[self.markers], _STEPS, moving_ends=moving)
 
     def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm)
-        body, law = body_of(arm), LengthLaw(body_of(arm))
+        body, driving = body_of(arm), Driving(arm)
+        law = driving.law
         table = node_tables(body, stations[self.markers], grid)
         columns = law.columns
         stiffness = np.zeros((*table.length.shape, 4))
@@ -153,12 +168,20 @@ class MarkerModel:
             arm.base.rotation,
             np.array(arm.base.position),
             offsets[self.markers],
-            Driving(arm).bundles(inputs),
+            driving.bundles(inputs),
             law.taut_from,
             law.compliance,
             measures * stiffness[..., None],
             rest,
         )
+
+    def _beside(
+        self, arm: Manipulator, at: _Explicit, other: Manipulator, grid: StepGrid, inputs: Array
+    ) -> _Explicit:
+        """The same of another arm; tables are not made again where its body is the same."""
+        if any(getattr(arm, part) != getattr(other, part) for part in _BODY):
+            return self._explicit(other, grid, inputs)
+        return at._replace(bundles=Driving(other).bundles(inputs))
 
     def _block(
         self,
@@ -197,7 +220,7 @@ class MarkerModel:
         """Derivative of all that is explicit by one number."""
         factors = [factor for factor, _ in neighbors]
         each = [
-            self._explicit(other, grid, inputs)
+            self._beside(arm, at, other, grid, inputs)
             if isinstance(other, Manipulator)
             else _on_base(arm, at, other)
             for _, other in neighbors
