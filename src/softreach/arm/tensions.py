@@ -2,9 +2,10 @@
 
 A unit of tension loads the sections by N and M, and does work on their strains: it shortens the
 path of its tendon by s = ∫ N (ζ - 1) + M·ω dZ, with ω = η u. This is exact for tendons parallel to
-the axis of an arm that is not twisted, and consistent with the loads of `Tendon` for all others. Without
-loads s is linear in the tensions, and its slopes C are symmetric and positive semidefinite; so
-tensions solve a linear complementarity problem. As every tension shortens the axis, it has a solution for all q.
+the axis of an arm that is not twisted, and consistent with the loads of `Tendon` for all others.
+Without loads s is linear in the tensions, and its slopes C are symmetric and positive semidefinite;
+so tensions solve a linear complementarity problem. As every tension shortens the axis, it has a
+solution for all displacements.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
     directors = np.tile(np.eye(3), (1, stations, 1, 1))
     nodes = len(quadrature(body_of(arm))[0])
     straight_lines = lengths_of_strains(arm, np.zeros((1, nodes, 3)), np.ones((1, nodes)))
+    lines: dict[str, Any] = {"line_length": straight_lines} if arm.bundles else {}
     shape = configuration_dataset(
         arm,
         np.zeros((1, arm.inputs)),
@@ -55,7 +56,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
         curvature=np.zeros((1, stations, 3)),
         extension=np.ones((1, stations)),
         radius=arm.profile.radius(z),
-        **({"line_length": straight_lines} if arm.bundles else {}),
+        **lines,
     )
     return shape.isel(sample=0)
 
