@@ -25,6 +25,7 @@ from softreach.arm.material import Material, material_names, named_material
 from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 
@@ -53,6 +54,7 @@ __all__ = [
     "RadialMuscle",
     "RestShape",
     "Resultants",
+    "RigidPiece",
     "Ring",
     "RingIntegrals",
     "SampledTaper",

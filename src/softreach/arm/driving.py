@@ -76,15 +76,15 @@ class Driving:
         bounds = self.arm.input_bounds.copy()
         for k, drive in enumerate(self.arm.drives):
             bounds[k] = drive.effective(bounds[k])[0]
-        return self._offsets[:, None] + ends_over(self._gains, bounds)
+        return self._offsets[:, None] + ends_over(self.gains, bounds)
 
     @cached_property
     def widths(self) -> Array:
         """Largest |∂γ/∂x| of an affine map, shape (inner bundle, input)."""
-        return np.abs(self._gains)
+        return np.abs(self.gains)
 
     @cached_property
-    def _gains(self) -> Array:
+    def gains(self) -> Array:
         """Activation of each bundle of the inner arm per effective input, (bundle, input)."""
         names = self.arm.bundle_names
         gains = np.zeros((self.law.arm.bundles, self.arm.inputs))
@@ -125,10 +125,10 @@ class Driving:
             effective[:, k], slopes[:, k] = drive.effective(x[:, k])
         bundles = np.tile(self._offsets, (len(x), 1))
         for k in range(x.shape[1]):  # in their order, whatever BLAS and its threads would do
-            bundles += effective[:, k, None] * self._gains[:, k]
+            bundles += effective[:, k, None] * self.gains[:, k]
         slack = self._pulls & (bundles < 0.0)
         bundles[slack] = 0.0
-        return bundles, np.where(slack[..., None], 0.0, slopes[:, None] * self._gains)
+        return bundles, np.where(slack[..., None], 0.0, slopes[:, None] * self.gains)
 
     def activations(self, x: Array) -> Array:
         """γ at checked x (n, inputs)."""

@@ -28,9 +28,10 @@ from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.scale import scale_warnings
-from softreach.arm.section import Ring, Section, name_faults
-from softreach.arm.stations import Stations, placed
+from softreach.arm.section import Ring, Section, Stiffness, name_faults
+from softreach.arm.stations import Located, Stations, placed
 from softreach.support.arguments import (
     as_flag,
     as_given,
@@ -78,7 +79,9 @@ class Manipulator:
     drives: tuple[Drive, ...] = ()
     """Inputs that activate bundles; bundles that none of them names are inputs themselves."""
     stations: Mapping[str, float] = Stations()
-    """Z [m] of stations by name, at which actuators and markers may be."""
+    """Z [m] of stations by name, at which actuators, rigid pieces and markers may be."""
+    rigid_pieces: tuple[RigidPiece, ...] = ()
+    """Where it neither bends nor twists nor changes its length."""
     markers: tuple[Marker, ...] = ()
     """Points that go with its sections; they change nothing about the arm."""
     display_unit: str | None = field(default=None, compare=False)
@@ -89,9 +92,13 @@ class Manipulator:
         if faults := list(_part_faults(self)):
             raise InvalidDesign(faults)
         object.__setattr__(self, "stations", _stations(self.stations))
-        object.__setattr__(self, "actuators", _placed(_named(self.actuators), self.stations))
-        markers = _placed(self.markers, self.stations, "markers.")
-        object.__setattr__(self, "markers", markers)
+        actuators = tuple(_named(self.actuators))
+        owners = [actuator.name for actuator in actuators]
+        object.__setattr__(self, "actuators", _placed(actuators, self.stations, owners))
+        owners = [f"rigid_pieces[{k}]" for k in range(len(self.rigid_pieces))]
+        object.__setattr__(self, "rigid_pieces", _placed(self.rigid_pieces, self.stations, owners))
+        owners = [f"markers.{marker.name}" for marker in self.markers]
+        object.__setattr__(self, "markers", _placed(self.markers, self.stations, owners))
         names = [actuator.name for actuator in self.actuators], self.bundle_names
         faults = list(_shared_names(self)) or list(_fit_faults(self))
         if faults := faults or list(drive_faults(self.drives, *names)):
@@ -238,6 +245,7 @@ class Manipulator:
             self.base,
             self.rest,
             self.stations,
+            self.rigid_pieces,
             self.drives,
             self.markers,
         )
@@ -352,11 +360,25 @@ class Manipulator:
         places = {0.0, self.length, *self.profile.breakpoints}
         places.update(self.length * x for x in self.section.breaks)
         places.update(z for actuator in self.actuators for z in actuator.breakpoints(self.profile))
+        places.update(z for piece in self.rigid_pieces for z in piece.span(self.length))
         ascending = np.array(sorted(places))
         # Two that differ by rounding alone are one.
         apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
         inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
         return tuple(inside.tolist())
+
+    def stiffness_at(self, z: ArrayLike) -> Stiffness:
+        """K0, K1 and K3 at stations Z [m]: those of its section, infinite in rigid pieces."""
+        stations = np.asarray(z, float)
+        stiffness = self.section.stiffness_at(self.profile, stations)
+        if not self.rigid_pieces:
+            return stiffness
+        spans = [piece.span(self.length) for piece in self.rigid_pieces]
+        inside = [
+            (stations >= start) & ((stations < end) | (end >= self.length)) for start, end in spans
+        ]
+        rigid = np.any(inside, axis=0)
+        return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
     @cached_property
     def inner(self) -> Manipulator:
@@ -467,14 +489,18 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
     if not isinstance(arm.rest, RestShape):
         yield Fault("rest", arm.rest, "must be a RestShape, such as RestShape(curvature_x=2.0)")
-    if not isinstance(arm.markers, tuple | list) or not all(
-        isinstance(marker, Marker) for marker in arm.markers
-    ):
-        yield Fault("markers", arm.markers, "must be Markers")
+    yield from _sequence_faults(arm)
     unit = arm.display_unit
     if unit is not None and not (isinstance(unit, str) and unit in UNITS):
         yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
     yield from _kind_faults(arm.actuators)
+
+
+def _sequence_faults(arm: Manipulator) -> Iterator[Fault]:
+    for name, kind in (("rigid_pieces", RigidPiece), ("markers", Marker)):
+        parts = getattr(arm, name)
+        if not isinstance(parts, tuple | list) or not all(isinstance(x, kind) for x in parts):
+            yield Fault(name, parts, f"must be {kind.__name__}s")
 
 
 def _kind_faults(actuators: Any) -> Iterator[Fault]:
@@ -499,20 +525,19 @@ def _stations(places: Any) -> Stations:
         raise InvalidDesign(list(map(_renamed, error.faults, paths))) from None
 
 
-LocatedPart = TypeVar("LocatedPart", Actuator, Marker)
+LocatedPart = TypeVar("LocatedPart", bound=Located)
 
 
 def _placed(
-    parts: Iterable[LocatedPart], stations: Mapping[str, float], owner: str = ""
+    parts: Iterable[LocatedPart], stations: Mapping[str, float], owners: Iterable[str]
 ) -> tuple[LocatedPart, ...]:
-    """The parts where the stations that they name are; `owner` begins their paths."""
+    """The parts where the stations that they name are; faults begin with their owners."""
     made, faults = [], []
-    for part in parts:
+    for part, owner in zip(parts, owners, strict=True):
         try:
             made.append(placed(part, stations))
         except InvalidDesign as error:
-            path = f"{owner}{part.name}"
-            faults += [_renamed(fault, f"{path}.{fault.path}") for fault in error.faults]
+            faults += [_renamed(fault, f"{owner}.{fault.path}") for fault in error.faults]
     if faults:
         raise InvalidDesign(faults)
     return tuple(made)
@@ -527,9 +552,11 @@ def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
     for name, z in arm.stations.items():
         if z > arm.length:
             yield Fault(f"stations.{name}", z, f"must be on the arm, at most {arm.length:g} m")
-    for marker in arm.markers:
-        for fault in marker.place_faults(arm.length):
-            yield _renamed(fault, f"markers.{marker.name}.{fault.path}")
+    others = {f"rigid_pieces[{k}]": piece for k, piece in enumerate(arm.rigid_pieces)}
+    others |= {f"markers.{marker.name}": marker for marker in arm.markers}
+    for owner, part in others.items():
+        for fault in part.place_faults(arm.length):
+            yield _renamed(fault, f"{owner}.{fault.path}")
     if arm.loads is not None:
         yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:

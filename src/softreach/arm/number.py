@@ -111,6 +111,8 @@ class Number:
     """None is allowed."""
     named: bool = False
     """The name of a station of the arm may take its place."""
+    pair: bool = False
+    """Two values, where the part begins and where it ends, may take its place."""
 
     @property
     def unit(self) -> str:
@@ -140,6 +142,9 @@ class Number:
         if self.along is not None and isinstance(value, self.along):
             outside = [element for element in value.values if not self.allowed.admits(element)]  # pyright: ignore
             return [Fault(self.field, element, self.allowed) for element in outside]
+        if self._is_pair(value):
+            outside = [end for end in as_numbers(value).tolist() if not self.allowed.admits(end)]
+            return [Fault(self.field, end, self.allowed) for end in outside]
         single = plain(value)
         if self.shape == "single" and self.allowed.admits(single):
             return []
@@ -153,11 +158,17 @@ class Number:
             return value
         if self._is_name(value):
             return value
+        if self._is_pair(value):
+            return tuple(np.asarray(value, float).tolist())
         return int(plain(value)) if self.allowed.whole else float(plain(value))
 
     def _is_name(self, value: Any) -> bool:
         """The name of a station, or its place with its name."""
         return self.named and isinstance(value, str | Station)
+
+    def _is_pair(self, value: Any) -> bool:
+        """Two values, where the part begins and where it ends."""
+        return self.pair and as_numbers(value).shape == (2,)
 
     def _faults_of_several(self, value: Any) -> list[Fault]:
         elements = as_numbers(value)
@@ -173,6 +184,7 @@ class Number:
         if self.along is None or (self.shape == "single" and isinstance(value, int | float)):
             return self.allowed
         functions = f"{self.along.__name__} along the arm"
+        functions = f"two at its ends, or {functions}" if self.pair else functions
         single = f"{self.allowed.text}, or " if self.shape == "single" else ""
         return f"must be {single}{functions}{', or None' if self.optional else ''}"
 
@@ -197,6 +209,7 @@ def number(
     shape: Shape = "single",
     along: type | None = None,
     named: bool = False,
+    pair: bool = False,
     default: Any = MISSING,
 ) -> Any:
     """Field of a dataclass that is a number of a design.
@@ -214,11 +227,18 @@ def number(
             several numbers.
         along: Class of functions along the arm that may take its place.
         named: The name of a station may take its place.
+        pair: Two values, where the part begins and where it ends, may take its place.
         default: Default of the field; without one it is required, None makes it optional.
     """
     allowed = Range(low, high, unit, open_low, open_high, integer)
     declared = Number(
-        symbol=symbol, meaning=meaning, allowed=allowed, shape=shape, along=along, named=named
+        symbol=symbol,
+        meaning=meaning,
+        allowed=allowed,
+        shape=shape,
+        along=along,
+        named=named,
+        pair=pair,
     )
     return dataclasses.field(default=default, metadata={"number": declared})
 

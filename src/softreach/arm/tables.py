@@ -74,7 +74,7 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     z = np.atleast_1d(np.asarray(stations, float))
     loads = [Resultants(np.empty((len(z), 0)), np.empty((len(z), 3, 0)))]
     loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
-    stiffness = arm.section.stiffness_at(arm.profile, z)
+    stiffness = arm.stiffness_at(z)
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
@@ -112,14 +112,14 @@ class Compliance(NamedTuple):
 
 
 def compliance(arm: Manipulator, stations: ArrayLike) -> Compliance:
-    """1/K0, 1/K1 and 1/K3 at stations Z [m].
+    """1/K0, 1/K1 and 1/K3 at stations Z [m]; 0 in rigid pieces.
 
     Raises:
         InvalidDesign: A material without Young's modulus.
     """
     if faults := arm.section.modulus_faults("where loads act"):
         raise InvalidDesign(faults)
-    stiffness = arm.section.stiffness_at(arm.profile, stations)
+    stiffness = arm.stiffness_at(stations)
     return Compliance(*(1.0 / value for value in stiffness))
 
 

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuators import Actuator
+from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.measurements import Measurements
@@ -119,16 +121,15 @@ class _Arcs:
         stations, offsets = marker_stations(arm)
         names = [marker.name for marker in arm.markers] or ["tip"]
         measured = [names.index(name) for name in data.marker_names]
-        ends = [actuator.end_over_length * arm.length for actuator in arm.bundle_actuators]
+        ends = [z for part in arm.actuators for z in Actuator.breakpoints(part, arm.profile)]
         whole = np.unique(np.round([*ends, arm.length], 9))
         middles = 0.5 * (np.append(0.0, whole[:-1]) + whole)
-        spans = [
-            (a.start_over_length * arm.length, a.end_over_length * arm.length)
-            for a in arm.bundle_actuators
-        ]
-        acts = np.array([[low <= z <= high for low, high in spans] for z in middles])
-        scale = np.where(np.ptp(data.inputs, axis=0) > 0, np.abs(data.inputs).max(axis=0), 1.0)
+        each = (part.acts(arm.profile, middles) for part in arm.actuators)
+        acts = np.concatenate([np.empty((len(whole), 0), bool), *each], axis=1)
+        gains = Driving(arm).widths[: arm.bundles]
+        acts = acts.astype(float) @ gains > 0
         moves = np.ptp(data.inputs, axis=0) > 0
+        scale = np.where(moves, np.abs(data.inputs).max(axis=0), 1.0)
         return cls(whole, acts & moves, scale, stations[measured], offsets[measured])
 
     def start(self, arm: Manipulator, share: float) -> Array:
@@ -136,7 +137,9 @@ class _Arcs:
         from scipy.spatial.transform import Rotation
 
         middles = 0.5 * (np.append(0.0, self.ends[:-1]) + self.ends)
-        slopes = np.moveaxis(tables(arm, middles).curvature[:, :2], 1, 2) * self.scale[:, None]
+        body, gains = body_of(arm), Driving(arm).gains
+        slopes = np.moveaxis(tables(body, middles).curvature[:, :2] @ gains, 1, 2)
+        slopes = slopes * self.scale[:, None]
         most = np.abs(slopes).max(initial=0.0)
         if any(unit == "m" for unit in arm.bundle_units) or not np.isfinite(most):
             slopes *= 1.0 / (arm.length * max(most, 1e-12))

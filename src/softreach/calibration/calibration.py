@@ -279,8 +279,8 @@ class Calibration:
         """
         from softreach.support.arrays import as_rows
 
-        allowed = f"shape (n, {self.arm.bundles})"
-        x = as_rows("inputs", inputs, self.arm.bundles, allowed)
+        allowed = f"shape (n, {self.arm.inputs})"
+        x = as_rows("inputs", inputs, self.arm.inputs, allowed)
         prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
         assert prediction.slopes is not None
         covariance = self.uncertainty.covariance
@@ -340,7 +340,7 @@ class Calibration:
             "unit": ("number", [number.unit for number in free.numbers]),
             "marker": list(self.data.marker_names),
             "axis": ["x", "y", "z"],
-            "input": list(self.arm.bundle_names),
+            "input": list(self.arm.input_names),
         }
         return xr.Dataset(values, names, self.provenance)
 

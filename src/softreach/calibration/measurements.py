@@ -147,8 +147,8 @@ def read_measurements(
     taken = {run, order, *(name for triple in triples.values() for name in triple)}
     plain = [name for name in columns if name not in taken]
     sources = _input_columns(arm, plain, inputs or {})
-    values = np.zeros((len(table), arm.bundles))
-    for k, (name, unit) in enumerate(zip(sources, arm.bundle_units, strict=True)):
+    values = np.zeros((len(table), arm.inputs))
+    for k, (name, unit) in enumerate(zip(sources, arm.input_units, strict=True)):
         if name:
             values[:, k] = _numbers(table, name) * _size(name, unit)
     if not np.isfinite(values).all():
@@ -290,18 +290,18 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
     """Column of each input of the arm; "" for one that stays at zero."""
     chosen: dict[str, str] = {}
     for name, column in given.items():
-        if name not in arm.bundle_names:
-            allowed = f"one of {', '.join(arm.bundle_names)}"
-            raise InvalidInput("inputs", name, allowed, did_you_mean(name, arm.bundle_names))
+        if name not in arm.input_names:
+            allowed = f"one of {', '.join(arm.input_names)}"
+            raise InvalidInput("inputs", name, allowed, did_you_mean(name, arm.input_names))
         if column and column not in columns:
             raise _missing(f"column of {name}", column, columns)
         chosen[name] = column
-    units = dict(zip(arm.bundle_names, arm.bundle_units, strict=True))
+    units = dict(zip(arm.input_names, arm.input_units, strict=True))
     simple = {_simple(_unit(column)[0]): column for column in columns}
-    for name in arm.bundle_names:
+    for name in arm.input_names:
         if name not in chosen and _simple(name) in simple:
             chosen[name] = simple[_simple(name)]
-    left = [name for name in arm.bundle_names if name not in chosen]
+    left = [name for name in arm.input_names if name not in chosen]
     for unit in dict.fromkeys(units[name] for name in left):
         wanting = [name for name in left if units[name] == unit]
         free = [c for c in columns if c not in chosen.values() and _fits(c, unit)]
@@ -312,7 +312,7 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
             )
             raise InvalidInput("inputs of the data", have, allowed, "name them by `inputs`")
         chosen |= dict(zip(wanting, free, strict=True))
-    return [chosen[name] for name in arm.bundle_names]
+    return [chosen[name] for name in arm.input_names]
 
 
 def _fits(column: str, unit: str) -> bool:

@@ -153,7 +153,7 @@ class MarkerModel:
             arm.base.rotation,
             np.array(arm.base.position),
             offsets[self.markers],
-            Driving(arm).held(inputs),
+            Driving(arm).bundles(inputs),
             law.taut_from,
             law.compliance,
             measures * stiffness[..., None],

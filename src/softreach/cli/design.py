@@ -90,6 +90,8 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     if facts.breakpoints:
         rows["breakpoints"] = (list(facts.breakpoints), "m")
     rows |= {f"station {name}": (z, "m") for name, z in arm.stations.items()}
+    pieces = enumerate(arm.rigid_pieces)
+    rows |= {f"rigid piece {k}": (list(piece.span(arm.length)), "m") for k, piece in pieces}
     if arm.markers:
         rows["markers"] = ([marker.name for marker in arm.markers], "")
     rows["extension"] = (list(facts.extension), "")
@@ -98,13 +100,13 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
 
 
 def _measured_rows(arm: Manipulator) -> Rows:
-    """Symbols of what was measured, in place of what follows from the materials."""
+    """What was measured, in place of what follows from the materials."""
     from softreach.arm.number import fields_of
 
     if (measured := arm.section.measured) is None:
         return {}
     numbers = fields_of(type(measured)).values()
-    known = [number.symbol for number in numbers if getattr(measured, number.field) is not None]
+    known = [number.meaning for number in numbers if getattr(measured, number.field) is not None]
     return {"measured": (known, "")}
 
 

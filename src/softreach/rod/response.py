@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
 from softreach.rod.arm_rod import ArmRod
@@ -107,13 +108,20 @@ def _places(arm: Manipulator, stations: Array) -> Array:
     """
     profile = arm.profile
     breaks = [z for actuator in arm.actuators for z in actuator.breakpoints(profile)]
-    ends = [
-        (a.station_at("start", arm.length), a.station_at("end", arm.length)) for a in arm.actuators
-    ]
+    breaks += [arm.length * x for x in arm.section.breaks]
+    spans = [*arm.actuators, *arm.rigid_pieces]
+    ends = [(a.station_at("start", arm.length), a.station_at("end", arm.length)) for a in spans]
+    breaks += [z for piece in arm.rigid_pieces for z in _inside(piece, arm.length)]
     breaks += [0.0 for start, _ in ends if start <= 0.0]
     breaks += [arm.length for _, end in ends if end >= arm.length]
     points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
     return np.array([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
+
+
+def _inside(piece: RigidPiece, length: float) -> list[float]:
+    """Ends of a rigid piece between base and tip [m]."""
+    ends = piece.station_at("start", length), piece.station_at("end", length)
+    return [z for z in ends if 0.0 < z < length]
 
 
 def step_grid(arm: Manipulator, stations: Array, steps: int) -> StepGrid:

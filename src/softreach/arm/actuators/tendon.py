@@ -68,10 +68,11 @@ class Tendon(PolarActuator):
         "Ω", "rad", "rotation from end to end", low=-MOST_TURN, high=MOST_TURN, default=0.0
     )
     """Ω, rotation from where it begins to its anchor, even along Z [rad]."""
-    distance: float | Samples | None = number(
-        "ρt", "m", "distance from the axis", low=0.0, along=Samples, default=None
+    distance: float | tuple[float, float] | Samples | None = number(
+        "ρt", "m", "distance from the axis", low=0.0, along=Samples, pair=True, default=None
     )
-    """ρt, from the axis [m]; a number, or samples along the arm."""
+    """ρt, from the axis [m]; a number, two (where it begins and at its anchor; straight between
+    them), or samples along the arm."""
     distance_ratio: float | None = number(
         "ρt/R2", "", "distance from the axis over R2", low=0.0, default=None
     )
@@ -158,6 +159,10 @@ class Tendon(PolarActuator):
         if isinstance(self.distance, AlongArm):
             x = z / profile.length
             return self.distance(x), self.distance.derivative(x) / profile.length
+        if isinstance(self.distance, tuple):
+            (first, last), (start, end) = self.distance, self.span(profile.length)
+            slope = (last - first) / (end - start)
+            return first + slope * (np.clip(z, start, end) - start), np.full(z.shape, slope)
         return np.full(z.shape, self.distance), np.zeros(z.shape)
 
     def _angle(self, profile: Profile, z: Array) -> tuple[Array, Array]:

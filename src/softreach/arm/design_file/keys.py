@@ -34,6 +34,7 @@ from softreach.arm.number import Number, fields_of, unit_suffix
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
@@ -84,7 +85,7 @@ KINDS: Mapping[type, Mapping[str, type]] = {Actuator: ACTUATORS, Profile: PROFIL
 """Kinds by what they are."""
 _GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
 
-_BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape, Marker)
+_BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape, RigidPiece, Marker)
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
 

@@ -32,6 +32,7 @@ from softreach.arm.material import LIBRARY_HINT, Material, material_names, named
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import PLACE, Located, Stations, placed
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
@@ -51,6 +52,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "rings": (list, True),
     "stations": (dict, False),
     "actuators": (list, True),
+    "rigid_pieces": (list, False),
     "drives": (list, False),
     "markers": (list, False),
     "loads": (dict, False),
@@ -71,6 +73,7 @@ class Parts(NamedTuple):
     base: Base
     rest: RestShape
     stations: Mapping[str, float]
+    rigid_pieces: tuple[RigidPiece, ...]
     drives: tuple[Drive, ...]
     markers: tuple[Marker, ...]
     display_unit: str | None
@@ -170,9 +173,10 @@ class _DesignReader(TableReader):
         raw = self._table("rest")
         rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
         stations = self._stations()
-        markers = [
-            (k, self.part(Marker, raw, f"markers[{k}]")) for k, raw in self._tables("markers")
-        ]
+        others = {
+            key: [(k, self.part(kind, raw, f"{key}[{k}]")) for k, raw in self._tables(key)]
+            for key, kind in (("rigid_pieces", RigidPiece), ("markers", Marker))
+        }
         unit = self._display_unit()
         names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
@@ -180,16 +184,27 @@ class _DesignReader(TableReader):
             return None
         sound = [(k, actuator) for k, actuator in actuators if actuator is not None]
         self._check_fit(profile, section, stations, sound)
-        there = [(k, marker) for k, marker in markers if marker is not None]
-        for k, marker in there:
-            faults = _place_faults(marker, profile, stations)
-            self.faults += [fault._replace(path=f"markers[{k}].{fault.path}") for fault in faults]
+        made = {key: [(k, part) for k, part in each if part] for key, each in others.items()}
+        for path, part in ((f"{key}[{k}]", part) for key, each in made.items() for k, part in each):
+            faults = _place_faults(part, profile, stations)
+            self.faults += [fault._replace(path=f"{path}.{fault.path}") for fault in faults]
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
-        made = tuple(actuator for _, actuator in sound)
-        marked = tuple(marker for _, marker in there)
-        known = tuple(drive for drive in drives if drive is not None)
-        return Parts(profile, section, made, loads, base, rest, stations, known, marked, unit)
+        actuators = tuple(actuator for _, actuator in sound)
+        rigid, markers = (tuple(part for _, part in each) for each in made.values())
+        return Parts(
+            profile=profile,
+            section=section,
+            actuators=actuators,
+            loads=loads,
+            base=base,
+            rest=rest,
+            stations=stations,
+            rigid_pieces=rigid,
+            drives=tuple(drive for drive in drives if drive is not None),
+            markers=markers,
+            display_unit=unit,
+        )
 
     def _stations(self) -> Stations | None:
         """Places of stations by name; None where there are faults."""

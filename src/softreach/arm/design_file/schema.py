@@ -17,6 +17,7 @@ from softreach.arm.material import Material
 from softreach.arm.measured import Measured
 from softreach.arm.number import Number
 from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
@@ -47,6 +48,7 @@ def json_schema() -> dict[str, Any]:
         "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
         "drive": _table(Drive, "Input that activates bundles"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
+        "rigid_piece": _table(RigidPiece, "Stretch that neither bends nor changes its length"),
         "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
@@ -81,6 +83,11 @@ def json_schema() -> dict[str, Any]:
             "description": "In the order of the activations; [] for a passive rod",
             "type": "array",
             "items": _one_of({**ACTUATORS, "own_actuator": None}, "What drives the arm"),
+        },
+        "rigid_pieces": {
+            "description": "Where the arm is not deformed",
+            "type": "array",
+            "items": _of("rigid_piece"),
         },
         "drives": {
             "description": "Inputs that activate bundles, before the bundles that none names",
@@ -205,7 +212,10 @@ def _number(number: Number) -> _Schema:
         "interpolation": {"enum": kinds},
     }
     along = _object(properties, ["stations_over_length", "values"])
-    return {**about, **along} if number.shape == "along" else {**about, "anyOf": [single, along]}
+    if number.shape == "along":
+        return {**about, **along}
+    pair = [{"type": "array", "items": single, "minItems": 2, "maxItems": 2}] if number.pair else []
+    return {**about, "anyOf": [single, *pair, along]}
 
 
 def _limits(allowed: Range) -> dict[str, float]:

@@ -118,6 +118,9 @@ class TableReader:
         """A number in SI units, a function along the arm, or a tuple of numbers."""
         if number.along is not None and isinstance(raw, dict):
             return self.along(number, raw, path)
+        if number.pair and isinstance(raw, list):
+            values = self._all(number, raw, path)
+            return values if len(raw) == 2 else self.refused(path, raw, "must be a number, or two")
         if number.shape == "along":
             return self.refused(path, raw, "must be a table")
         if number.shape == "single":

@@ -25,6 +25,7 @@ from softreach.arm.material import Material
 from softreach.arm.number import Station
 from softreach.arm.profile import Profile
 from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
@@ -56,6 +57,7 @@ def render(
     base: Base,
     rest: RestShape,
     stations: Mapping[str, float],
+    rigid_pieces: Sequence[RigidPiece],
     drives: Sequence[Drive],
     markers: Sequence[Marker],
 ) -> str:
@@ -76,6 +78,7 @@ def render(
         blocks.append(["[stations]", *places])
     for actuator in actuators:
         blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
+    blocks += [["[[rigid_pieces]]", *_lines(piece)] for piece in rigid_pieces]
     blocks += [["[[drives]]", *_lines(drive)] for drive in drives]
     blocks += [["[[markers]]", *_lines(marker)] for marker in markers]
     if loads is not None:

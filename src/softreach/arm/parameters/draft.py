@@ -45,8 +45,8 @@ class Path(NamedTuple):
             return str(path[0])
         if kind == "markers":
             return f"markers.{path[0]}"
-        if kind == "rings":
-            return "".join((f"rings[{path[0]}]", *(f".{step}" for step in path[1:])))
+        if kind in ("rings", "rigid_pieces"):
+            return "".join((f"{kind}[{path[0]}]", *(f".{step}" for step in path[1:])))
         of_arm = kind == "section" or (kind == "profile" and not self.place)
         return "" if of_arm else str(kind)
 
@@ -78,6 +78,7 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["rest",] = arm.rest
     if arm.stations:
         keyed["stations",] = arm.stations
+    keyed |= {("rigid_pieces", k): piece for k, piece in enumerate(arm.rigid_pieces)}
     keyed |= {("markers", marker.name): marker for marker in arm.markers}
     for k, ring in enumerate(arm.section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
@@ -217,6 +218,8 @@ class Draft:
         for part in ("base", "rest", "stations"):
             if (part,) in self._parts:
                 changes[part] = self._made((part,))
+        pieces = (self._made(("rigid_pieces", k)) for k in range(len(self.arm.rigid_pieces)))
+        changes["rigid_pieces"] = tuple(pieces)
         markers = (self._made(("markers", marker.name)) for marker in self.arm.markers)
         changes["markers"] = tuple(markers)
         keys = [("actuators", actuator.name) for actuator in self.arm.actuators]

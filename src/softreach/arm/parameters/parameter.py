@@ -319,6 +319,7 @@ def _element(number: Number, k: int) -> Number:
         meaning=f"{number.meaning}, number {k}",
         shape="single",
         along=None,
+        pair=False,
     )
 
 

@@ -279,6 +279,8 @@ def _check_expressible(arm: Manipulator) -> None:
     there = "in ActiveFilaments.jl"
     if not isinstance(arm.profile, LinearTaper):
         raise InvalidInput("profile", type(arm.profile).__name__, f"a LinearTaper {there}")
+    if arm.rigid_pieces:
+        raise InvalidInput("rigid_pieces", len(arm.rigid_pieces), f"0 {there}")
     taper = arm.profile.taper
     if 0 < abs(taper) < _SMALLEST_TAPER:
         raise InvalidInput("taper", f"{taper:g} rad", f"0 or at least {_SMALLEST_TAPER:g} {there}")

@@ -240,7 +240,7 @@ def respond(
     """
     steps, columns = growth.shape[0], turning.shape[3]
     every = columns + 3
-    loaded = thrust[0, 0] != 0.0
+    loaded = thrust.max() > 0.0
     state, place = np.zeros((6, every)), np.zeros((3, every))  # θ and μ, ρ
     for c in range(3):
         state[3 + c, c] = 1.0
