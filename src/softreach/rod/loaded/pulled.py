@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.tables import quadrature
 from softreach.arm.tensions import LengthLaw, Tensions
-from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.arm_rod import ArmRod
 from softreach.rod.response import (
     NodeTables,
     linear_response,
@@ -58,7 +58,7 @@ class LoadedLengths:
 
     law: LengthLaw
     """That of the arm without loads."""
-    rod: LoadedRod
+    rod: ArmRod
     """The map of the inner arm under loads, accurate enough for s."""
 
     @cached_property
