@@ -81,6 +81,13 @@ def test_one_parallel_tendon_takes_its_length_from_the_arm():
     assert tension == pytest.approx(0.01 / LENGTH / (1 / K0 + DISTANCE**2 / K1), rel=1e-12)
 
 
+def test_a_tendon_that_is_anchored_halfway_is_shortened_there_alone():
+    halfway = arm_of(tendons(1, end_over_length=0.5, activation_bounds=(0.0, 0.005)))
+    (tension,) = tensions_of_lengths(halfway, [[0.005]])[0]
+    assert tension == pytest.approx(0.01 / LENGTH / (1 / K0 + DISTANCE**2 / K1), rel=1e-12)
+    assert np.isfinite(tip_map(halfway).tips([[0.005]])).all()
+
+
 def test_a_soft_cable_stretches_in_series():
     stiffness, pretension, slack = 500.0, 0.7, 0.001
     tendon = tendons(1, tendon_stiffness=stiffness, pretension=pretension, slack=slack)
