@@ -51,6 +51,7 @@ def test_the_wheel_is_what_runs(installed, tmp_path):
     assert str(SOURCE) not in printed_by(installed, tmp_path, sys.executable, "-c", where)
 
 
+@pytest.mark.large
 def test_my_tendon_arm(installed, tmp_path):
     text = printed_by(
         installed, tmp_path, "bash", EXAMPLES / "tendon_arm.sh", EXAMPLES / "tendon_arm.toml"
