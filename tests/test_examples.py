@@ -69,6 +69,7 @@ def test_a_requirement_is_checked(installed, tmp_path):
     assert text.count(": missed by") == 2
 
 
+@pytest.mark.large
 def test_an_actuator_of_ones_own_and_an_atlas_that_is_interrupted(installed, tmp_path):
     files = EXAMPLES / "spine.toml", EXAMPLES / "magnets.py"
     text = printed_by(installed, tmp_path, "bash", EXAMPLES / "own_actuator.sh", *files)

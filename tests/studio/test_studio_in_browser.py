@@ -248,6 +248,7 @@ def test_nothing_leaves_the_machine(tab, studio):
     assert all(url.startswith((studio.url, f"blob:{studio.url}", "data:")) for url in tab.requests)
 
 
+@pytest.mark.large
 def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
     trunk = sr.designs.minimal_trunk()
     space = DesignSpace.grid(trunk, revolution=[0.5, 1.5], taper=[0.0, 0.01, 0.02])
