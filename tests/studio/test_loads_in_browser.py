@@ -164,6 +164,8 @@ def test_postures_under_loads_are_told(loads_tab):
 @pytest.mark.large
 def test_a_load_that_is_too_large_shows_nothing_and_a_force_leans_the_arm(loads_tab):
     tab = loads_tab
+    tab.choose("gravity", "up")
+    become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
     enter(
         tab,
         "payload [g]",
