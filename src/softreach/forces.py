@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arm.actuators import LengthTendon
 from softreach.arm.manipulator import Manipulator
 from softreach.force_growth import Grown, Growth, Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import as_activations, as_targets
+from softreach.rod.driven import inner_rod
 from softreach.rod.loaded.pushing_tip import PushingTip
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import tip_map
@@ -80,6 +82,9 @@ def blocked_force(
     family = as_integer("family", family, 1, 10_000)
     progress = as_progress(progress)
     rod = tip_map(arm, tol)
+    if rod.arm.drives or any(isinstance(part, LengthTendon) for part in rod.arm.actuators):
+        hint = "ask the arm whose tendons are driven by tension, without drives"
+        raise InvalidInput("arm", "driven", "one whose activations load its sections", hint)
     yielding = yielding_rod(rod)
     if rod.box.dimension < 3:
         allowed = "3 or more to keep the tip in its place"
@@ -89,6 +94,7 @@ def blocked_force(
     best = []
     for target, along, choice in zip(targets, directions, starts, strict=True):
         push, place = rod.pose.directions_to_base(along), rod.pose.to_base(target)
+        choice = inner_rod(rod, choice)[1]
         results = [_grown(yielding, push, place, gamma) for gamma in choice]
         best.append(max((result for result in results if result), key=_force, default=None))
         progress(1)
@@ -154,9 +160,11 @@ def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | N
     status, limit = np.full(n, Stop.NO_START, np.int8), np.zeros((n, bundles), bool)
     settles = np.zeros(n, bool)
     for k, result in _rows(best):
-        force[k], status[k], limit[k] = result.end.fixed.force, result.end.stop, result.end.limits
+        force[k], status[k] = result.end.fixed.force, result.end.stop
+        limit[k] = result.end.limits[:bundles]
         error[k] = result.end.slope * result.tip_error
-        activation[k], begun[k], settles[k] = result.end.fixed.gamma, result.start, result.settles
+        activation[k], begun[k] = result.end.fixed.gamma[:bundles], result.start[:bundles]
+        settles[k] = result.settles
     units = activation_attributes(rod.arm)
     dead = np.array(yielding_rod(rod).loads.tip_force)
     acting = rod.pose.directions_to_world(dead) - force[:, None] * directions

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.rod.free import FreeRod
-from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
 
@@ -46,17 +45,18 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     arm = a_manipulator("arm", arm)
     if arm.loads is None:
         raise InvalidInput("loads", None, "given", "arm.replace(loads=Loads(...)) gives some")
-    activation = np.clip(0.0, *arm.bounds.T)
+    activation = np.clip(0.0, *arm.input_bounds.T)
     # Nothing but rest is asked for, and the steps need suit no other activation.
-    held = arm.with_bounds(np.stack([activation, activation], axis=1)) if arm.bundles else arm
-    rod = LoadedRod(held, tol)
-    equilibria = rod.equilibria(activation[None])
-    free = FreeRod(held.replace(loads=None), tol).tips(activation[None])[0]
-    sag = float(np.linalg.norm(equilibria.tips[0] - free))
+    held = arm
+    if arm.bundles and not arm.drives:
+        held = arm.with_bounds(np.stack([activation, activation], axis=1))
+    (tip,), (status,) = tip_map(held, tol, warn=False).tips_and_status(activation[None])
+    free = tip_map(held.replace(loads=None), tol).tips(activation[None])[0]
+    sag = float(np.linalg.norm(tip - free))
     return Rest(
         activation=activation,
-        tip=arm.base.to_world(equilibria.tips[0]),
+        tip=tip,
         sag=sag,
         sag_over_length=sag / arm.length,
-        status=TipStatus(int(equilibria.status[0])),
+        status=TipStatus(int(status)),
     )

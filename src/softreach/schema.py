@@ -62,6 +62,7 @@ _CONFIGURATION = {
     "radius": (("station",), "m", "outer radius R2 before activation"),
     "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
+_MARKERS = {"marker_position": (("sample", "marker", "axis"), "m", "place of each marker")}
 
 
 def cloud_dataset(
@@ -109,19 +110,22 @@ def configuration_dataset(
     frame: str = "world",
     **arrays: Array,
 ) -> xr.Dataset:
-    """Shapes of an arm at stations Z, one for each row of `activation`.
+    """Shapes of an arm at stations Z, and its markers, one for each row of `activation`.
 
     `names` are those of the bundles with a column there; by default all. `frame` is that of the
     arrays.
     """
     import xarray as xr
 
-    variables = _variables(_CONFIGURATION, arm, {**arrays, "activation": activation}, names)
+    marked = "marker_position" in arrays
+    table = _CONFIGURATION | (_MARKERS if marked else {})
+    variables = _variables(table, arm, {**arrays, "activation": activation}, names)
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "axis": list(AXES),
         "director": ["d1", "d2", "d3"],
         "component": ["u1", "u2", "u3"],
+        **({"marker": [marker.name for marker in arm.markers]} if marked else {}),
         **bundle_coordinates(arm, names),
     }
     return xr.Dataset(variables, coordinates, provenance(arm, frame))
@@ -209,14 +213,14 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
         yield InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
     pairs = {
         "axis": (cloud.get("axis"), AXES),
-        "bundle": (cloud.get("bundle"), arm.bundle_names),
-        "unit": (cloud.get("unit"), arm.bundle_units),
+        "bundle": (cloud.get("bundle"), arm.input_names),
+        "unit": (cloud.get("unit"), arm.input_units),
     }
     for name, (labels, wanted) in pairs.items():
         if labels is not None and tuple(map(str, labels.values)) != tuple(wanted):
             shown = ", ".join(map(str, labels.values))
             yield InvalidInput(f"cloud.{name}", shown, f"{', '.join(wanted)}, as its design says")
-    for name, size in (("axis", len(AXES)), ("bundle", arm.bundles)):
+    for name, size in (("axis", len(AXES)), ("bundle", arm.inputs)):
         if cloud.sizes[name] != size:
             yield InvalidInput(
                 f"cloud.sizes['{name}']", cloud.sizes[name], f"{size}, as its design says"
@@ -242,21 +246,21 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
     """Names of the bundles, of all or of some, and the unit of each if they differ."""
     units = _units(arm, names)
     each = {} if len(set(units)) == 1 else {"unit": ("bundle", list(units))}
-    return {"bundle": list(arm.bundle_names if names is None else names), **each}
+    return {"bundle": list(arm.input_names if names is None else names), **each}
 
 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
     if names is None:
-        return arm.bundle_units
-    of_name = dict(zip(arm.bundle_names, arm.bundle_units, strict=True))
+        return arm.input_units
+    of_name = dict(zip(arm.input_names, arm.input_units, strict=True))
     return tuple(of_name[name] for name in names)
 
 
-_SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P"}
+_SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}
 
 
 def activation_symbols(units: Iterable[str]) -> tuple[str, ...]:
-    """Symbols of activations of these units: γ, the tension τ, the pressure P."""
+    """Symbols of activations of these units: γ, the tension τ, the pressure P, q in m."""
     return tuple(_SYMBOLS.get(unit, "a") for unit in units)
 
 

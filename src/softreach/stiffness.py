@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
+from softreach.rod.driven import DrivenRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
@@ -184,16 +185,20 @@ def yielding_rod(rod: TipMap) -> LoadedRod:
     Without loads nothing weighs on it.
     """
     of_base = tip_map(rod, frame="base")
+    if isinstance(of_base, DrivenRod):
+        of_base = of_base.base
     if isinstance(of_base, LoadedRod):
         return of_base
-    if of_base != tip_map(rod.arm, rod.tol, frame="base"):
+    if of_base != tip_map(of_base.arm, rod.tol, frame="base"):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or the tip map that it has")
     return _without_loads(of_base)
 
 
 def _compliance(rod: TipMap, activations: ArrayLike) -> Array:
     """∂r/∂F [m/N] in the frame of a tip map, shape (n, 3, 3)."""
-    matrices, turn = yielding_rod(rod).compliance(activations), rod.pose.rotation
+    gamma = rod.box.check(activations)
+    at = rod.activations(gamma) if isinstance(rod, DrivenRod) else gamma
+    matrices, turn = yielding_rod(rod).compliance(at), rod.pose.rotation
     return matrices if rod.pose.is_identity else turn @ matrices @ turn.T
 
 

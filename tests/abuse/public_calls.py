@@ -277,6 +277,7 @@ CALLS: dict[str, Call] = {
     "rod.configuration": Call(lambda: dict(arm=ARM, activation=GAMMA)),
     "rod.equilibria": Call(lambda: dict(arm=HEAVY, activations=GAMMA)),
     "rod.free_bundles": Call(lambda: dict(rod=sr.rod.tip_map(ARM))),
+    "rod.marker_positions": Call(lambda: dict(arm=ARM, activations=GAMMA)),
     "rod.tip_jacobian": Call(lambda: dict(arm=ARM, activations=GAMMA)),
     "rod.tip_map": Call(lambda: dict(arm=ARM)),
     "rod.tip_positions": Call(lambda: dict(arm=ARM, activations=GAMMA)),

@@ -84,7 +84,7 @@ profile.length_m = '1': must be a valid number
 profile.tapper_deg = 3: unknown key; did you mean "taper_deg"?
 materials.lce.young_modulus = 3: unknown key; did you mean "young_modulus_pa"?
 materials."a b".poisson_ratio = 0.7: must be a finite number >= 0 and <= 0.5
-materials."a b".density_kg_m3 = -3: must be a finite number > 0 kg/m³
+materials."a b".density_kg_m3 = -3: must be a finite number >= 0 kg/m³
 rings[0].inner_ratio = 0.7: must be below outer_ratio = 0.6
 rings[1].material.poisson = 0.3: unknown key; did you mean "poisson_ratio"?
 rings[2].inner_ratio: required key is missing
@@ -111,9 +111,9 @@ actuators[7].radius_m = 0: must be a finite number > 0 m
 actuators[7].pressure_bounds_pa = [0, '1 bar']: must be a pair (lower, upper)
 actuators[7].end_over_length = 0.4: must be above start_over_length = 0.5
 actuators[8].kind: required key is missing: one of fiber
-actuators[9].kind = 'fibre': must be one of fiber, oblique_muscle, radial_muscle, tendon, chamber
+actuators[9].kind = 'fibre': must be one of fiber, oblique_muscle, radial_muscle, tendon, length_tendon, chamber
 actuators[2].name = 'a': must differ from actuators[1].name
-"""
+"""  # noqa: E501
 
 
 def faults_of(text: str) -> list[str]:

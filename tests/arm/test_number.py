@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import pytest
 
 import softreach as sr
-from softreach.arm import Actuator, AlongArm, Loads, Pieces, PointLoad, Samples
+from softreach.arm import Actuator, AlongArm, Loads, Measured, Pieces, PointLoad, Samples
 from softreach.arm.design_file.keys import keys_of
 from softreach.arm.design_file.schema import json_schema
 from softreach.arm.number import fields_of, number, own_fields
@@ -21,7 +21,7 @@ from softreach.support.errors import InvalidDesign
 from tests.arm.test_refusals import SOUND
 from tests.cable import Cable
 
-PARTS = {**SOUND, Loads: {}, PointLoad: {"station": 0.0}}
+PARTS = {**SOUND, Loads: {}, PointLoad: {"station": 0.0}, Measured: {}}
 NUMBERS = [(kind, field) for kind in PARTS for field in fields_of(kind)]
 UNDECLARED = {"activation_bounds", "values"}
 """Their unit is that of the activation, or of the field that changes along the arm."""
@@ -126,7 +126,8 @@ def test_plain_numbers_of_a_kind_of_ones_own_need_no_declaration(trunk):
     arm = trunk.replace(actuators=(*trunk.actuators, Plain(place=(0.0, 0.01), name="own")))
     names = {name.partition(".")[2] for name in parameters(arm) if name.startswith("own.")}
     mine = {"gain", "turns", "slack", "knots[0]", "knots[1]", "place[0]", "place[1]"}
-    assert names == mine | {"bundles", "lower", "upper", "start_over_length", "end_over_length"}
+    ends = {"start", "end", "start_over_length", "end_over_length"}
+    assert names == mine | ends | {"bundles", "lower", "upper"}
     new = {"own.gain": 0.5, "own.turns": 3, "own.slack": 0.1, "own.knots[1]": 2.0}
     made = changed(arm, new).actuators[3]
     assert made == Plain(

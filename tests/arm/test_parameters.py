@@ -273,7 +273,7 @@ def nudged(name: str, value: float) -> float:
         return 0.1 if "angle" in name or "distance" in name else 1000.0
     if name.endswith("bundles"):
         return value + 1
-    below = name.endswith(("end_over_length", "inner_ratio", "bore_ratio", "poisson_ratio"))
+    below = name.endswith(("end_over_length", ".end", "inner_ratio", "bore_ratio", "poisson_ratio"))
     step = 0.01 * abs(value) or 0.005
     return value - step if below else value + step
 
@@ -418,10 +418,10 @@ def test_all_that_is_helical_turns_in_its_own_sense():
         ),
         ({"pull.distance": 0.1, "pull.distance_ratio": 0.1}, ["pull.distance, pull.distance_rat"]),
         (
-            {"length": -1.0, "rings[0].inner_ratio": 2.0, "core.density": 0.0, "bore_ratio": -1.0}
+            {"length": -1.0, "rings[0].inner_ratio": 2.0, "core.density": -1.0, "bore_ratio": -1.0}
             | {"left.helical_angle.values[0]": 9.0, "air.area_factor": 0.0},
             ["left.helical_angle.values[0] = 9", "length = -1", "rings[0].inner_ratio = 2"]
-            + ["core.density = 0", "bore_ratio = -1", "air.area_factor = 0"],
+            + ["core.density = -1", "bore_ratio = -1", "air.area_factor = 0"],
         ),
     ],
 )
@@ -523,6 +523,8 @@ def test_another_kind_of_actuator_has_the_parameters_that_it_declares(trunk):
         "pull.bundles",
         "pull.start_over_length",
         "pull.end_over_length",
+        "pull.start",
+        "pull.end",
         "pull.lower",
         "pull.upper",
     }

@@ -21,6 +21,7 @@ from softreach.arm import (
     Section,
     Tendon,
 )
+from softreach.arm.parameters import changed
 from softreach.arm.tables import tables
 from softreach.support.errors import InvalidDesign
 from tests.oracles import tendon_rod
@@ -208,6 +209,38 @@ def test_two_tendons_in_series_bend_as_two_arms_end_to_end():
     np.testing.assert_allclose(whole, expected, atol=1e-11)
 
 
+@pytest.mark.parametrize("revolution", [0.0, 1.5])
+@pytest.mark.parametrize("span", [{}, {"start": 0.06, "end": 0.24}, {"end_over_length": 0.8}])
+def test_two_distances_are_a_straight_line_from_where_a_tendon_begins_to_its_anchor(
+    span, revolution
+):
+    pair, z = tendon(distance=(0.009, 0.004), revolution=revolution, **span), [[10.0], [30.0]]
+    start, end = pair.span(LENGTH)
+    slope = (0.004 - 0.009) / (end - start)
+    ends = (0.009 - slope * start, 0.009 + slope * (LENGTH - start))
+    samples = Samples(stations_over_length=(0, 1), values=ends, interpolation="linear")
+    np.testing.assert_allclose(
+        sr.tip_positions(arm(pair), z),
+        sr.tip_positions(arm(pair.replace(distance=samples)), z),
+        atol=1e-13,
+    )
+
+
+def test_files_and_parameters_hold_distances_that_change_along_the_arm():
+    samples = Samples(stations_over_length=(0, 0.5, 1), values=(0.009, 0.008, 0.004))
+    made = arm(tendon(name="a", distance=(0.009, 0.004)), tendon(name="b", distance=samples))
+    assert "distance_m = [0.009, 0.004]" in made.to_toml()
+    assert Manipulator.from_toml(made.to_toml()) == made
+    moved = changed(made, {"a.distance[1]": 0.005, "b.distance.values[2]": 0.006})
+    assert moved.actuators[0].distance == (0.009, 0.005)
+    assert moved.actuators[1].distance.values == (0.009, 0.008, 0.006)
+    assert changed(made, {"a.distance": 0.007}).actuators[0].distance == 0.007
+    with pytest.raises(InvalidDesign, match=r"a.distance\[1\] = -1: must be"):
+        changed(made, {"a.distance[1]": -1.0})
+    with pytest.raises(InvalidDesign, match=r"actuators\[0\].distance_m = \[1, 2, 3\]: must be a"):
+        Manipulator.from_toml(made.to_toml().replace("[0.009, 0.004]", "[1, 2, 3]", 1))
+
+
 def test_tendons_break_the_arm_where_they_start_end_and_turn():
     bent = Samples(stations_over_length=(0, 0.3, 1), values=(0, 1, 0), interpolation="linear")
     one = tendon(routing=bent, start_over_length=0.1, end_over_length=0.75)
@@ -228,6 +261,8 @@ def test_a_tendon_is_measured_in_newtons():
         ({"distance_ratio": 0.5}, r"\(0.008, 0.5\): give exactly one of distance and distance_r"),
         ({"distance": -0.1}, "distance = -0.1: must be a finite number >= 0 m"),
         ({"distance": math.nan}, "distance = nan"),
+        ({"distance": (0.01, -0.1)}, "distance = -0.1: must be a finite number >= 0 m"),
+        ({"distance": (0.01, 0.02, 0.03)}, "must be .*, or two at its ends, or Samples"),
         ({"distance": True}, "distance = True"),
         ({"distance": "1cm"}, "distance = '1cm'"),
         ({"distance": 10**400}, "distance = 1000"),
@@ -237,7 +272,7 @@ def test_a_tendon_is_measured_in_newtons():
         ),
         (
             {"distance": Pieces(stations_over_length=(0, 1), values=(0.1,))},
-            r"distance = Pieces\(.*must be a finite number >= 0 m, or Samples along the arm",
+            r"distance = Pieces\(.*must be a finite .*, or two .*or Samples along the arm",
         ),
         ({"routing": 0.3}, "routing = 0.3: must be Samples along the arm, or None"),
         (

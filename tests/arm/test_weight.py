@@ -131,6 +131,18 @@ def test_where_nothing_weighs_the_load_number_needs_no_density():
     assert describe(pulled).load_number == pytest.approx(1e-3 * 0.3**2 / (4 * stiffness))
 
 
+@pytest.mark.parametrize("loads", [sr.Loads(), sr.Loads(payload=0.001, tip_force=(1e-3, 0, 0))])
+def test_a_rod_of_no_density_bends_as_one_that_nothing_pulls_down_but_its_loads(loads):
+    made = arm(
+        section=Section(rings=(Ring(inner_ratio=0.7, material=RUBBER.replace(density=0.0)),))
+    )
+    assert (mass(made), load_number(made)) == (0.0, 0.0)
+    weight = 9.81 * loads.payload
+    free = sr.Loads(gravity=(0, 0, 0), tip_force=np.add(loads.tip_force, (0, 0, -weight)))
+    tips = [sr.tip_positions(made.replace(loads=each), [[0.005], [0.01]]) for each in (loads, free)]
+    np.testing.assert_allclose(tips[0], tips[1], atol=1e-9)
+
+
 def test_loads_beyond_the_verified_ones_are_warned_of_with_their_number():
     number = load_number(arm())
     heavy = arm().replace(loads=sr.Loads(gravity=(0, 0, 9.81 * 12.5 / number)))

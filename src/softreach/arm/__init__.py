@@ -5,6 +5,7 @@ from softreach.arm.actuators import (
     Actuator,
     Chamber,
     FiberArchitecture,
+    LengthTendon,
     ObliqueMuscle,
     Outline,
     RadialMuscle,
@@ -15,11 +16,16 @@ from softreach.arm.actuators import (
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
+from softreach.arm.drives import Drive
 from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material, material_names, named_material
+from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
+from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 
@@ -29,12 +35,16 @@ __all__ = [
     "Base",
     "Chamber",
     "DesignSummary",
+    "Drive",
     "FiberArchitecture",
     "Layer",
+    "LengthTendon",
     "LinearTaper",
     "Loads",
     "Manipulator",
+    "Marker",
     "Material",
+    "Measured",
     "ObliqueMuscle",
     "Outline",
     "Pieces",
@@ -42,7 +52,9 @@ __all__ = [
     "PointLoad",
     "Profile",
     "RadialMuscle",
+    "RestShape",
     "Resultants",
+    "RigidPiece",
     "Ring",
     "RingIntegrals",
     "SampledTaper",

@@ -18,7 +18,7 @@ from softreach.arm.number import series_faults, stations
 from softreach.arm.part import Part
 from softreach.support.errors import Fault
 
-__all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic"]
+__all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic", "values_along"]
 
 Array = NDArray[np.float64]
 
@@ -111,6 +111,11 @@ class Samples(AlongArm):
             allowed = f"must be one of {', '.join(_INTERPOLATIONS)}"
             faults.append(Fault("interpolation", self.interpolation, allowed))
         return faults
+
+
+def values_along(value: float | AlongArm, x: ArrayLike) -> Array:
+    """A number, or a function along the arm, at x = Z/L."""
+    return value(x) if isinstance(value, AlongArm) else np.full(np.shape(x), value)
 
 
 def monotone_cubic(places: Sequence[float], values: Sequence[float]) -> Any:

@@ -47,6 +47,7 @@ def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
     Returns:
         Least and largest bending [1/m], each of shape (station,).
     """
+    arm = arm.inner
     center, halves = _zonogons(arm, stations)
     if not arm.bundles:
         return np.zeros(len(center)), np.zeros(len(center))
@@ -67,16 +68,19 @@ def _farthest(vertices: Array) -> Array:
 
 def largest_bending(arm: Manipulator) -> Extreme:
     """The largest bending [1/m] in the box and along the arm, to 1e-9 of it."""
+    arm = arm.inner
     return _largest(arm, lambda z: _largest_at(arm, z))
 
 
 def sharpest_bending(arm: Manipulator) -> Extreme:
     """The largest bending times R2(Z) [-]: the inner side folds where it is 1 or more."""
+    arm = arm.inner
     return _largest(arm, lambda z: _largest_at(arm, z) * arm.profile.radius(z))
 
 
 def smallest_bending(arm: Manipulator) -> Extreme:
     """The least bending [1/m] in the box and along the arm; 0 below 1e-9 of the largest there."""
+    arm = arm.inner
     low, high = arm.bounds.T
     if (low <= 0).all() and (high >= 0).all():
         return Extreme(0.0, 0.0)

@@ -209,7 +209,7 @@ ACTUATOR_KINDS: Mapping[str, Callable[[Manipulator, str, float], Actuator]] = {
 
 def _moment(arm: Manipulator) -> float:
     """The moment that bends the base as if the arm were to turn in all by `_TURN` [N m]."""
-    stiffness = float(arm.section.stiffness(arm.profile.radius(0.0)).bending)
+    stiffness = float(arm.section.stiffness_at(arm.profile, 0.0).bending)
     return _TURN * stiffness / arm.length
 
 

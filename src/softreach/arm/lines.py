@@ -1,22 +1,21 @@
-"""Lengths of the lines along which bundles run, as activations change them."""
+"""Lengths of the lines along which bundles run, and tensions of those driven by length."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.tables import tables
+from softreach.arm.tables import quadrature, tables
 from softreach.support.arguments import as_number
 from softreach.support.arrays import as_rows
 from softreach.support.errors import Range
 
-__all__ = ["limit_shortening", "line_lengths", "line_strains"]
+__all__ = ["limit_shortening", "line_lengths", "line_strains", "tensions_of_lengths"]
 
 Array = NDArray[np.float64]
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-_PIECES = 32
 _STEP = 1e-5  # of a piece, for derivatives along the arm
 _HALVINGS = 52
 
@@ -39,8 +38,11 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
         InvalidInput: No finite activations of that shape.
     """
     arm = a_manipulator("arm", arm)
-    gamma = as_rows("activations", activations, arm.bundles, "of shape (n, bundles)")
-    z, weights, step = _quadrature(arm)
+    gamma = as_rows("activations", activations, arm.inputs, "of shape (n, inputs)")
+    bundles, gamma = arm.bundles, Driving(arm).activations(gamma)
+    arm = body_of(arm)
+    z, weights, half = quadrature(arm)
+    step = _STEP * half
     table = tables(arm, z)
     zeta = 1.0 + gamma @ table.extension.T
     eta = zeta if table.growth is table.extension else 1.0 + gamma @ table.growth.T
@@ -53,7 +55,25 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     speed = np.sqrt(
         (dx - three * y) ** 2 + (dy + three * x) ** 2 + (zeta[..., None] + one * y - two * x) ** 2
     )
-    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
+    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))[:, :bundles]
+
+
+def tensions_of_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
+    """Tensions of the tendons that are driven by length, without loads [N].
+
+    Args:
+        arm: The design.
+        activations: Displacements in m among them, shape (n, bundles).
+
+    Returns:
+        τ >= 0, shape (n, tendons driven by length), in the order of their bundles.
+
+    Raises:
+        InvalidInput: No finite activations of that shape.
+    """
+    driving = Driving(a_manipulator("arm", arm))
+    gamma = as_rows("activations", activations, arm.inputs, "of shape (n, inputs)")
+    return driving.activations(gamma)[:, driving.law.columns]
 
 
 def line_strains(arm: Manipulator) -> Array:
@@ -89,18 +109,10 @@ def limit_shortening(arm: Manipulator, most: float) -> Manipulator:
 
 def _strains_at(arm: Manipulator, ends: Array) -> Array:
     """Change of length of each bundle's line at activations of its own [-], shape (bundle, 2)."""
-    count = arm.bundles
+    arm, count = arm.replace(drives=()), arm.bundles
     alone = np.concatenate([np.zeros((1, count)), np.diag(ends[:, 0]), np.diag(ends[:, 1])])
     lengths = line_lengths(arm, alone)
     return (lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0).T
-
-
-def _quadrature(arm: Manipulator) -> tuple[Array, Array, Array]:
-    """Gauss nodes between all breakpoints with their weights [m], and steps that stay between."""
-    knots = np.union1d(np.linspace(0.0, arm.length, _PIECES + 1), arm.breakpoints)
-    half = np.diff(knots)[:, None] / 2.0
-    z = knots[:-1, None] + half * (1.0 + _NODES)
-    return z.ravel(), (half * _WEIGHTS).ravel(), np.repeat(_STEP * half.ravel(), len(_NODES))
 
 
 def _places(arm: Manipulator, z: Array) -> Array:

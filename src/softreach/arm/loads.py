@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
@@ -11,6 +12,7 @@ from softreach.support.errors import Fault
 
 if TYPE_CHECKING:
     from softreach.arm.base import Base
+    from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
 __all__ = ["GRAVITY", "Loads", "PointLoad"]
@@ -100,6 +102,24 @@ class Loads(Part):
             for k, load in enumerate(self.point_loads)
             if load.station > length
         ]
+
+    def sizes(self, section: Section, profile: Profile) -> tuple[float, float]:
+        """Force per length at the base [N/m], and other forces with moments over the length [N].
+
+        Sizes are added whatever their directions.
+        """
+        gravity = math.hypot(*self.gravity)
+        payload = self.payload * gravity
+        per_length = math.hypot(*self.force_per_length)
+        if gravity:
+            per_length += gravity * float(section.mass_per_length_at(profile, 0.0))
+        force = payload + math.hypot(*self.tip_force) + math.hypot(*self.follower_force)
+        moment = payload * math.hypot(*self.payload_arm)
+        moment += math.hypot(*self.tip_moment) + math.hypot(*self.follower_moment)
+        for load in self.point_loads:
+            force += math.hypot(*load.force)
+            moment += math.hypot(*load.moment)
+        return per_length, force + moment / profile.length
 
     def seen_from(self, base: Base) -> Self:
         """The same in the frame of a base: everything that does not follow the tip is turned."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -13,14 +13,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import design_file
-from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
+from softreach.arm.actuators import (
+    Actuator,
+    FiberArchitecture,
+    LengthTendon,
+    Outline,
+    SectorActuator,
+)
 from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distance_faults
 from softreach.arm.base import UPRIGHT, Base
+from softreach.arm.drives import Drive, drive_faults
 from softreach.arm.loads import Loads
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.rest_shape import STRAIGHT, RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.scale import scale_warnings
-from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.section import Ring, Section, Stiffness, name_faults
+from softreach.arm.stations import Located, Stations, placed
 from softreach.support.arguments import (
     as_flag,
     as_given,
@@ -63,6 +74,16 @@ class Manipulator:
     """Loads beside them; None for nothing, not even its weight."""
     base: Base = UPRIGHT
     """Pose of its clamped end in the world; upright at the origin."""
+    rest: RestShape = STRAIGHT
+    """Curvature and twist of the arm that nothing drives; straight."""
+    drives: tuple[Drive, ...] = ()
+    """Inputs that activate bundles; bundles that none of them names are inputs themselves."""
+    stations: Mapping[str, float] = Stations()
+    """Z [m] of stations by name, at which actuators, rigid pieces and markers may be."""
+    rigid_pieces: tuple[RigidPiece, ...] = ()
+    """Where it neither bends nor twists nor changes its length."""
+    markers: tuple[Marker, ...] = ()
+    """Points that go with its sections; they change nothing about the arm."""
     display_unit: str | None = field(default=None, compare=False)
     """Unit that the command line shows it in, "m", "cm", "mm" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
@@ -70,9 +91,19 @@ class Manipulator:
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):
             raise InvalidDesign(faults)
-        object.__setattr__(self, "actuators", tuple(_named(self.actuators)))
-        if faults := list(_shared_names(self)) or list(_fit_faults(self)):
+        object.__setattr__(self, "stations", _stations(self.stations))
+        actuators = tuple(_named(self.actuators))
+        owners = [actuator.name for actuator in actuators]
+        object.__setattr__(self, "actuators", _placed(actuators, self.stations, owners))
+        owners = [f"rigid_pieces[{k}]" for k in range(len(self.rigid_pieces))]
+        object.__setattr__(self, "rigid_pieces", _placed(self.rigid_pieces, self.stations, owners))
+        owners = [f"markers.{marker.name}" for marker in self.markers]
+        object.__setattr__(self, "markers", _placed(self.markers, self.stations, owners))
+        names = [actuator.name for actuator in self.actuators], self.bundle_names
+        faults = list(_shared_names(self)) or list(_fit_faults(self))
+        if faults := faults or list(drive_faults(self.drives, *names)):
             raise InvalidDesign(faults)
+        object.__setattr__(self, "drives", tuple(self.drives))
 
     @classmethod
     def tapered(
@@ -206,7 +237,18 @@ class Manipulator:
 
     @cached_property
     def _toml(self) -> str:
-        return design_file.render(self.profile, self.section, self.actuators, self.loads, self.base)
+        return design_file.render(
+            self.profile,
+            self.section,
+            self.actuators,
+            self.loads,
+            self.base,
+            self.rest,
+            self.stations,
+            self.rigid_pieces,
+            self.drives,
+            self.markers,
+        )
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
@@ -279,15 +321,81 @@ class Manipulator:
         return read_only(np.concatenate([np.empty((0, 2)), *bounds]))
 
     @cached_property
+    def undriven(self) -> tuple[int, ...]:
+        """Bundles that no drive names."""
+        driven = {name for drive in self.drives for name in drive.gains}
+        return tuple(k for k, name in enumerate(self.bundle_names) if name not in driven)
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs: drives, then bundles that no drive names.
+
+        They are what is called the activations of the arm in all results.
+        """
+        return len(self.drives) + len(self.undriven)
+
+    @cached_property
+    def input_names(self) -> tuple[str, ...]:
+        """A name for each input."""
+        names = self.bundle_names
+        return (*(drive.name for drive in self.drives), *(names[k] for k in self.undriven))
+
+    @cached_property
+    def input_units(self) -> tuple[str, ...]:
+        """The unit of each input."""
+        units = self.bundle_units
+        return (*(drive.unit for drive in self.drives), *(units[k] for k in self.undriven))
+
+    @cached_property
+    def input_bounds(self) -> Array:
+        """Lower and upper bound of each input [unit], shape (inputs, 2), read-only."""
+        if not self.drives:
+            return self.bounds
+        of_drives = np.array([drive.bounds for drive in self.drives])
+        return read_only(np.concatenate([of_drives, self.bounds[list(self.undriven)]]))
+
+    @cached_property
     def breakpoints(self) -> tuple[float, ...]:
-        """Stations inside (0, L) where profile or actuators are not smooth, ascending [m]."""
+        """Stations inside (0, L) where profile, section or actuators are not smooth [m]."""
         places = {0.0, self.length, *self.profile.breakpoints}
+        places.update(self.length * x for x in self.section.breaks)
         places.update(z for actuator in self.actuators for z in actuator.breakpoints(self.profile))
+        places.update(z for piece in self.rigid_pieces for z in piece.span(self.length))
         ascending = np.array(sorted(places))
         # Two that differ by rounding alone are one.
         apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
         inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
         return tuple(inside.tolist())
+
+    def stiffness_at(self, z: ArrayLike) -> Stiffness:
+        """K0, K1 and K3 at stations Z [m]: those of its section, infinite in rigid pieces."""
+        stations = np.asarray(z, float)
+        stiffness = self.section.stiffness_at(self.profile, stations)
+        if not self.rigid_pieces:
+            return stiffness
+        spans = [piece.span(self.length) for piece in self.rigid_pieces]
+        inside = [
+            (stations >= start) & ((stations < end) | (end >= self.length)) for start, end in spans
+        ]
+        rigid = np.any(inside, axis=0)
+        return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
+
+    @cached_property
+    def inner(self) -> Manipulator:
+        """The arm as tables and kernels see it; itself where activations load its sections.
+
+        A rest shape is a bundle held at 1, and tendons that are driven by length have tensions.
+        `arm.driving` maps activations of the arm to those of this one.
+
+        Raises:
+            InvalidDesign: Displacements within the bounds shorten the arm to nothing.
+        """
+        by_length = any(isinstance(actuator, LengthTendon) for actuator in self.actuators)
+        if self.rest.is_straight and not self.drives and not by_length:
+            return self
+        from softreach.arm.driving import inner_arm
+
+        return inner_arm(self)
 
     @property
     def bundle_courses(self) -> tuple[str, ...]:
@@ -379,10 +487,20 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("loads", arm.loads, "must be Loads or None")
     if not isinstance(arm.base, Base):
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
+    if not isinstance(arm.rest, RestShape):
+        yield Fault("rest", arm.rest, "must be a RestShape, such as RestShape(curvature_x=2.0)")
+    yield from _sequence_faults(arm)
     unit = arm.display_unit
     if unit is not None and not (isinstance(unit, str) and unit in UNITS):
         yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
     yield from _kind_faults(arm.actuators)
+
+
+def _sequence_faults(arm: Manipulator) -> Iterator[Fault]:
+    for name, kind in (("rigid_pieces", RigidPiece), ("markers", Marker)):
+        parts = getattr(arm, name)
+        if not isinstance(parts, tuple | list) or not all(isinstance(x, kind) for x in parts):
+            yield Fault(name, parts, f"must be {kind.__name__}s")
 
 
 def _kind_faults(actuators: Any) -> Iterator[Fault]:
@@ -398,13 +516,53 @@ def _kind_faults(actuators: Any) -> Iterator[Fault]:
         yield Fault("actuators", f"{count} bundles", f"must be at most {MOST_BUNDLES} in all")
 
 
+def _stations(places: Any) -> Stations:
+    """Stations by name, with their faults under the arm's path."""
+    try:
+        return places if isinstance(places, Stations) else Stations(places)
+    except InvalidDesign as error:
+        paths = [f"stations.{fault.path}".rstrip(".") for fault in error.faults]
+        raise InvalidDesign(list(map(_renamed, error.faults, paths))) from None
+
+
+LocatedPart = TypeVar("LocatedPart", bound=Located)
+
+
+def _placed(
+    parts: Iterable[LocatedPart], stations: Mapping[str, float], owners: Iterable[str]
+) -> tuple[LocatedPart, ...]:
+    """The parts where the stations that they name are; faults begin with their owners."""
+    made, faults = [], []
+    for part, owner in zip(parts, owners, strict=True):
+        try:
+            made.append(placed(part, stations))
+        except InvalidDesign as error:
+            faults += [_renamed(fault, f"{owner}.{fault.path}") for fault in error.faults]
+    if faults:
+        raise InvalidDesign(faults)
+    return tuple(made)
+
+
+def _renamed(fault: Fault, path: str) -> Fault:
+    return fault._replace(path=path)
+
+
 def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
     """Faults that keep actuators and loads from acting on this profile and section."""
+    for name, z in arm.stations.items():
+        if z > arm.length:
+            yield Fault(f"stations.{name}", z, f"must be on the arm, at most {arm.length:g} m")
+    others = {f"rigid_pieces[{k}]": piece for k, piece in enumerate(arm.rigid_pieces)}
+    others |= {f"markers.{marker.name}": marker for marker in arm.markers}
+    for owner, part in others.items():
+        for fault in part.place_faults(arm.length):
+            yield _renamed(fault, f"{owner}.{fault.path}")
     if arm.loads is not None:
         yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:
         parts = arm.profile, arm.section
-        faults = actuator.section_faults(*parts) or distance_faults(actuator, *parts)
+        faults = actuator.place_faults(arm.length) or actuator.section_faults(*parts)
+        faults = faults or distance_faults(actuator, *parts)
         yield from (
             fault
             if fault.path.startswith(("rings", "core"))
@@ -427,7 +585,8 @@ def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
 
 
 def _shared_names(arm: Manipulator) -> Iterator[Fault]:
-    """Names that two actuators or two bundles share."""
+    """Names that two actuators, two bundles or two markers share."""
+    yield from name_faults([marker.name for marker in arm.markers], "markers")
     names = [actuator.name for actuator in arm.actuators]
     yield from (faults := list(name_faults(names, "actuators")))
     names = arm.bundle_names

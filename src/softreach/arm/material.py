@@ -50,8 +50,8 @@ class Material(Part):
     """E, Young's modulus [Pa]; None where it cancels."""
     poisson_ratio: float = number("ν", "", "Poisson's ratio", low=0.0, high=0.5, default=0.5)
     """ν, Poisson's ratio [-]."""
-    density: float | None = number("ρ", "kg/m³", "density", low=0.0, open_low=True, default=None)
-    """ρ, mass per volume [kg/m³]; None where weight plays no part."""
+    density: float | None = number("ρ", "kg/m³", "density", low=0.0, default=None)
+    """ρ, mass per volume [kg/m³]; 0 where only loads count, None where weight plays no part."""
     name: str = ""
     """Name in files and pictures."""
 

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from softreach.support.errors import Fault, InvalidInput, Range
 __all__ = [
     "Number",
     "Shape",
+    "Station",
     "as_numbers",
     "fields_of",
     "number",
@@ -55,13 +56,40 @@ _SUFFIXES = {
     "N": "_n",
     "m/s²": "_m_s2",
     "N m": "_n_m",
+    "N m²": "_n_m2",
     "N/m": "_n_per_m",
+    "1/m": "_per_m",
+    "kg/m": "_kg_per_m",
 }
 
 
 def unit_suffix(unit: str) -> str:
     """Suffix of names and keys whose values have a unit; angles are in degrees there."""
     return _SUFFIXES.get(unit, f"_{unit}")
+
+
+class Station(float):
+    """Z [m] of a named station, as a part of an arm has it that begins, ends or stands there."""
+
+    name: str
+
+    def __new__(cls, name: str, z: float) -> Self:
+        """The place of a name."""
+        station = super().__new__(cls, z)
+        station.name = name
+        return station
+
+    def __getnewargs__(self) -> tuple[str, float]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self.name, float(self)
+
+    def __eq__(self, other: object) -> bool:
+        """The name counts: the parts that have it follow when it moves."""
+        return (
+            isinstance(other, Station) and self.name == other.name and float(self) == float(other)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.name, float(self)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +109,10 @@ class Number:
     """Class of functions along the arm that may take its place."""
     optional: bool = False
     """None is allowed."""
+    named: bool = False
+    """The name of a station of the arm may take its place."""
+    pair: bool = False
+    """Two values, where the part begins and where it ends, may take its place."""
 
     @property
     def unit(self) -> str:
@@ -94,7 +126,7 @@ class Number:
 
     def faults(self, value: Any) -> list[Fault]:
         """Everything wrong with a value by itself, but for what `series_faults` judges."""
-        if self.shape == "stations" or (value is None and self.optional):
+        if self.shape == "stations" or (value is None and self.optional) or self._is_name(value):
             return []
         if self.shape == "series":
             return [
@@ -110,6 +142,9 @@ class Number:
         if self.along is not None and isinstance(value, self.along):
             outside = [element for element in value.values if not self.allowed.admits(element)]  # pyright: ignore
             return [Fault(self.field, element, self.allowed) for element in outside]
+        if self._is_pair(value):
+            outside = [end for end in as_numbers(value).tolist() if not self.allowed.admits(end)]
+            return [Fault(self.field, end, self.allowed) for end in outside]
         single = plain(value)
         if self.shape == "single" and self.allowed.admits(single):
             return []
@@ -121,7 +156,19 @@ class Number:
             return tuple(np.asarray(value, float).tolist())
         if value is None or (self.along is not None and isinstance(value, self.along)):
             return value
+        if self._is_name(value):
+            return value
+        if self._is_pair(value):
+            return tuple(np.asarray(value, float).tolist())
         return int(plain(value)) if self.allowed.whole else float(plain(value))
+
+    def _is_name(self, value: Any) -> bool:
+        """The name of a station, or its place with its name."""
+        return self.named and isinstance(value, str | Station)
+
+    def _is_pair(self, value: Any) -> bool:
+        """Two values, where the part begins and where it ends."""
+        return self.pair and as_numbers(value).shape == (2,)
 
     def _faults_of_several(self, value: Any) -> list[Fault]:
         elements = as_numbers(value)
@@ -137,6 +184,7 @@ class Number:
         if self.along is None or (self.shape == "single" and isinstance(value, int | float)):
             return self.allowed
         functions = f"{self.along.__name__} along the arm"
+        functions = f"two at its ends, or {functions}" if self.pair else functions
         single = f"{self.allowed.text}, or " if self.shape == "single" else ""
         return f"must be {single}{functions}{', or None' if self.optional else ''}"
 
@@ -160,6 +208,8 @@ def number(
     integer: bool = False,
     shape: Shape = "single",
     along: type | None = None,
+    named: bool = False,
+    pair: bool = False,
     default: Any = MISSING,
 ) -> Any:
     """Field of a dataclass that is a number of a design.
@@ -176,10 +226,20 @@ def number(
         shape: A single number, a function along the arm, a triple, a series, its stations, or
             several numbers.
         along: Class of functions along the arm that may take its place.
+        named: The name of a station may take its place.
+        pair: Two values, where the part begins and where it ends, may take its place.
         default: Default of the field; without one it is required, None makes it optional.
     """
     allowed = Range(low, high, unit, open_low, open_high, integer)
-    declared = Number(symbol=symbol, meaning=meaning, allowed=allowed, shape=shape, along=along)
+    declared = Number(
+        symbol=symbol,
+        meaning=meaning,
+        allowed=allowed,
+        shape=shape,
+        along=along,
+        named=named,
+        pair=pair,
+    )
     return dataclasses.field(default=default, metadata={"number": declared})
 
 

@@ -28,10 +28,12 @@ def body_mass(profile: Profile, section: Section) -> float:
     Raises:
         InvalidDesign: A layer without a density.
     """
-    ends = np.array([0.0, *profile.breakpoints, profile.length])
+    ends = {0.0, *profile.breakpoints, profile.length}
+    ends.update(profile.length * x for x in section.breaks)
+    ends = np.array(sorted(ends))
     half = 0.5 * np.diff(ends)[:, None]
     z = ends[:-1, None] + half * (1.0 + _NODES)
-    per_length = section.mass_per_length(profile.radius(z))
+    per_length = section.mass_per_length_at(profile, z)
     return float(np.sum(half * _WEIGHTS * per_length))
 
 

@@ -1,19 +1,27 @@
-"""The cross-section: a core and rings of materials, and how stiff and heavy they make it."""
+"""The cross-section: a core and rings of materials, and how stiff and heavy they make it.
+
+What a laboratory measured on the arm itself takes the place of what follows from materials.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.along import values_along
 from softreach.arm.material import Material, as_material, material_faults
+from softreach.arm.measured import Measured
 from softreach.arm.number import number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault, InvalidDesign
+
+if TYPE_CHECKING:
+    from softreach.arm.profile import Profile
 
 __all__ = ["Layer", "Ring", "Section", "Stiffness", "name_faults"]
 
@@ -108,6 +116,8 @@ class Section(Part):
         "R0/R2", "", "radius of the bore over R2", low=0.0, high=1.0, open_high=True, default=0.0
     )
     """Radius of the hole along the axis over R2 [-]; 0 for a solid core."""
+    measured: Measured | None = None
+    """Stiffnesses and mass per length that were measured; None for those of the materials."""
 
     def __post_init__(self) -> None:
         rings = tuple(self.rings) if isinstance(self.rings, tuple | list) else ()
@@ -117,6 +127,9 @@ class Section(Part):
         if faults := material_faults("section.core", self.core, optional=True):
             raise InvalidDesign(faults)
         object.__setattr__(self, "rings", rings)
+        if not isinstance(self.measured, Measured | None):
+            allowed = "must be Measured or None"
+            raise InvalidDesign([Fault("section.measured", self.measured, allowed)])
         super().__post_init__()
 
     def _faults(self) -> list[Fault]:
@@ -177,8 +190,40 @@ class Section(Part):
         """Young's modulus is known, so that forces have a unit."""
         return all(layer.material.young_modulus is not None for layer in self.layers)
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Z/L inside (0, 1) where what was measured is not smooth."""
+        return () if self.measured is None else self.measured.breaks
+
+    @property
+    def has_measured_stiffness(self) -> bool:
+        """A stiffness was measured, so that Young's modulus cancels no more."""
+        return self.measured is not None and any(k is not None for k in self.measured.stiffnesses)
+
+    def stiffness_at(self, profile: Profile, z: ArrayLike) -> Stiffness:
+        """K0, K1 and K3 at stations Z [m] of an arm: what was measured, else by the materials."""
+        stations = np.asarray(z, float)
+        stiffness = self.stiffness(profile.radius(stations))
+        if self.measured is None:
+            return stiffness
+        x = stations / profile.length
+        pairs = zip(self.measured.stiffnesses, stiffness, strict=True)
+        return Stiffness(*(own if k is None else values_along(k, x) for k, own in pairs))
+
+    def mass_per_length_at(self, profile: Profile, z: ArrayLike) -> Array:
+        """Mass per length [kg/m] at stations Z [m]: what was measured, else by the materials.
+
+        Raises:
+            InvalidDesign: Not measured, and a layer without a density.
+        """
+        if self.measured is not None and (mass := self.measured.mass_per_length) is not None:
+            return values_along(mass, np.asarray(z, float) / profile.length)
+        return self.mass_per_length(profile.radius(z))
+
     def stiffness(self, radius: ArrayLike) -> Stiffness:
-        """K0 = Σ πE(R2² - R1²), K1 = Σ (π/4)E(R2⁴ - R1⁴), K3 = Σ K1/(1 + ν): theory (5).
+        """Stiffness that follows from the materials, theory (5).
+
+        K0 = Σ πE(R2² - R1²), K1 = Σ (π/4)E(R2⁴ - R1⁴), K3 = Σ K1/(1 + ν).
 
         Args:
             radius: R2 [m].
@@ -191,12 +236,12 @@ class Section(Part):
         return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)
 
     def mass_per_length(self, radius: ArrayLike) -> Array:
-        """Σ ρ π (R2² - R1²) [kg/m] at R2 [m]: theory (49).
+        """Σ ρ π (R2² - R1²) [kg/m] at R2 [m], that of the materials: theory (49).
 
         Raises:
             InvalidDesign: A layer without a density.
         """
-        if faults := self.density_faults("where weight counts"):
+        if faults := list(_missing(self, "density", "kg/m³", "where weight counts")):
             raise InvalidDesign(faults)
         density = self._sum(lambda material: material.density or 0.0, 2)
         return np.pi * density * np.asarray(radius, float) ** 2
@@ -204,17 +249,25 @@ class Section(Part):
     def modulus_faults(self, why: str) -> list[Fault]:
         """A fault for each material whose Young's modulus is needed and left out.
 
+        None is needed where all stiffnesses were measured.
+
         Args:
             why: Ends the sentence "must be given in Pa ...".
         """
+        if self.measured is not None and None not in self.measured.stiffnesses:
+            return []
         return list(_missing(self, "young_modulus", "Pa", why))
 
     def density_faults(self, why: str) -> list[Fault]:
         """A fault for each material whose density is needed and left out.
 
+        None is needed where the mass per length was measured.
+
         Args:
             why: Ends the sentence "must be given in kg/m³ ...".
         """
+        if self.measured is not None and self.measured.mass_per_length is not None:
+            return []
         return list(_missing(self, "density", "kg/m³", why))
 
     def _sum(self, factor: Callable[[Material], float], power: int) -> float:
@@ -244,7 +297,9 @@ def _modulus(material: Material) -> float:
 
 def _modulus_faults(section: Section) -> Iterator[Fault]:
     first, *others = (layer.material for layer in section.layers)
-    if not all(first.same_matter(other) for other in others):
+    if section.has_measured_stiffness:
+        yield from section.modulus_faults("where not all stiffnesses are measured")
+    elif not all(first.same_matter(other) for other in others):
         yield from section.modulus_faults("where materials differ")
 
 

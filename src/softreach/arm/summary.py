@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -122,9 +121,9 @@ def _pairs(values: Iterator[tuple[float, float]]) -> Array:
 def _of_matter(arm: Manipulator) -> dict[str, Any]:
     """Stiffness, mass and load number, as far as moduli and densities are known."""
     moduli, densities = arm.section.modulus_faults(""), arm.section.density_faults("")
-    ends = arm.profile.radius(np.array([0.0, arm.length]))
+    ends = np.array([0.0, arm.length])
     return {
-        "stiffness": None if moduli else arm.section.stiffness(ends),
+        "stiffness": None if moduli else arm.section.stiffness_at(arm.profile, ends),
         "mass": None if densities else mass(arm),
         "load_number": None if load_number_faults(arm) else load_number(arm),
         "lacking": (
@@ -148,7 +147,7 @@ def _validity(actuator: Actuator) -> str:
 def _alone(arm: Manipulator) -> Iterator[Manipulator]:
     """For each activation, the arm whose other activations stay zero, without their actuators."""
     for actuator in arm.actuators:
-        bare = arm.replace(actuators=(actuator,))
+        bare = arm.replace(actuators=(actuator,), drives=())
         for bundle in range(bare.bundles):
             bounds = np.zeros_like(bare.bounds)
             bounds[bundle] = bare.bounds[bundle]
@@ -166,7 +165,8 @@ def _slender_bending(arm: Manipulator) -> tuple[float, float]:
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
     angle = fiber.helical_angle_on(arm.profile, arm.section)
-    return float(angle(fiber.start_over_length)) if isinstance(angle, AlongArm) else angle
+    start, _ = fiber.span_over_length(arm.length)
+    return float(angle(start)) if isinstance(angle, AlongArm) else angle
 
 
 def mass(arm: Manipulator) -> float:
@@ -190,11 +190,11 @@ def load_number(arm: Manipulator) -> float:
     Raises:
         InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
     """
-    base = arm.profile.radius(0.0)
     if faults := load_number_faults(arm):
         raise InvalidDesign(faults)
-    per_length, force = (_own_weight(arm), 0.0) if arm.loads is None else _of_loads(arm, arm.loads)
-    stiffness = arm.section.stiffness(base).bending
+    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
+    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
+    stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
 
 
@@ -212,26 +212,6 @@ def load_number_faults(arm: Manipulator) -> list[Fault]:
     faults = arm.section.modulus_faults("where weight counts")
     weighs = arm.loads is None or any(arm.loads.gravity)
     return faults + (arm.section.density_faults("where weight counts") if weighs else [])
-
-
-def _own_weight(arm: Manipulator, gravity: float = GRAVITY) -> float:
-    """Weight per length at the base [N/m]."""
-    return gravity * float(arm.section.mass_per_length(arm.profile.radius(0.0)))
-
-
-def _of_loads(arm: Manipulator, loads: Loads) -> tuple[float, float]:
-    """Force per length at the base [N/m], and other forces with moments over the length [N]."""
-    gravity = math.hypot(*loads.gravity)
-    payload = loads.payload * gravity
-    per_length = math.hypot(*loads.force_per_length)
-    per_length += _own_weight(arm, gravity) if gravity else 0.0
-    force = payload + math.hypot(*loads.tip_force) + math.hypot(*loads.follower_force)
-    moment = payload * math.hypot(*loads.payload_arm)
-    moment += math.hypot(*loads.tip_moment) + math.hypot(*loads.follower_moment)
-    for load in loads.point_loads:
-        force += math.hypot(*load.force)
-        moment += math.hypot(*load.moment)
-    return per_length, force + moment / arm.length
 
 
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:

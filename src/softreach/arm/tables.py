@@ -10,16 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
-from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import fields_of
+from softreach.arm.rest_shape import RestStrains
 from softreach.support.errors import Fault, InvalidDesign
+
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = [
     "Compliance",
@@ -29,6 +32,7 @@ __all__ = [
     "compliance",
     "ends_over",
     "extension_range",
+    "quadrature",
     "strain_stations",
     "tables",
 ]
@@ -36,6 +40,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _STATIONS = 101
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_PIECES = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +62,8 @@ class Tables:
 def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     """z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
 
+    U of a rest shape is its curvature; what an arm is at rest, its `inner` arm has.
+
     Args:
         arm: The design.
         stations: Z [m], shape (station,).
@@ -66,10 +74,13 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     z = np.atleast_1d(np.asarray(stations, float))
     loads = [Resultants(np.empty((len(z), 0)), np.empty((len(z), 3, 0)))]
     loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
-    stiffness = arm.section.stiffness(arm.profile.radius(z))
+    stiffness = arm.stiffness_at(z)
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
+    for k, actuator in enumerate(arm.bundle_actuators):
+        if isinstance(actuator, RestStrains):
+            curvature[..., k] = actuator.curvature(arm.profile, z)
     is_force = [actuator.is_force for actuator in arm.bundle_actuators]
     growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
     return Tables(z, extension, curvature, growth)
@@ -101,19 +112,22 @@ class Compliance(NamedTuple):
 
 
 def compliance(arm: Manipulator, stations: ArrayLike) -> Compliance:
-    """1/K0, 1/K1 and 1/K3 at stations Z [m].
+    """1/K0, 1/K1 and 1/K3 at stations Z [m]; 0 in rigid pieces.
 
     Raises:
         InvalidDesign: A material without Young's modulus.
     """
     if faults := arm.section.modulus_faults("where loads act"):
         raise InvalidDesign(faults)
-    stiffness = arm.section.stiffness(arm.profile.radius(np.asarray(stations, float)))
+    stiffness = arm.stiffness_at(stations)
     return Compliance(*(1.0 / value for value in stiffness))
 
 
 def check_extension(arm: Manipulator) -> None:
     """The theory ends where an activation would shorten the arm to nothing.
+
+    Args:
+        arm: The inner arm.
 
     Raises:
         InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, dimensions too
@@ -149,6 +163,7 @@ def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
+    arm = arm.inner
     return _extension_range(arm, tables(arm, strain_stations(arm)).extension)
 
 
@@ -179,3 +194,11 @@ def both_sides(arm: Manipulator, stations: Array) -> Array:
 def strain_stations(arm: Manipulator) -> Array:
     """Stations Z [m] at which it is seen how far strains go."""
     return both_sides(arm, np.linspace(0.0, arm.length, _STATIONS))
+
+
+def quadrature(arm: Manipulator, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
+    """Gauss nodes between all breakpoints, their weights, and half the gap that each is in [m]."""
+    knots = np.union1d(np.linspace(0.0, arm.length, pieces + 1), arm.breakpoints)
+    half = np.diff(knots)[:, None] / 2.0
+    z = knots[:-1, None] + half * (1.0 + _NODES)
+    return z.ravel(), (half * _WEIGHTS).ravel(), np.repeat(half.ravel(), len(_NODES))

@@ -230,7 +230,7 @@ def _surveyed(space: DesignSpace, progress: Progress) -> _Survey:
         except InvalidDesign as error:
             gaps[index] = "; ".join(str(error).splitlines())
         else:
-            sizes.add((arm.bundles, arm.length))
+            sizes.add((arm.inputs, arm.length))
         progress(1)
     bundles, lengths = zip(*sizes, strict=True) if sizes else ((0,), (math.nan,))
     return _Survey(gaps, _Extent(max(bundles), min(lengths), max(lengths)))

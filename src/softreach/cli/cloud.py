@@ -59,7 +59,7 @@ def cloud(
     out = out or Path(f"{Path(design).stem}.zarr")
     check_output(out, cloud_store(arm), overwrite)
     arguments = sampling.arguments
-    check_disk("n", sampling.count, sample_bytes(arm.bundles) * sampling.count, out)
+    check_disk("n", sampling.count, sample_bytes(arm.inputs) * sampling.count, out)
     start = perf_counter()
     dataset = compute_cloud(arm, **arguments, tol=tol)
     seconds = perf_counter() - start

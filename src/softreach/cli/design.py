@@ -89,9 +89,25 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     }
     if facts.breakpoints:
         rows["breakpoints"] = (list(facts.breakpoints), "m")
+    rows |= {f"station {name}": (z, "m") for name, z in arm.stations.items()}
+    pieces = enumerate(arm.rigid_pieces)
+    rows |= {f"rigid piece {k}": (list(piece.span(arm.length)), "m") for k, piece in pieces}
+    if arm.markers:
+        rows["markers"] = ([marker.name for marker in arm.markers], "")
     rows["extension"] = (list(facts.extension), "")
     rows["curvature times L"] = (list(facts.curvature), "")
-    return rows | _rows_of_matter(facts) | load_rows(arm) | _rest_rows(arm)
+    return rows | _measured_rows(arm) | _rows_of_matter(facts) | load_rows(arm) | _rest_rows(arm)
+
+
+def _measured_rows(arm: Manipulator) -> Rows:
+    """What was measured, in place of what follows from the materials."""
+    from softreach.arm.number import fields_of
+
+    if (measured := arm.section.measured) is None:
+        return {}
+    numbers = fields_of(type(measured)).values()
+    known = [number.meaning for number in numbers if getattr(measured, number.field) is not None]
+    return {"measured": (known, "")}
 
 
 def _rows_of_matter(facts: DesignSummary) -> Rows:

@@ -141,10 +141,10 @@ def cloud_of(
 def activation_of(text: str | None, arm: Manipulator) -> list[float]:
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
-        return arm.bounds[:, 0].tolist()
-    values = numbers_in(text, arm.bundles)
+        return arm.input_bounds[:, 0].tolist()
+    values = numbers_in(text, arm.inputs)
     if values is None:
-        allowed = f"{arm.bundles} comma-separated numbers ({', '.join(arm.bundle_names)})"
+        allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
         raise InvalidInput("activation", shortened(text), allowed)
     return values
 
@@ -157,7 +157,7 @@ def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
 
     shape = configuration(arm, activation_of(text, arm))
     if not np.isfinite(shape.position.values).all():
-        lower, upper = (",".join(f"{bound:g}" for bound in ends) for ends in arm.bounds.T)
+        lower, upper = (",".join(f"{bound:g}" for bound in ends) for ends in arm.input_bounds.T)
         allowed = f"such that the arm has a shape, as from {lower} to {upper}"
         raise InvalidInput("activation", text, allowed)
     return shape

@@ -101,7 +101,7 @@ def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     if any(path.suffix.lower() in SURFACE_FILES for path in outs):
         needed.append(("skimage", "surface"))
     check_installed(*needed)
-    free = int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum())
+    free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs or [None]:
         check_output(path, formats, overwrite)
         if path is not None and not is_page(path) and free < (3 if _is_picture(path) else 2):

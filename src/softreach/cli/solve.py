@@ -62,7 +62,7 @@ def solve(
         raise InvalidInput("target", target, "given, or --targets, and not both")
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
-    if int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum()) <= 3:
+    if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
         why = "left out for a design with three free bundles or fewer: all solutions are found"
         refuse(why, family=family, prove_least=prove_least)
     if targets is None:
@@ -165,7 +165,7 @@ def _proof(solution: Solution, arm: Manipulator) -> str:
 
 def _size_unit(arm: Manipulator) -> str:
     """Unit of the size of an activation."""
-    units = set(arm.bundle_units)
+    units = set(arm.input_units)
     if len(units) > 1:
         return " (each over its range)"
     return "" if units == {"1"} else f" {units.pop()}"

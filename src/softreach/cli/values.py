@@ -53,7 +53,7 @@ def as_read(values: Any, unit: str) -> tuple[Any, str]:
 
 def activation_text(arm: Manipulator, values: Iterable[float]) -> str:
     """Activations with the names and units of their bundles: "left -1, right 0.5 N"."""
-    named = zip(arm.bundle_names, values, arm.bundle_units, strict=True)
+    named = zip(arm.input_names, values, arm.input_units, strict=True)
     return ", ".join(
         f"{name} {round(value, 6) + 0.0:.6g}" if unit == "1" else f"{name} {value:.6g} {unit}"
         for name, value, unit in named

@@ -23,7 +23,7 @@ from softreach.plot.style import (
     pyplot,
     some_bundles,
 )
-from softreach.rod.arm_shape import arm_surface, bundle_skins, rest_configuration
+from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_instance, as_number
 from softreach.support.arrays import Array, as_stations
@@ -97,14 +97,15 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
 
 
 def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
-    """Points of one configuration: its surface, and bundles outside of it; shape (n, 3)."""
+    """Points of one configuration: its surface, bundles outside of it, markers; shape (n, 3)."""
     outline = arm.outline(shape["Z"].values)
     out = (outline.outer_ratio > _BULGE) & outline.acts
     surfaces = [arm_surface(arm, shape, _SIDES)]
     if out.any():
         skins = bundle_skins(arm, shape)
         surfaces += [skin for k, skin in enumerate(skins) if out[:, k].any()]
-    return unit.of(np.concatenate([surface.vertices for surface in surfaces]))
+    points = [surface.vertices for surface in surfaces]
+    return unit.of(np.concatenate([*points, marker_points(arm, shape)]))
 
 
 def draw_arms(
@@ -117,6 +118,15 @@ def draw_arms(
     """One image of all shapes, over what the axes hold."""
     if shapes:
         panel.show(*arm_images(panel, arm, shapes, bundles, fade))
+        draw_markers(panel, arm, shapes, fade)
+
+
+def draw_markers(
+    panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float = 0.0
+) -> None:
+    """Small dots where the markers of all shapes are, in front of everything."""
+    if arm.markers and shapes:
+        panel.dot(np.concatenate([marker_points(arm, shape) for shape in shapes]), 1.0 - fade)
 
 
 def arm_images(

@@ -122,6 +122,18 @@ class Panel:
         elif first:
             draw_box(ax, self.box, self.view, self.unit)
 
+    def dot(self, points: Array, opacity: float = 1.0) -> None:
+        """Draw small dots over the image.
+
+        Args:
+            points: Places [m], shape (n, 3).
+            opacity: From 0 to 1.
+        """
+        x, y = project(self.unit.of(points), self.view).T[:2]
+        x = -x if is_mirrored(self.view) else x
+        style = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4}
+        self.ax.plot(x, y, "o", markersize=3, alpha=opacity, zorder=3, **style)
+
     def _columns(self) -> int:
         return max(16, round(_inches(self.ax, self.extent)[0] * DPI))
 

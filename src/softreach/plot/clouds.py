@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.picture.projection import View, sight_axis, view_angles
 from softreach.picture.zbuffer import ZBuffer
-from softreach.plot.arm import arm_images, arm_points, shapes_of
+from softreach.plot.arm import arm_images, arm_points, draw_markers, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import color_samples, draw_figure_key, draw_key
 from softreach.plot.lengths import Unit, common_unit, unit_for, unit_of
@@ -244,6 +244,8 @@ def plot_views(
         for panel, drawn in zip(panels, images, strict=True):
             for image, within in drawn:
                 panel.show(image, within)
+            if arm is not None:
+                draw_markers(panel, arm, shapes)
         draw_figure_key(figure, coloring.key, top)
     return figure
 

@@ -1,7 +1,7 @@
 """The rod: activation box, tip map, and the kinematics that a user asks."""
 
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
+from softreach.rod.kinematics import configuration, marker_positions, tip_jacobian, tip_positions
 from softreach.rod.loaded.all_equilibria import AllEquilibria, equilibria
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.shooting import Equilibria, Rung
@@ -25,6 +25,7 @@ __all__ = [
     "configuration",
     "equilibria",
     "free_bundles",
+    "marker_positions",
     "tip_jacobian",
     "tip_map",
     "tip_positions",

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from threading import RLock
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -70,6 +70,10 @@ class ArmRod(TipMap):
                 least[block] = np.minimum(extension, growth).min(axis=1)
                 most[block] = (growth * bend * step).max(axis=1)
         return least, most
+
+    @abstractmethod
+    def in_steps(self, steps: int) -> Self:
+        """The rod in so many steps, whatever its tolerance; none of its own are sought."""
 
     @abstractmethod
     def _prepare(self) -> None:

@@ -23,6 +23,7 @@ __all__ = [
     "bundle_curves",
     "bundle_skins",
     "bundle_surfaces",
+    "marker_points",
     "rest_configuration",
 ]
 
@@ -42,7 +43,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
     directors = np.tile(np.eye(3), (1, stations, 1, 1))
     shape = configuration_dataset(
         arm,
-        np.zeros((1, arm.bundles)),
+        np.zeros((1, arm.inputs)),
         z,
         position=arm.base.to_world(straight),
         directors=arm.base.directions_to_world(directors),
@@ -118,6 +119,28 @@ def bundle_surfaces(
         InvalidInput: Several configurations.
     """
     return skin.bundle_solids(arm, _drawn_line(arm, configuration), thickness=thickness)
+
+
+def marker_points(arm: Manipulator, configuration: xr.Dataset) -> Array:
+    """Places of the markers of an arm, between the stations of a configuration for pictures.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm, from its base to its tip.
+
+    Returns:
+        Points [m], shape (marker, 3).
+
+    Raises:
+        InvalidInput: Several configurations.
+    """
+    if not arm.markers:
+        return np.empty((0, 3))
+    stations = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
+    line = _line(configuration).with_stations(np.unique(stations))
+    section = np.abs(line.z - stations[:, None]).argmin(axis=1)
+    offsets = np.array([marker.offset for marker in arm.markers])
+    return line.position[section] + np.einsum("mk,mkx->mx", offsets, line.directors[section])
 
 
 def _drawn_line(arm: Manipulator, configuration: xr.Dataset) -> Centerline:

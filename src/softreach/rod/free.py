@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,6 +60,11 @@ class FreeRod(ArmRod):
     @cached_property
     def _table(self) -> Array:
         return self.rule.packed_nodes(self._fineness)
+
+    def in_steps(self, steps: int) -> Self:
+        """The rod in so many steps."""
+        vars(self).update(_fineness=steps, _shape_steps=steps)
+        return self
 
     def _prepare(self) -> None:
         self._table  # noqa: B018

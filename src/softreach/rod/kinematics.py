@@ -23,7 +23,14 @@ from softreach.support.memory import check_room
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["configuration", "shape_dataset", "stations_along", "tip_jacobian", "tip_positions"]
+__all__ = [
+    "configuration",
+    "marker_positions",
+    "shape_dataset",
+    "stations_along",
+    "tip_jacobian",
+    "tip_positions",
+]
 
 Array = NDArray[np.float64]
 
@@ -87,6 +94,49 @@ def tip_jacobian(
     return rod.tip_twists(rod.check_activations("activations", activations))[1]
 
 
+def marker_positions(
+    arm: Manipulator | TipMap,
+    activations: ArrayLike,
+    tol: float = 1e-6,
+    *,
+    frame: Frame = "world",
+) -> Array:
+    """Places of the markers of an arm under many activations, such as those of a cloud.
+
+    Args:
+        arm: The design, or its tip map.
+        activations: γ [-], shape (n, bundles), or (bundles,) for one.
+        tol: As for `tip_positions`.
+        frame: As for `tip_positions`.
+
+    Returns:
+        Places [m] in the order of `Manipulator.markers`, shape (n, marker, 3); NaN where there is
+        no equilibrium.
+
+    Raises:
+        InvalidInput: As for `tip_positions`.
+    """
+    rod = tip_map(arm, tol, frame=frame)
+    gamma = rod.check_activations("activations", activations)
+    check_room("activations", len(gamma), _COLUMNS * max(1, len(rod.arm.markers)))
+    return _markers(rod, gamma)
+
+
+def _markers(rod: TipMap, gamma: Array) -> Array:
+    """r + x d1 + y d2 + z d3 of each marker at checked activations [m], shape (n, marker, 3)."""
+    markers = rod.arm.markers
+    if not markers:
+        return np.empty((len(gamma), 0, 3))
+    # together, so that each equilibrium is found once
+    z, section = np.unique(
+        [m.station_at("station", rod.length) for m in markers], return_inverse=True
+    )
+    frames = rod.frames(gamma, z)
+    offsets = np.array([marker.offset for marker in markers])
+    turned = np.einsum("mk,nmkx->nmx", offsets, frames.directors[:, section])
+    return frames.position[:, section] + turned
+
+
 def configuration(
     arm: Manipulator | TipMap,
     activation: ArrayLike,
@@ -106,7 +156,8 @@ def configuration(
 
     Returns:
         Dataset with `position` [m], `directors` (d1, d2, d3), `curvature` u [1/m] in the directors,
-        `extension` ζ and `radius` R2 [m], over `station` (coordinate Z [m]).
+        `extension` ζ and `radius` R2 [m], over `station` (coordinate Z [m]); `marker_position` [m]
+        over `marker`, if the arm has markers.
 
     Raises:
         InvalidInput: Activations or stations of another shape or out of range, or activations
@@ -127,6 +178,7 @@ def shape_dataset(
     rod: TipMap, gamma: Array, z: Array, frames: Frames, strains: Strains
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
+    markers = {"marker_position": _markers(rod, gamma)} if rod.arm.markers else {}
     return schema.configuration_dataset(
         rod.arm,
         gamma * rod.measures,
@@ -136,6 +188,7 @@ def shape_dataset(
         **frames._asdict(),
         **strains._asdict(),
         radius=rod.radius(z),
+        **markers,
     )
 
 

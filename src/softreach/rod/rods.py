@@ -8,6 +8,7 @@ from functools import lru_cache
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.rod.arm_rod import ArmRod
+from softreach.rod.driven import DrivenRod
 from softreach.rod.free import FreeRod
 from softreach.rod.tip_map import Frame, TipMap, check_tol
 from softreach.rod.view import PlacedRod, View
@@ -47,7 +48,7 @@ def tip_map(
 
 def _from_base(rod: TipMap) -> TipMap:
     """The same map in the frame of the base."""
-    if isinstance(rod, View):
+    if isinstance(rod, View | DrivenRod):
         return replace(rod, base=_from_base(rod.base))
     return rod.base if isinstance(rod, PlacedRod) else rod
 
@@ -61,7 +62,7 @@ def refined(rod: TipMap, tol: float) -> TipMap:
     """
     if rod.tol <= check_tol(tol):
         return rod
-    if isinstance(rod, View):
+    if isinstance(rod, View | DrivenRod):
         return replace(rod, base=refined(rod.base, tol))
     frame: Frame = "base" if isinstance(rod, ArmRod) else "world"
     return _of_arm(rod.arm, tol, frame) if isinstance(rod, ArmRod | PlacedRod) else rod
@@ -69,6 +70,10 @@ def refined(rod: TipMap, tol: float) -> TipMap:
 
 @lru_cache(maxsize=64)
 def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> TipMap:
+    if arm.inner is not arm:
+        inner = _of_arm(arm.inner, tol, frame)
+        assert isinstance(inner, ArmRod | PlacedRod)
+        return DrivenRod(inner, arm)
     if frame == "world" and not arm.base.is_identity:
         rod = _of_arm(arm, tol, "base")
         assert isinstance(rod, ArmRod)

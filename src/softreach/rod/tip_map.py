@@ -335,6 +335,20 @@ class StrainRange(NamedTuple):
     """ζ [-]."""
 
 
+def sampled_range(strains: Strains) -> StrainRange:
+    """Ranges over samples, of those that have an arm."""
+    bend = np.hypot(strains.curvature[..., 0], strains.curvature[..., 1])
+    return StrainRange(
+        np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),
+        _range(strains.curvature[..., 2]),
+        _range(strains.extension),
+    )
+
+
+def _range(values: Array) -> Array:
+    return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
+
+
 class TipMotions(NamedTuple):
     """Positions and directions of tips with their derivatives along each activation."""
 

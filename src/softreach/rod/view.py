@@ -32,6 +32,7 @@ from softreach.rod.tip_map import (
 from softreach.support.arguments import as_instance
 
 __all__ = [
+    "DerivedMap",
     "PlacedRod",
     "View",
     "activation_measures",
@@ -53,7 +54,7 @@ def free_bundles(rod: TipMap) -> TipMap:
 def measured_bundles(rod: TipMap) -> TipMap:
     """A tip map whose activations are in `activation_measures`; the map itself if they are."""
     view, measures = _view(rod), activation_measures(rod.arm)
-    names = rod.arm.bundle_names
+    names = rod.arm.input_names
     scale = tuple(float(measures[names.index(name)]) for name in view.base.box.names)
     return rod if scale == view.scale else replace(view, scale=scale)
 
@@ -71,13 +72,13 @@ def activation_measures(arm: Manipulator) -> Array:
     Strains count as they are. Where all bundles share another unit, the widest range is 1, so that
     distances keep their proportions; where units differ, the range of each bundle is.
     """
-    units = set(arm.bundle_units)
-    ranges = np.diff(arm.bounds, axis=1)[:, 0]
+    units = set(arm.input_units)
+    ranges = np.diff(arm.input_bounds, axis=1)[:, 0]
     if units == {"1"} or not ranges.any():
-        return np.ones(arm.bundles)
+        return np.ones(arm.inputs)
     if len(units) == 1:
-        return np.full(arm.bundles, ranges.max())
-    return np.where(ranges > 0, ranges, np.maximum(np.abs(arm.bounds[:, 1]), 1.0))
+        return np.full(arm.inputs, ranges.max())
+    return np.where(ranges > 0, ranges, np.maximum(np.abs(arm.input_bounds[:, 1]), 1.0))
 
 
 def _view(rod: TipMap) -> View:
@@ -88,7 +89,7 @@ def _view(rod: TipMap) -> View:
 
 
 @dataclass(frozen=True, repr=False)
-class _DerivedMap(TipMap):
+class DerivedMap(TipMap):
     """A tip map made of another one, which answers where nothing changes."""
 
     base: TipMap
@@ -149,7 +150,7 @@ class _DerivedMap(TipMap):
 
 
 @dataclass(frozen=True, repr=False)
-class PlacedRod(_DerivedMap):
+class PlacedRod(DerivedMap):
     """A free or loaded rod as the world sees it: r = r(0) + R r', with r' in the base's frame.
 
     Its base stands, hangs or leans anywhere.
@@ -216,7 +217,7 @@ class PlacedRod(_DerivedMap):
 
 
 @dataclass(frozen=True, repr=False)
-class View(_DerivedMap):
+class View(DerivedMap):
     """A tip map in other coordinates x of its activations, γ = offset + scale ∘ x.
 
     A search that takes NaN for a failed step ends at places that the arm can hold, where unstable

@@ -254,7 +254,7 @@ def _check(arm: Manipulator) -> None:
         )
     if faults := arm.loads.section_faults(arm.section, arm.length):
         raise InvalidDesign(faults)
-    free = int(sum(low < high for low, high in arm.bounds))
+    free = int(sum(low < high for low, high in arm.input_bounds))
     if free < 3:
         raise InvalidInput("free bundles", free, "3 or more, which reach a volume")
 
@@ -262,7 +262,7 @@ def _check(arm: Manipulator) -> None:
 def _usual_payloads(arm: Manipulator) -> Array:
     """Payloads between those that hardly bend the arm and those that bend it far [kg]."""
     assert arm.loads is not None
-    stiffness = arm.section.stiffness(arm.profile.radius(np.array([0.5 * arm.length])))
+    stiffness = arm.section.stiffness_at(arm.profile, np.array([0.5 * arm.length]))
     weight = float(stiffness.bending[0]) / arm.length**2
     mass = weight / float(np.linalg.norm(arm.loads.gravity))
     rounded = float(f"{mass:.1g}")

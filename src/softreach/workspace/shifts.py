@@ -85,7 +85,7 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
 def _scale(arm: Manipulator, parameter: Parameter) -> float:
     """Scale of a parameter that is 0: an offset or a bound of another one."""
     if parameter.field.startswith(("lower", "upper")):
-        return float(np.ptp(arm.bounds, axis=1).max()) or 1.0
+        return float(np.ptp(arm.input_bounds, axis=1).max()) or 1.0
     return _SCALES.get(parameter.unit, 1.0) * (arm.length if parameter.unit == "m" else 1.0)
 
 
@@ -94,7 +94,7 @@ def _shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulat
     parameter.shift(draft, float(amount))
     made = draft.made()
     check_extension(made)
-    free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.bounds, arm.bounds))
+    free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.input_bounds, arm.input_bounds))
     if not np.array_equal(free, before):
         allowed = "one that neither holds a bundle nor frees one"
         raise InvalidInput("parameter", parameter.name, allowed)

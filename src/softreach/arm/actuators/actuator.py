@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.number import as_numbers, number
-from softreach.arm.part import Part
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
+from softreach.arm.stations import Span
 from softreach.support.errors import Fault
 
 __all__ = [
@@ -94,7 +94,7 @@ class Outline:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Actuator(Part, ABC):
+class Actuator(Span, ABC):
     """Something that loads the sections of an arm in proportion to its activations.
 
     A new kind is a frozen dataclass that inherits these fields and implements `resultants` and
@@ -128,14 +128,6 @@ class Actuator(Part, ABC):
     """n, number of independent activations [-]."""
     activation_bounds: Bounds
     """(lower, upper) activation of every bundle, or one pair per bundle [unit]."""
-    start_over_length: float = number(
-        "Z0/L", "", "where it begins to act", low=0.0, high=1.0, open_high=True, default=0.0
-    )
-    """Z0/L, where along the arm it begins to act [-]."""
-    end_over_length: float = number(
-        "Z1/L", "", "where it ends to act", low=0.0, high=1.0, open_low=True, default=1.0
-    )
-    """Z1/L, where it ends to act [-]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -175,8 +167,7 @@ class Actuator(Part, ABC):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations inside (0, L) where its load jumps or is not smooth [m]."""
-        ends = (self.start_over_length, self.end_over_length)
-        return tuple(profile.length * x for x in ends if 0.0 < x < 1.0)
+        return tuple(z for z in self.span(profile.length) if 0.0 < z < profile.length)
 
     def acts(self, profile: Profile, z: Array) -> NDArray[np.bool_]:
         """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
@@ -184,8 +175,8 @@ class Actuator(Part, ABC):
         Returns:
             Shape (station, bundle).
         """
-        start, end = (profile.length * x for x in (self.start_over_length, self.end_over_length))
-        inside = (z >= start) & ((z < end) | (self.end_over_length == 1.0))
+        start, end = self.span(profile.length)
+        inside = (z >= start) & ((z < end) | (end >= profile.length))
         return np.broadcast_to(inside[:, None], (len(z), self.bundles))
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
@@ -193,20 +184,9 @@ class Actuator(Part, ABC):
         del profile, section
         return []
 
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number when this actuator drives an arm with this profile and section."""
-        del profile, section
-        return getattr(self, field)
-
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
-        blamed = {fault.path for fault in faults}
-        start, end = self.start_over_length, self.end_over_length
-        if not blamed & {"start_over_length", "end_over_length"} and start >= end:
-            faults.append(
-                Fault("end_over_length", end, f"must be above start_over_length = {start:g}")
-            )
-        bundles = None if "bundles" in blamed else self.bundles
+        bundles = None if any(fault.path == "bundles" for fault in faults) else self.bundles
         return faults + bounds_faults(self.activation_bounds, bundles)
 
 

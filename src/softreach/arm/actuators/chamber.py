@@ -108,14 +108,13 @@ class Chamber(PolarActuator):
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
         """Value of a number; of a length and its ratio, the one not given follows at the base."""
-        del section
         base = np.array([0.0])
         if field in ("distance", "distance_ratio"):
             length = float(self._distance(profile, base)[0])
         elif field in ("radius", "radius_ratio"):
             length = float(self._radius(profile, base)[0])
         else:
-            return getattr(self, field)
+            return super().value_on(field, profile, section)
         return length / float(profile.radius(0.0)) if field.endswith("_ratio") else length
 
     def _distance(self, profile: Profile, z: Array) -> Array:

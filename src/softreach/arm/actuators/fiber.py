@@ -78,15 +78,15 @@ class FiberArchitecture(SectorActuator):
         """α at the outer radius of the ring [rad], which the revolution fixes."""
         if self.helical_angle is not None:
             return self.helical_angle
-        ratio, end = section.ring(self.ring).outer_ratio, self.end_over_length * profile.length
+        ratio, (start, end) = section.ring(self.ring).outer_ratio, self.span(profile.length)
         turn = profile.surface_coordinate(end, ratio)
-        if self.start_over_length > 0.0:
-            turn -= profile.surface_coordinate(self.start_over_length * profile.length, ratio)
+        if start > 0.0:
+            turn -= profile.surface_coordinate(start, ratio)
         return math.atan((self.revolution or 0.0) / float(turn))
 
     def revolution_on(self, profile: Profile, section: Section) -> float:
         """Ω = Θ(L) [rad], which the helical angle fixes: theory (14)."""
-        end = np.asarray([self.end_over_length * profile.length])
+        end = np.asarray(self.span(profile.length)[1:])
         return float(self.rotation(profile, section, end)[0])
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
@@ -95,7 +95,7 @@ class FiberArchitecture(SectorActuator):
             return self.revolution_on(profile, section)
         if field == "helical_angle":
             return self.helical_angle_on(profile, section)
-        return getattr(self, field)
+        return super().value_on(field, profile, section)
 
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0, I1, I3 for the local taper and helical angle: theory (3)."""
@@ -106,7 +106,7 @@ class FiberArchitecture(SectorActuator):
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
         """Θ(Z) = ∫ tan α dZ/(R cos φ) from where it begins [rad]: theory (50)."""
         angle = self.helical_angle_on(profile, section)
-        start = self.start_over_length * profile.length
+        start, _ = self.span(profile.length)
         return helical_rotation(profile, section.ring(self.ring).outer_ratio, angle, start, z)
 
     def _faults(self) -> list[Fault]:

@@ -74,13 +74,17 @@ class SectorActuator(PolarActuator):
         )
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        """A ring that the section does not have."""
+        """A ring that the section does not have, or whose modulus is unknown and needed."""
         del profile
         try:
-            section.ring(self.ring)
+            index = section.ring_index(self.ring)
         except InvalidDesign as error:
             return list(error.faults)
-        return []
+        known = section.rings[index].material.young_modulus is not None
+        if known or not section.has_measured_stiffness:
+            return []
+        allowed = f"must be given in Pa for {self.name!r}, which acts on measured stiffnesses"
+        return [Fault(f"rings[{index}].material.young_modulus", None, allowed)]
 
     def angles(self, profile: Profile, section: Section, z: Array) -> Array:
         """θ0 + 2πj/n + Θ(Z) [rad], shape (station, bundle): theory (11)."""

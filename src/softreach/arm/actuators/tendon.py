@@ -56,6 +56,8 @@ class Tendon(PolarActuator):
     activation: ClassVar[str] = "tension"
     is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "tendon"
+    least: ClassVar[float] = 0.0
+    """Least activation that a bound may be."""
     validity: ClassVar[str] = (
         "Linear material: real silicone (neo-Hookean) bends less than this, by about 2.3 τ/K0. "
         "Tendons that are not parallel to the axis pull along their direction before activation, "
@@ -66,10 +68,11 @@ class Tendon(PolarActuator):
         "Ω", "rad", "rotation from end to end", low=-MOST_TURN, high=MOST_TURN, default=0.0
     )
     """Ω, rotation from where it begins to its anchor, even along Z [rad]."""
-    distance: float | Samples | None = number(
-        "ρt", "m", "distance from the axis", low=0.0, along=Samples, default=None
+    distance: float | tuple[float, float] | Samples | None = number(
+        "ρt", "m", "distance from the axis", low=0.0, along=Samples, pair=True, default=None
     )
-    """ρt, from the axis [m]; a number, or samples along the arm."""
+    """ρt, from the axis [m]; a number, two (where it begins and at its anchor; straight between
+    them), or samples along the arm."""
     distance_ratio: float | None = number(
         "ρt/R2", "", "distance from the axis over R2", low=0.0, default=None
     )
@@ -135,15 +138,14 @@ class Tendon(PolarActuator):
 
         The revolution of a routing is its rotation from where the tendon begins to its anchor.
         """
-        del section
         if field == "revolution" and self.routing is not None:
-            return float(np.diff(self.routing([self.start_over_length, self.end_over_length]))[0])
+            return float(np.diff(self.routing(self.span_over_length(profile.length)))[0])
         base = float(profile.radius(0.0))
         if field == "distance" and self.distance is None:
             return (self.distance_ratio or 0.0) * base
         if field == "distance_ratio" and isinstance(self.distance, int | float):
             return self.distance / base
-        return getattr(self, field)
+        return super().value_on(field, profile, section)
 
     def _route(self, profile: Profile, z: Array) -> _Route:
         column = z[:, None]
@@ -157,6 +159,10 @@ class Tendon(PolarActuator):
         if isinstance(self.distance, AlongArm):
             x = z / profile.length
             return self.distance(x), self.distance.derivative(x) / profile.length
+        if isinstance(self.distance, tuple):
+            (first, last), (start, end) = self.distance, self.span(profile.length)
+            slope = (last - first) / (end - start)
+            return first + slope * (np.clip(z, start, end) - start), np.full(z.shape, slope)
         return np.full(z.shape, self.distance), np.zeros(z.shape)
 
     def _angle(self, profile: Profile, z: Array) -> tuple[Array, Array]:
@@ -164,13 +170,14 @@ class Tendon(PolarActuator):
         x = z / profile.length
         if self.routing is not None:
             return self.routing(x), self.routing.derivative(x) / profile.length
-        rate = self.revolution / (self.end_over_length - self.start_over_length)
-        return rate * (x - self.start_over_length), np.full(z.shape, rate / profile.length)
+        start, end = self.span_over_length(profile.length)
+        rate = self.revolution / (end - start)
+        return rate * (x - start), np.full(z.shape, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults() + length_or_ratio_faults(vars(self), "distance")
         tensions = as_numbers(self.activation_bounds)
-        if tensions.size and tensions.min() < 0:
+        if tensions.size and tensions.min() < self.least:
             allowed = "must be at least 0 N: a tendon pulls and cannot push"
             faults.append(Fault("activation_bounds", self.activation_bounds, allowed))
         turns_evenly = all(fault.path != "revolution" for fault in faults) and self.revolution != 0

@@ -20,16 +20,21 @@ from softreach.arm.actuators import (
     Actuator,
     Chamber,
     FiberArchitecture,
+    LengthTendon,
     ObliqueMuscle,
     RadialMuscle,
     Tendon,
 )
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
+from softreach.arm.measured import Measured
 from softreach.arm.number import Number, fields_of, unit_suffix
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
+from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
@@ -67,6 +72,7 @@ ACTUATORS: Mapping[str, type[Actuator]] = MappingProxyType(
         "oblique_muscle": ObliqueMuscle,
         "radial_muscle": RadialMuscle,
         "tendon": Tendon,
+        "length_tendon": LengthTendon,
         "chamber": Chamber,
     }
 )
@@ -79,7 +85,7 @@ KINDS: Mapping[type, Mapping[str, type]] = {Actuator: ACTUATORS, Profile: PROFIL
 """Kinds by what they are."""
 _GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
 
-_BODY = (Material, Ring, Section, Loads, PointLoad, Base)
+_BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape, RigidPiece, Marker)
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
 
@@ -95,6 +101,9 @@ class Key(NamedTuple):
     """Declaration of a number; None for names, bounds, materials, and lists of tables."""
     default: Any
     """Default of the field; MISSING where the key is required."""
+
+    of_names: bool = False
+    """It holds the name of a station, beside a key of the field that holds its place in m."""
 
     @property
     def required(self) -> bool:
@@ -113,6 +122,8 @@ def keys_of(kind: type) -> Mapping[str, Key]:
         if field.name == "activation_bounds":
             name = f"{kind.activation}_bounds{unit_suffix(kind.unit)}"
         default = field.default if field.default_factory is MISSING else None
+        if number is not None and number.named:  # text has no unit
+            keys.append(Key(field.name, field.name, None, default, of_names=True))
         if (kind, field.name) != (Section, "rings"):
             keys.append(Key(name, field.name, number, default))
     return MappingProxyType({key.name: key for key in keys})

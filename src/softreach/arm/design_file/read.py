@@ -25,11 +25,16 @@ from softreach.arm.design_file.keys import (
     own_kind,
 )
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
+from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.marker import Marker
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.rest_shape import STRAIGHT, RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.stations import PLACE, Located, Stations, placed
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
 from softreach.support.files.text import read_text
 from softreach.support.units import UNITS
@@ -45,9 +50,14 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "materials": (dict, False),
     "section": (dict, False),
     "rings": (list, True),
+    "stations": (dict, False),
     "actuators": (list, True),
+    "rigid_pieces": (list, False),
+    "drives": (list, False),
+    "markers": (list, False),
     "loads": (dict, False),
     "base": (dict, False),
+    "rest": (dict, False),
     "display": (dict, False),
 }
 """Keys at the top of a file, their types, and whether they are required."""
@@ -61,6 +71,11 @@ class Parts(NamedTuple):
     actuators: tuple[Actuator, ...]
     loads: Loads | None
     base: Base
+    rest: RestShape
+    stations: Mapping[str, float]
+    rigid_pieces: tuple[RigidPiece, ...]
+    drives: tuple[Drive, ...]
+    markers: tuple[Marker, ...]
     display_unit: str | None
 
 
@@ -150,20 +165,61 @@ class _DesignReader(TableReader):
             self.refused("actuators", f"{len(tables):,} tables", f"must be at most {MOST_BUNDLES}")
             return None
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
+        drives = [self.part(Drive, raw, f"drives[{k}]") for k, raw in self._tables("drives")]
         raw = self._table("loads")
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
         base = Base() if raw is None else self.part(Base, raw, "base")
+        raw = self._table("rest")
+        rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
+        stations = self._stations()
+        others = {
+            key: [(k, self.part(kind, raw, f"{key}[{k}]")) for k, raw in self._tables(key)]
+            for key, kind in (("rigid_pieces", RigidPiece), ("markers", Marker))
+        }
         unit = self._display_unit()
         names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
-        if profile is None or section is None:
+        if profile is None or section is None or stations is None:
             return None
         sound = [(k, actuator) for k, actuator in actuators if actuator is not None]
-        self._check_fit(profile, section, sound)
+        self._check_fit(profile, section, stations, sound)
+        made = {key: [(k, part) for k, part in each if part] for key, each in others.items()}
+        for path, part in ((f"{key}[{k}]", part) for key, each in made.items() for k, part in each):
+            faults = _place_faults(part, profile, stations)
+            self.faults += [fault._replace(path=f"{path}.{fault.path}") for fault in faults]
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
-        return Parts(profile, section, tuple(actuator for _, actuator in sound), loads, base, unit)
+        actuators = tuple(actuator for _, actuator in sound)
+        rigid, markers = (tuple(part for _, part in each) for each in made.values())
+        return Parts(
+            profile=profile,
+            section=section,
+            actuators=actuators,
+            loads=loads,
+            base=base,
+            rest=rest,
+            stations=stations,
+            rigid_pieces=rigid,
+            drives=tuple(drive for drive in drives if drive is not None),
+            markers=markers,
+            display_unit=unit,
+        )
+
+    def _stations(self) -> Stations | None:
+        """Places of stations by name; None where there are faults."""
+        before = len(self.faults)
+        places = {
+            name: self.number(PLACE, raw, f"stations.{key_text(name)}")
+            for name, raw in (self._table("stations") or {}).items()
+        }
+        try:
+            stations = Stations({name: z for name, z in places.items() if z is not WRONG})
+        except InvalidDesign as error:
+            for fault in error.faults:
+                self.refused(f"stations.{key_text(fault.path)}", fault.value, fault.allowed)
+            return None
+        return stations if len(self.faults) == before else None
 
     def _display_unit(self) -> str | None:
         """Unit that the table of the display names, if there is one."""
@@ -324,18 +380,38 @@ class _DesignReader(TableReader):
             return None
 
     def _check_fit(
-        self, profile: Profile, section: Section, actuators: list[tuple[int, Actuator]]
+        self,
+        profile: Profile,
+        section: Section,
+        stations: Stations,
+        actuators: list[tuple[int, Actuator]],
     ) -> None:
         """Faults that keep actuators from driving this body."""
         lacking: list[Fault] = []
         for k, actuator in actuators:
             named = dataclasses.replace(actuator, name=actuator.name or f"actuators[{k}]")
-            for fault in named.section_faults(profile, section):
+            for fault in _fit_faults(named, profile, section, stations):
                 if fault.path.startswith(("rings", "core")):
                     lacking.append(fault)
                 else:
                     self.faults.append(fault._replace(path=f"actuators[{k}].{fault.path}"))
         self.faults += self._of_section(lacking)
+
+
+def _fit_faults(
+    actuator: Actuator, profile: Profile, section: Section, stations: Stations
+) -> list[Fault]:
+    """Faults that keep one actuator from driving a body."""
+    faults = _place_faults(actuator, profile, stations)
+    return faults or placed(actuator, stations).section_faults(profile, section)
+
+
+def _place_faults(part: Located, profile: Profile, stations: Stations) -> list[Fault]:
+    """Faults of the places of a part along an arm."""
+    try:
+        return placed(part, stations).place_faults(profile.length)
+    except InvalidDesign as error:
+        return list(error.faults)
 
 
 def _of_own_kind(kind: type[Kind], table: Mapping[str, Any]) -> Kind:

@@ -10,9 +10,14 @@ from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
 from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
+from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
+from softreach.arm.measured import Measured
 from softreach.arm.number import Number
+from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
@@ -26,6 +31,7 @@ _PAIR: _Schema = {**_NUMBERS, "minItems": 2, "maxItems": 2}
 _PAIRS: _Schema = {"type": "array", "items": _PAIR, "minItems": 1}
 _TRIPLE: _Schema = {**_NUMBERS, "minItems": 3, "maxItems": 3}
 _ROTATION: _Schema = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItems": 3}
+_BY_NAME: _Schema = {"type": "object", "additionalProperties": {"type": "number"}}
 _TEXT: _Schema = {"type": "string"}
 
 
@@ -36,9 +42,14 @@ def json_schema() -> dict[str, Any]:
         "inline_material": _table(Material, "Material where it is used"),
         "ring": _table(Ring, "Layer between two radii"),
         "section": _table(Section, "Inside of the arm"),
+        "measured": _table(Measured, "What was measured, in place of what follows from materials"),
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
+        "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
+        "drive": _table(Drive, "Input that activates bundles"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
+        "rigid_piece": _table(RigidPiece, "Stretch that neither bends nor changes its length"),
+        "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
@@ -63,13 +74,34 @@ def json_schema() -> dict[str, Any]:
             "items": _of("ring"),
             "minItems": 1,
         },
+        "stations": {
+            "description": "Places along the arm by name, Z [m]",
+            "type": "object",
+            "additionalProperties": {"type": "number", "minimum": 0},
+        },
         "actuators": {
             "description": "In the order of the activations; [] for a passive rod",
             "type": "array",
             "items": _one_of({**ACTUATORS, "own_actuator": None}, "What drives the arm"),
         },
+        "rigid_pieces": {
+            "description": "Where the arm is not deformed",
+            "type": "array",
+            "items": _of("rigid_piece"),
+        },
+        "drives": {
+            "description": "Inputs that activate bundles, before the bundles that none names",
+            "type": "array",
+            "items": _of("drive"),
+        },
+        "markers": {
+            "description": "Points that go with sections of the arm",
+            "type": "array",
+            "items": _of("marker"),
+        },
         "loads": _of("loads"),
         "base": _of("base"),
+        "rest": _of("rest"),
         "display": {
             "description": "How the design is shown; it changes nothing about the arm",
             **_object(
@@ -133,6 +165,8 @@ def _table(
 
 def _value(part: type, key: Key) -> _Schema:
     """The schema of one key."""
+    if key.of_names:
+        return {**_TEXT, "description": f"Name of a station, in place of {key.field}_m"}
     if key.number is not None:
         return _number(key.number)
     if key.field == "activation_bounds":
@@ -143,11 +177,15 @@ def _value(part: type, key: Key) -> _Schema:
     others: dict[str, _Schema] = {
         "ring": {"type": ["integer", "string"], "description": "Index or name of its ring"},
         "material": {"anyOf": [_TEXT, _of("inline_material")]},
+        "measured": _of("measured"),
         "core": {"anyOf": [_TEXT, _of("inline_material")]},
         "points": {
             "description": "The way the straight arm points, or a rotation",
             "anyOf": [{"enum": [*POINTS]}, _ROTATION, {**_NUMBERS, "minItems": 3, "maxItems": 4}],
         },
+        "bounds": _PAIR,
+        "gains": _BY_NAME,
+        "offsets": _BY_NAME,
         "point_loads": {"type": "array", "items": _of("point_load")},
     }
     return others.get(key.field, _TEXT)
@@ -174,7 +212,10 @@ def _number(number: Number) -> _Schema:
         "interpolation": {"enum": kinds},
     }
     along = _object(properties, ["stations_over_length", "values"])
-    return {**about, **along} if number.shape == "along" else {**about, "anyOf": [single, along]}
+    if number.shape == "along":
+        return {**about, **along}
+    pair = [{"type": "array", "items": single, "minItems": 2, "maxItems": 2}] if number.pair else []
+    return {**about, "anyOf": [single, *pair, along]}
 
 
 def _limits(allowed: Range) -> dict[str, float]:

@@ -13,6 +13,7 @@ from softreach.arm.along import Pieces, Samples
 from softreach.arm.design_file.keys import Key, field_keys, in_file_units, keys_of, radians
 from softreach.arm.loads import PointLoad
 from softreach.arm.material import Material
+from softreach.arm.measured import Measured
 from softreach.arm.number import Number, series_faults
 from softreach.arm.profile import Profile
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
@@ -80,9 +81,12 @@ class TableReader:
         keys = {name: key for name, key in keys_of(kind).items() if name not in without}
         values: dict[str, Any] = {}
         for name, key in keys.items():
-            if name in raw:
+            if name in raw and key.field in values:
+                allowed = f"give exactly one of {key.field} (a name) and {name}"
+                values[key.field] = self.refused(f"{path}.{name}", raw[name], allowed)
+            elif name in raw:
                 values[key.field] = self.value(key, raw[name], f"{path}.{name}")
-            elif key.required:
+            elif key.required and key.field not in values:
                 values[key.field] = self.refused(f"{path}.{name}", None, "required key is missing")
         fields = {key.field: name for name, key in keys.items()}
         for name in raw:
@@ -101,8 +105,11 @@ class TableReader:
             return self._judged(raw, path, ring_name_faults(raw))
         if key.field in ("material", "core"):
             return self.material(raw, path)
-        if key.field == "points":  # words or a rotation, which the base judges
-            return raw
+        if key.field in ("points", "gains", "offsets", "bounds"):  # which base and drive judge
+            return raw if key.field == "points" else _floats(raw)
+        if key.field == "measured":
+            made = self.part(Measured, raw, path)
+            return WRONG if made is None else made
         if key.field == "point_loads":
             return self._point_loads(raw, path)
         return raw if isinstance(raw, str) else self.refused(path, raw, "must be text")
@@ -111,6 +118,9 @@ class TableReader:
         """A number in SI units, a function along the arm, or a tuple of numbers."""
         if number.along is not None and isinstance(raw, dict):
             return self.along(number, raw, path)
+        if number.pair and isinstance(raw, list):
+            values = self._all(number, raw, path)
+            return values if len(raw) == 2 else self.refused(path, raw, "must be a number, or two")
         if number.shape == "along":
             return self.refused(path, raw, "must be a table")
         if number.shape == "single":
@@ -221,10 +231,19 @@ def _in_keys(fault: Fault, keys: Mapping[str, str], raw: Mapping[str, Any], path
 def _example(key: Key) -> Any:
     """A sound value of a required key."""
     if key.number is None:
-        return (0.0, 1.0)  # bounds
+        return {"name": "drive", "gains": {"bundle": 1.0}}.get(key.field, (0.0, 1.0))  # or bounds
     if key.number.shape in ("series", "stations"):
         return (0.0, 1.0) if key.number.shape == "stations" else (1.0, 1.0)
     return next(value for value in (1.0, 0.5, 0.0) if key.number.allowed.admits(value))
+
+
+def _floats(raw: Any) -> Any:
+    """Numbers in lists and tables as Python's own."""
+    if isinstance(raw, dict):
+        return {name: _floats(value) for name, value in raw.items()}
+    if isinstance(raw, list):
+        return tuple(map(_floats, raw))
+    return float(raw) if _is_number(raw) else raw
 
 
 def _is_number(raw: Any) -> bool:

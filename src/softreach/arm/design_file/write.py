@@ -18,9 +18,14 @@ from softreach.arm.design_file.keys import (
     keys_of,
     value_text,
 )
+from softreach.arm.drives import BundleNumbers, Drive
 from softreach.arm.loads import Loads
+from softreach.arm.marker import Marker
 from softreach.arm.material import Material
+from softreach.arm.number import Station
 from softreach.arm.profile import Profile
+from softreach.arm.rest_shape import RestShape
+from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
@@ -29,7 +34,7 @@ __all__ = ["display_text", "render"]
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 
-_FIRST = ("name", "ring", "length", "revolution")
+_FIRST = ("name", "unit", "ring", "length", "revolution")
 _LAST = (
     "taper",
     "offset",
@@ -38,6 +43,8 @@ _LAST = (
     "activation_bounds",
     "start_over_length",
     "end_over_length",
+    "start",
+    "end",
 )
 """Order of fields: between these stands what distinguishes a kind."""
 
@@ -48,6 +55,11 @@ def render(
     actuators: Sequence[Actuator],
     loads: Loads | None,
     base: Base,
+    rest: RestShape,
+    stations: Mapping[str, float],
+    rigid_pieces: Sequence[RigidPiece],
+    drives: Sequence[Drive],
+    markers: Sequence[Marker],
 ) -> str:
     """TOML text of a design, of version 2.
 
@@ -61,13 +73,21 @@ def render(
         *(_material_block(name, material) for name, material in names.items()),
         *_section_blocks(section, names),
     ]
+    if stations:
+        places = (f"{key_text(name)} = {value_text(z)}" for name, z in stations.items())
+        blocks.append(["[stations]", *places])
     for actuator in actuators:
         blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
+    blocks += [["[[rigid_pieces]]", *_lines(piece)] for piece in rigid_pieces]
+    blocks += [["[[drives]]", *_lines(drive)] for drive in drives]
+    blocks += [["[[markers]]", *_lines(marker)] for marker in markers]
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
     if not base.is_identity:
         blocks.append(["[base]", *_lines(base)])
+    if not rest.is_straight:
+        blocks.append(["[rest]", *_lines(rest)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
@@ -85,6 +105,7 @@ def _part_lines(part: Actuator | Profile, kinds: Mapping[str, type]) -> Iterator
     yield f"kind = {value_text(type(part).__name__)}"
     for field in fields(part):  # pyright: ignore[reportArgumentType]
         if field.init and (value := getattr(part, field.name)) is not None:
+            value = value.name if isinstance(value, Station) else value
             yield f"{field.name} = {_plain_text(part, field.name, value)}"
 
 
@@ -118,11 +139,13 @@ def _material_block(name: str, material: Material) -> list[str]:
 
 
 def _section_blocks(section: Section, names: Mapping[str, Material]) -> Iterator[list[str]]:
-    inside = _lines(section, without=("core",))
+    inside = _lines(section, without=("core", "measured"))
     if section.core is not None:
         inside.insert(0, f"core = {_material_text(section.core, names)}")
     if inside:
         yield ["[section]", *inside]
+    if section.measured is not None:
+        yield ["[section.measured]", *_lines(section.measured)]
     for ring in section.rings:
         text = _material_text(ring.material, names)
         lines = _lines(ring, without=("material",))
@@ -144,7 +167,7 @@ def _pairs(part: object, without: tuple[str, ...] = ()) -> Iterator[tuple[str, s
     """Keys and texts of what is not the default."""
     for key in sorted(keys_of(type(part)).values(), key=lambda key: _rank(key.field)):
         value = getattr(part, key.field)
-        if key.field in without or value is None:
+        if key.field in without or value is None or key.of_names != isinstance(value, Station):
             continue
         if key.field in _ALWAYS or repr(value) != repr(key.default):
             yield key.name, _text(key.name, value)
@@ -157,6 +180,10 @@ def _rank(field: str) -> int:
 
 
 def _text(key: str, value: Any) -> str:
+    if isinstance(value, BundleNumbers):
+        return inline_table((key_text(name), value_text(x)) for name, x in value.items())
+    if isinstance(value, Station):
+        return value_text(value.name)
     number = degrees_text if key.endswith("_deg") else value_text
     return _along_text(value, number) if isinstance(value, AlongArm) else number(value)
 

@@ -115,6 +115,8 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
         hint = "the arm has no loads: give it some first"
     if name.startswith("base.") and not any(key.startswith("base.") for key in known):
         hint = "the arm stands upright at the origin: give it another base first"
+    if name.startswith("measured.") and not any(key.startswith("measured.") for key in known):
+        hint = "nothing was measured on the arm: give its section measured=Measured() first"
     allowed = f"one of {', '.join(_shortened(own))}"
     if owners and not meant:
         parts = ", ".join(owners[:_FEW]) + (", ..." if len(owners) > _FEW else "")

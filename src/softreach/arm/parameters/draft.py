@@ -41,10 +41,12 @@ class Path(NamedTuple):
     def owner(self) -> str:
         """Start of names of numbers of this part; "" for the arm itself."""
         kind, *path = self.part
-        if kind == "actuators":
+        if kind in ("actuators", "drives"):
             return str(path[0])
-        if kind == "rings":
-            return "".join((f"rings[{path[0]}]", *(f".{step}" for step in path[1:])))
+        if kind == "markers":
+            return f"markers.{path[0]}"
+        if kind in ("rings", "rigid_pieces"):
+            return "".join((f"{kind}[{path[0]}]", *(f".{step}" for step in path[1:])))
         of_arm = kind == "section" or (kind == "profile" and not self.place)
         return "" if of_arm else str(kind)
 
@@ -72,10 +74,19 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["loads",] = arm.loads
     if not arm.base.is_identity:
         keyed["base",] = arm.base
+    if not arm.rest.is_straight:
+        keyed["rest",] = arm.rest
+    if arm.stations:
+        keyed["stations",] = arm.stations
+    keyed |= {("rigid_pieces", k): piece for k, piece in enumerate(arm.rigid_pieces)}
+    keyed |= {("markers", marker.name): marker for marker in arm.markers}
     for k, ring in enumerate(arm.section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
         keyed["core",] = arm.section.core
+    if arm.section.measured is not None:
+        keyed["measured",] = arm.section.measured
+    keyed |= {("drives", drive.name): drive for drive in arm.drives}
     return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
 
 
@@ -204,10 +215,16 @@ class Draft:
         changes: dict[str, Any] = {"profile": self._made(("profile",)), "section": self._section()}
         if self.arm.loads is not None:
             changes["loads"] = self._made(("loads",))
-        if ("base",) in self._parts:
-            changes["base"] = self._made(("base",))
+        for part in ("base", "rest", "stations"):
+            if (part,) in self._parts:
+                changes[part] = self._made((part,))
+        pieces = (self._made(("rigid_pieces", k)) for k in range(len(self.arm.rigid_pieces)))
+        changes["rigid_pieces"] = tuple(pieces)
+        markers = (self._made(("markers", marker.name)) for marker in self.arm.markers)
+        changes["markers"] = tuple(markers)
         keys = [("actuators", actuator.name) for actuator in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
+        changes["drives"] = tuple(self._made(("drives", drive.name)) for drive in self.arm.drives)
         if not self._faults:
             made = self._tried(None, lambda: self.arm.replace(**changes))
             if made is not None:
@@ -227,8 +244,9 @@ class Draft:
             material = self._made(("rings", k, "material"))
             rings.append(self._made(("rings", k), **({"material": material} if material else {})))
         core = self._made(("core",)) if ("core",) in self._parts else None
+        measured = self._made(("measured",)) if ("measured",) in self._parts else None
         if len(self._faults) == before:
-            return self._made(("section",), rings=tuple(rings), core=core)
+            return self._made(("section",), rings=tuple(rings), core=core, measured=measured)
         for (name, _), value in self._parts["section",].values.items():
             # by themselves, as the parts around them are faulty
             self._faults += fields_of(Section)[name].faults(value)

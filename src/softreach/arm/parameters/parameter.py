@@ -13,12 +13,14 @@ import numpy as np
 
 from softreach.arm.actuators import Actuator, FiberArchitecture
 from softreach.arm.along import AlongArm
+from softreach.arm.drives import Drive
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.number import Number, fields_of
 from softreach.arm.parameters.draft import Draft, PartKey, Path, part_of, parts
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
+from softreach.arm.stations import PLACE, Located, Stations
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, Range
 
@@ -110,9 +112,9 @@ class OwnParameter(Parameter):
             *inner, k = place
             series = getattr(part, field)
             return (float(getattr(series, str(inner[0]))[k] if inner else series[k]),)
-        is_actuator = isinstance(part, Actuator)
-        value = part.value_on(field, arm.profile, arm.section) if is_actuator else None
-        return (_float(value if is_actuator else getattr(part, field)),)
+        if isinstance(part, Located):
+            return (_float(part.value_on(field, arm.profile, arm.section)),)
+        return (_float(getattr(part, field)),)
 
     def change(self, draft: Draft, value: float) -> None:
         """Change it; an element alone must be admitted, as its series names no places."""
@@ -130,6 +132,24 @@ class OwnParameter(Parameter):
             return
         for k, value in enumerate(values):
             draft.set(self.name, path._replace(place=(*path.place, k)), value + amount)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Place(OwnParameter):
+    """The place of a named station: what begins, ends or stands there moves with it."""
+
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Z [m]."""
+        return (arm.stations[self.path.field],)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _OfDrive(OwnParameter):
+    """A bound, a gain or an offset of a drive."""
+
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Its value [unit]."""
+        return (part_of(arm, self.path.part).value_of(self.path.field),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +238,8 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
     """
     arm = a_manipulator("arm", arm)
     own = [parameter for key, part in parts(arm).items() for parameter in _of_part(key, part)]
-    every = [*_of_arm(arm, own), *(parameter for parameter in own if parameter.owner)]
+    of_body = [parameter for parameter in own if parameter.path.part[0] != "drives"]
+    every = [*_of_arm(arm, of_body), *(parameter for parameter in own if parameter.owner)]
     return {parameter.name: parameter for parameter in every}
 
 
@@ -254,6 +275,7 @@ def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
 
 def _of_part(key: PartKey, part: Any) -> Iterator[OwnParameter]:
     """Its numbers, first those that stand alone, and the bounds of an actuator."""
+    yield from _of_names(key, part)
     numbers = fields_of(type(part)).values()
     for number in numbers:
         if number.shape == "single":
@@ -263,6 +285,19 @@ def _of_part(key: PartKey, part: Any) -> Iterator[OwnParameter]:
             yield _own(Path(key, number.field, place), element)
     if isinstance(part, Actuator):
         yield from _bounds(key, part)
+
+
+def _of_names(key: PartKey, part: Any) -> Iterator[OwnParameter]:
+    """Places of stations, and numbers of a drive for each of its bundles."""
+    if isinstance(part, Stations):
+        for name in part:
+            yield _Place(
+                name=f"stations.{name}", owner="stations", number=PLACE, path=Path(key, name)
+            )
+    if isinstance(part, Drive):
+        for name, number in part.numbers.items():
+            path = Path(key, name)
+            yield _OfDrive(name=f"{part.name}.{name}", owner=part.name, number=number, path=path)
 
 
 def _elements(number: Number, value: Any) -> Iterator[tuple[tuple[str | int, ...], Number]]:
@@ -284,6 +319,7 @@ def _element(number: Number, k: int) -> Number:
         meaning=f"{number.meaning}, number {k}",
         shape="single",
         along=None,
+        pair=False,
     )
 
 

@@ -266,22 +266,30 @@ def _check_upright(arm: Manipulator) -> None:
         raise InvalidInput("base", str(arm.base), allowed, hint)
 
 
+def _check_section(section: Section, there: str) -> None:
+    if section.measured is not None:
+        raise InvalidInput("section.measured", section.measured, f"None {there}")
+    if section.bore_ratio > 0:
+        raise InvalidInput("bore_ratio", section.bore_ratio, f"0 {there}")
+
+
 def _check_expressible(arm: Manipulator) -> None:
     """Refuse what no filament there has, one reason at a time."""
     _check_upright(arm)
     there = "in ActiveFilaments.jl"
     if not isinstance(arm.profile, LinearTaper):
         raise InvalidInput("profile", type(arm.profile).__name__, f"a LinearTaper {there}")
+    if arm.rigid_pieces:
+        raise InvalidInput("rigid_pieces", len(arm.rigid_pieces), f"0 {there}")
     taper = arm.profile.taper
     if 0 < abs(taper) < _SMALLEST_TAPER:
         raise InvalidInput("taper", f"{taper:g} rad", f"0 or at least {_SMALLEST_TAPER:g} {there}")
-    if arm.section.bore_ratio > 0:
-        raise InvalidInput("bore_ratio", arm.section.bore_ratio, f"0 {there}")
+    _check_section(arm.section, there)
     for actuator in arm.actuators:
         if not isinstance(actuator, FiberArchitecture):
             kind = type(actuator).__name__
             raise InvalidInput(actuator.name, kind, f"a FiberArchitecture {there}")
-        stretch = (actuator.start_over_length, actuator.end_over_length)
+        stretch = actuator.span_over_length(arm.length)
         if stretch != (0.0, 1.0):
             raise InvalidInput(f"stretch of {actuator.name}", stretch, f"all of the arm {there}")
         angle = actuator.helical_angle

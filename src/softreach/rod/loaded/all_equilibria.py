@@ -9,7 +9,7 @@ odd.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from softreach.geometry.sphere_maps import (
     polished_roots,
     sphere_roots,
 )
+from softreach.rod.driven import inner_rod
 from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration, shape_dataset, stations_along
 from softreach.rod.loaded.rod import LoadedRod
@@ -88,13 +89,14 @@ class AllEquilibria:
             stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
-        loaded = tip_map(rod, frame="base")
+        inner, of_inner = inner_rod(rod, gamma)
+        loaded = tip_map(inner, frame="base")
         if self.solver is None or not isinstance(loaded, LoadedRod):
             return configuration(rod, gamma, stations)
         z = stations_along(rod, stations)
-        shapes = self.solver.shapes_facing(gamma, self.directions, z)[0]
-        frames = rod.placed(shapes.frames) if isinstance(rod, PlacedRod) else shapes.frames
-        strains = loaded.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
+        shapes = self.solver.shapes_facing(of_inner, self.directions, z)[0]
+        frames = inner.placed(shapes.frames) if isinstance(inner, PlacedRod) else shapes.frames
+        strains = loaded.strains_of_shapes(z)(of_inner, shapes.moment, shapes.force)
         return shape_dataset(rod, gamma, z, frames, strains)
 
     def to_dataset(self) -> xr.Dataset:
@@ -189,15 +191,17 @@ def equilibria(
         rod, gamma = rod.base, rod.activations(gamma)
     if not rod.supports_unstable:
         return _without_loads(rod, gamma)
-    loaded = tip_map(rod, frame="base")  # where all directions of the search are
+    inner, at = inner_rod(rod, gamma)
+    loaded = tip_map(inner, frame="base")  # where all directions of the search are
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     _check_loads(loaded.tables)
-    solver = _resolving(Solver(loaded.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
-    branch = solver.find(gamma)
+    solver = _resolving(Solver(loaded.tables, FreeRod(inner.arm, rod.tol).steps, rod.tol), at)
+    branch = solver.find(at)
     known = branch.frame[has_tip(branch.status)]
-    solver, roots = _accurate(solver, gamma, _search(solver, gamma, known))
-    return _judged(rod, solver, gamma, roots, known)
+    solver, roots = _accurate(solver, at, _search(solver, at, known))
+    result = _judged(rod, solver, at, roots, known)
+    return replace(result, activation=gamma[0])
 
 
 def _one(rod: TipMap, activations: ArrayLike) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +41,7 @@ from softreach.rod.tip_map import (
     loads_too_heavy,
     no_equilibrium_message,
     position_slopes,
+    sampled_range,
 )
 from softreach.support import parallel
 
@@ -122,6 +124,11 @@ class LoadedRod(ArmRod):
         """Solver with the steps that `tol` needs all along the arm."""
         return self._solver_of(checked(self._shape_steps, self.tol))
 
+    def in_steps(self, steps: int) -> Self:
+        """The rod in so many steps."""
+        vars(self).update(_tip_steps=steps, _shape_steps=steps)
+        return self
+
     def _prepare(self) -> None:
         self.solver  # noqa: B018
 
@@ -185,9 +192,9 @@ class LoadedRod(ArmRod):
     ) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
         gamma, z = self.box.check(activations), self.check_stations(stations)
-        return self._shapes(gamma, z, status).frames
+        return self.shapes(gamma, z, status).frames
 
-    def _shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
+    def shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
         """Shapes at ascending stations; each equilibrium is found once."""
         gamma, lost = self.with_arms(gamma)
         shapes = self._shape_solver.shapes(gamma, z, status=status)
@@ -208,7 +215,7 @@ class LoadedRod(ArmRod):
 
         def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
             gamma = self.box.check(activations)
-            shape = self._shapes(gamma, ascending, status)
+            shape = self.shapes(gamma, ascending, status)
             return of_shapes(gamma, shape.moment[:, back], shape.force[:, back])
 
         return strains
@@ -237,13 +244,4 @@ class LoadedRod(ArmRod):
         strains = self.strains_at(stations)(gamma)
         if np.isnan(strains.extension).all():
             raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
-        bend = np.hypot(strains.curvature[..., 0], strains.curvature[..., 1])
-        return StrainRange(
-            np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),
-            _range(strains.curvature[..., 2]),
-            _range(strains.extension),
-        )
-
-
-def _range(values: Array) -> Array:
-    return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
+        return sampled_range(strains)

@@ -50,7 +50,7 @@ class ArmBody:
         """[kg/m], before activation."""
         if self.arm.loads is None or not any(self.arm.loads.gravity):
             return np.zeros(np.shape(z))
-        return self.arm.section.mass_per_length(self.arm.profile.radius(z))
+        return self.arm.section.mass_per_length_at(self.arm.profile, z)
 
 
 OneDirection = tuple[Array, Array, Array]

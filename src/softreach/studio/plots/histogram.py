@@ -70,8 +70,8 @@ def histogram_picture(
     """
     kept = in_slice(cloud_points(reach, level), cut)
     activation = reach.cloud.activation.values[shown_samples(reach, level)][kept]
-    figure = blank_figure(0.5 + 0.95 * reach.arm.bundles)
-    axes = figure.subplots(reach.arm.bundles, 1, squeeze=False)[:, 0]
+    figure = blank_figure(0.5 + 0.95 * reach.arm.inputs)
+    axes = figure.subplots(reach.arm.inputs, 1, squeeze=False)[:, 0]
     bounds = np.array(rod_of(reach.arm).box.bounds)
     share = shares(activation, bounds)
     for k, ax in enumerate(axes):
@@ -103,10 +103,10 @@ def _ends(low: float, high: float) -> tuple[float, float]:
 
 
 def _label(arm: Manipulator, bundle: int) -> str:
-    unit = arm.bundle_units[bundle]
-    symbol = activation_symbols(arm.bundle_units)[bundle]
+    unit = arm.input_units[bundle]
+    symbol = activation_symbols(arm.input_units)[bundle]
     # A name is shown as it is: matplotlib would set what is between dollars.
-    name = arm.bundle_names[bundle].replace("$", r"\$")
+    name = arm.input_names[bundle].replace("$", r"\$")
     return f"{symbol} {name}" + (f" [{unit}]" if unit != "1" else "")
 
 

@@ -131,9 +131,9 @@ def color_names(arm: Manipulator) -> dict[str, str]:
     """Colors that points can have: name -> what the menu says."""
     box = rod_of(arm).box
     names = {"effort": "effort: mean |γ| / max |γ|", "rgb": "all activations (RGB)"}
-    if arm.bundles > 3:  # mixtures of more lights cannot be told apart
+    if arm.inputs > 3:  # mixtures of more lights cannot be told apart
         names["strongest"] = "strongest bundle"
-    labels = zip(activation_symbols(arm.bundle_units), box.names, strict=True)
+    labels = zip(activation_symbols(arm.input_units), box.names, strict=True)
     names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
     names["manipulability"] = "manipulability"
     names["activation distance"] = "activation distance D̄"
@@ -219,7 +219,7 @@ def _effort(reach: Reach, rows: NDArray[np.int64]) -> Array:
 def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
     """√det(J Jᵀ) with J = ∂r/∂γ [L]; of fewer than three bundles an area [L²] or a length [L]."""
     volume = dexterity(reach.cloud.isel(sample=rows)).manipulability.values
-    return volume / reach.arm.length ** min(reach.arm.bundles, 3)
+    return volume / reach.arm.length ** min(reach.arm.inputs, 3)
 
 
 def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:

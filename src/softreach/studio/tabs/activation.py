@@ -85,8 +85,8 @@ _SliderEnds = tuple[str, float, float]
 
 
 def _slider_ends(arm: Manipulator) -> list[_SliderEnds]:
-    symbols = activation_symbols(arm.bundle_units)
-    units = (f" [{unit}]" if unit != "1" else "" for unit in arm.bundle_units)
-    labels = zip(symbols, arm.bundle_names, units, strict=True)
+    symbols = activation_symbols(arm.input_units)
+    units = (f" [{unit}]" if unit != "1" else "" for unit in arm.input_units)
+    labels = zip(symbols, arm.input_names, units, strict=True)
     bounds = rod_of(arm).box.bounds
     return [("{} {}{}".format(*label), *ends) for label, ends in zip(labels, bounds, strict=True)]

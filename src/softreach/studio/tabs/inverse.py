@@ -158,7 +158,7 @@ def _answer_text(answer: Solution, arm: Manipulator) -> str:
         near = _place(answer.nearest / arm.length)
         return f"{place} is {certain}. Nearest: {near}, {answer.gap / arm.length:.4g} L away."
     count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
-    names = ", ".join(arm.bundle_names)
+    names = ", ".join(arm.input_names)
     return (
         f"{count} {place} to {answer.residuals.max() / arm.length:.1e} L. "
         f"Press one ({names}) to move the arm there; green is where it is."

@@ -1,0 +1,203 @@
+"""Drives: inputs of a user, such as motors and valves, that activate one bundle or several."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.number import Number, number
+from softreach.arm.part import Part
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault, Range
+
+__all__ = ["BundleNumbers", "Drive", "drive_faults"]
+
+Array = NDArray[np.float64]
+
+_FINITE = Range()
+
+
+class BundleNumbers(Mapping[str, float]):
+    """Numbers of bundles by the bundles' names; frozen."""
+
+    def __init__(self, numbers: Mapping[str, float] = {}) -> None:
+        """Those of a mapping, in its order."""
+        self._numbers = {str(name): float(value) for name, value in numbers.items()}
+
+    def __getitem__(self, name: str) -> float:
+        return self._numbers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._numbers.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._numbers)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive(Part):
+    """An input u that activates bundles: γ = offset + gain dz(u) of each that it names.
+
+    dz(u) = sign(u) max(0, |u| - dead_zone). What several drives give to one bundle is added, and a
+    tendon driven by its tension never gets less than 0 N, as it cannot push. So gains +g and -g
+    make an antagonistic pair of two tendons from one signed input, with the offset as its
+    pretension.
+
+    Raises:
+        InvalidDesign: A field is not what it must be.
+    """
+
+    name: str
+    """Name of the input; unlike those of actuators and bundles."""
+    unit: str = "1"
+    """Unit of u: "m", "N", "V", "turns", or any other."""
+    bounds: tuple[float, float]
+    """(lower, upper) of u [unit]."""
+    gains: Mapping[str, float]
+    """Activation per u of each bundle that it drives, by the bundle's name."""
+    offsets: Mapping[str, float] = BundleNumbers()
+    """Activation of these bundles at u = 0; 0 where none is given."""
+    dead_zone: float = number("u0", "", "largest |u| without effect", low=0.0, default=0.0)
+    """Largest |u| that has no effect [unit]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        low, high = (float(plain(bound)) for bound in self.bounds)
+        object.__setattr__(self, "bounds", (low, high))
+        for field in ("gains", "offsets"):
+            object.__setattr__(self, field, BundleNumbers(getattr(self, field)))
+
+    @classmethod
+    def antagonists(
+        cls,
+        name: str,
+        pulls: str,
+        releases: str,
+        *,
+        bounds: tuple[float, float],
+        gain: float = 1.0,
+        offset: float = 0.0,
+        unit: str = "1",
+        dead_zone: float = 0.0,
+    ) -> Self:
+        """One input for two bundles: a positive one pulls the first and releases the second.
+
+        Args:
+            name: Of the input.
+            pulls: Name of the bundle with the gain.
+            releases: Name of the bundle with the opposite gain.
+            bounds: (lower, upper) of u [unit].
+            gain: Activation per u.
+            offset: Activation of both at u = 0, such as a pretension.
+            unit: Of u.
+            dead_zone: Largest |u| without effect [unit].
+        """
+        offsets = {pulls: offset, releases: offset} if offset else {}
+        gains = {pulls: gain, releases: -gain}
+        return cls(
+            name=name, unit=unit, bounds=bounds, gains=gains, offsets=offsets, dead_zone=dead_zone
+        )
+
+    def effective(self, u: Array) -> tuple[Array, Array]:
+        """dz(u), and its derivative."""
+        beyond = np.abs(u) - self.dead_zone
+        acts = beyond > 0.0 if self.dead_zone else np.ones(u.shape, bool)
+        return np.where(acts, np.sign(u) * beyond, 0.0), acts.astype(float)
+
+    @property
+    def numbers(self) -> dict[str, Number]:
+        """What can be varied, by its name: see `value_of`."""
+        declared = {
+            "lower": ("min u", "lowest input"),
+            "upper": ("max u", "highest input"),
+            "gain": ("g", "size of the gains, each of which keeps its sign"),
+            **{f"gains[{name}]": ("g", f"gain of {name}") for name in self.gains},
+            **{f"offsets[{name}]": ("o", f"offset of {name}") for name in self.offsets},
+        }
+        return {
+            name: Number(field=name, symbol=symbol, meaning=meaning, allowed=_FINITE)
+            for name, (symbol, meaning) in declared.items()
+        }
+
+    def value_of(self, field: str) -> float:
+        """A number by its name; NaN for a gain that its bundles do not share."""
+        if field == "gain":
+            sizes = {abs(gain) for gain in self.gains.values()}
+            return sizes.pop() if len(sizes) == 1 else math.nan
+        if field in ("lower", "upper"):
+            return self.bounds[field == "upper"]
+        owner, _, bundle = field.partition("[")
+        numbers = getattr(self, owner)
+        return float(numbers[bundle.removesuffix("]")] if bundle else numbers)
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, or with numbers by the names in `numbers`."""
+        named = {field: changes.pop(field) for field in self.numbers if field in changes}
+        for field, value in named.items():
+            if field == "gain":
+                gains = changes.get("gains", self.gains).items()
+                changes["gains"] = {name: math.copysign(value, gain) for name, gain in gains}
+            elif field in ("lower", "upper"):
+                low, high = changes.get("bounds", self.bounds)
+                changes["bounds"] = (low, value) if field == "upper" else (value, high)
+            else:
+                owner, _, bundle = field.partition("[")
+                before = changes.get(owner, getattr(self, owner))
+                changes[owner] = {**before, bundle.removesuffix("]"): value}
+        return super().replace(**changes)
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        if isinstance(self.name, str) and not self.name:
+            faults.append(Fault("name", self.name, "must not be empty: inputs are called by it"))
+        if not isinstance(self.unit, str) or not self.unit:
+            faults.append(Fault("unit", self.unit, 'must be text, "1" for none'))
+        return [*faults, *self._number_faults()]
+
+    def _number_faults(self) -> Iterator[Fault]:
+        is_pair = isinstance(self.bounds, Sequence | np.ndarray) and len(self.bounds) == 2
+        bounds = [plain(bound) for bound in self.bounds] if is_pair else []
+        if not is_pair or not all(map(_FINITE.admits, bounds)) or bounds[0] > bounds[1]:
+            allowed = "must be a pair (lower, upper) of finite numbers, lower <= upper"
+            yield Fault("bounds", self.bounds, allowed)
+        for field in ("gains", "offsets"):
+            numbers = getattr(self, field)
+            if not isinstance(numbers, Mapping) or (field == "gains" and not numbers):
+                yield Fault(field, numbers, "must be a mapping from names of bundles to numbers")
+                continue
+            for name, value in numbers.items():
+                if not _FINITE.admits(plain(value)):
+                    yield Fault(f"{field}[{name}]", value, _FINITE)
+                elif name not in self.gains:
+                    yield Fault(f"offsets[{name}]", value, "must be that of a bundle in gains")
+
+
+def drive_faults(drives: Any, actuators: Sequence[str], bundles: Sequence[str]) -> Iterator[Fault]:
+    """Faults of the drives of an arm with these actuators and bundles."""
+    if not isinstance(drives, Sequence) or not all(isinstance(each, Drive) for each in drives):
+        yield Fault("drives", drives, "must be a sequence of Drive")
+        return
+    taken = [*actuators, *bundles]
+    for k, drive in enumerate(drives):
+        name = drive.name
+        if name in taken:
+            yield Fault(f"drives[{k}].name", name, "must be unlike names of other parts")
+        elif not name.isprintable() or name != name.strip() or set(name) & set(".[]"):
+            allowed = "must be one line without dots and brackets, and without spaces around it"
+            yield Fault(f"drives[{k}].name", name, allowed)
+        taken.append(name)
+        for bundle in drive.gains:
+            if bundle not in bundles:
+                allowed = f"must be a bundle of the arm: {', '.join(bundles) or 'it has none'}"
+                yield Fault(f"drives[{k}].gains", bundle, allowed)

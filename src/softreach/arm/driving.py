@@ -1,0 +1,250 @@
+"""From the activations of an arm to those of its inner arm, which the sections see.
+
+Displacements of tendons become tensions, and the rest shape is a bundle that is held at 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.actuators import LengthTendon, Tendon
+from softreach.arm.rest_shape import STRAIGHT, RestStrains
+from softreach.arm.tables import ends_over, strain_stations, tables
+from softreach.arm.tensions import LengthLaw, Tensions
+from softreach.support.errors import Fault, InvalidDesign
+
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
+
+__all__ = ["Driving", "InnerActivations", "body_of", "inner_arm", "pilot"]
+
+Array = NDArray[np.float64]
+
+_MOST_CORNERS = 1024
+_INSIDE = 256
+_SAFETY = 1.25  # of the largest tensions that samples reach
+_LEAST_EXTENSION = 0.05  # that a box of tensions has
+
+
+@dataclass(frozen=True, eq=False)
+class InnerActivations:
+    """Activations of the inner arm and their derivatives."""
+
+    values: Array
+    """γ, shape (n, inner bundle)."""
+    slopes: Array
+    """∂γ/∂x, shape (n, inner bundle, bundle)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Driving:
+    """The map from the activations x of an arm without loads to those of its inner arm, γ(x)."""
+
+    arm: Manipulator
+
+    @cached_property
+    def law(self) -> LengthLaw:
+        """Law of the tendons that are driven by length."""
+        return LengthLaw(body_of(self.arm))
+
+    @cached_property
+    def has_length_tendons(self) -> bool:
+        """True if tensions follow from displacements."""
+        return any(isinstance(each, LengthTendon) for each in self.arm.actuators)
+
+    @cached_property
+    def is_affine(self) -> bool:
+        """True if γ(x) has no kinks."""
+        is_cut = self._pulls & (self._reached()[:, 0] < 0.0)
+        has_dead_zones = any(drive.dead_zone for drive in self.arm.drives)
+        return not (self.has_length_tendons or has_dead_zones or is_cut.any())
+
+    @cached_property
+    def ranges(self) -> Array:
+        """Bounds of the bundles of the inner arm, displacements among them, shape (bundle, 2)."""
+        reached = self._reached()
+        return np.where(self._pulls[:, None], np.maximum(reached, 0.0), reached)
+
+    def _reached(self) -> Array:
+        """Bounds of the bundles, if tendons could push."""
+        bounds = self.arm.input_bounds.copy()
+        for k, drive in enumerate(self.arm.drives):
+            bounds[k] = drive.effective(bounds[k])[0]
+        return self._offsets[:, None] + ends_over(self.gains, bounds)
+
+    @cached_property
+    def widths(self) -> Array:
+        """Largest |∂γ/∂x| of an affine map, shape (inner bundle, input)."""
+        return np.abs(self.gains)
+
+    @cached_property
+    def gains(self) -> Array:
+        """Activation of each bundle of the inner arm per effective input, (bundle, input)."""
+        names = self.arm.bundle_names
+        gains = np.zeros((self.law.arm.bundles, self.arm.inputs))
+        for k, drive in enumerate(self.arm.drives):
+            for name, gain in drive.gains.items():
+                gains[names.index(name), k] += gain
+        for k, bundle in enumerate(self.arm.undriven, start=len(self.arm.drives)):
+            gains[bundle, k] = 1.0
+        return gains
+
+    @cached_property
+    def _offsets(self) -> Array:
+        """Activation of each bundle of the inner arm at inputs of 0; 1 of the rest shape."""
+        offsets = np.zeros(self.law.arm.bundles)
+        offsets[self.arm.bundles :] = 1.0
+        for drive in self.arm.drives:
+            for name, offset in drive.offsets.items():
+                offsets[self.arm.bundle_names.index(name)] += offset
+        return offsets
+
+    @cached_property
+    def _pulls(self) -> NDArray[np.bool_]:
+        """Bundles that drives cannot push: tendons driven by tension, shape (inner bundle,)."""
+        pulls = np.zeros(self.law.arm.bundles, bool)
+        for k, actuator in enumerate(self.arm.bundle_actuators):
+            by_tension = isinstance(actuator, Tendon) and not isinstance(actuator, LengthTendon)
+            pulls[k] = by_tension and k not in self.arm.undriven
+        return pulls
+
+    def bundles(self, x: Array) -> Array:
+        """Activations of all bundles of the inner arm, displacements among them."""
+        return self._of_drives(x)[0]
+
+    def _of_drives(self, x: Array) -> tuple[Array, Array]:
+        """The same with their derivatives along x, shape (n, inner bundle, input)."""
+        effective, slopes = x.copy(), np.ones(x.shape)
+        for k, drive in enumerate(self.arm.drives):
+            effective[:, k], slopes[:, k] = drive.effective(x[:, k])
+        bundles = np.tile(self._offsets, (len(x), 1))
+        for k in range(x.shape[1]):  # in their order, whatever BLAS and its threads would do
+            bundles += effective[:, k, None] * self.gains[:, k]
+        slack = self._pulls & (bundles < 0.0)
+        bundles[slack] = 0.0
+        return bundles, np.where(slack[..., None], 0.0, slopes[:, None] * self.gains)
+
+    def activations(self, x: Array) -> Array:
+        """γ at checked x (n, inputs)."""
+        bundles = self.bundles(x)
+        if not self.has_length_tendons:
+            return bundles
+        return self.law.inner(bundles, self.law.tensions(bundles).tension)
+
+    def with_slopes(self, x: Array) -> InnerActivations:
+        """γ with ∂γ/∂x."""
+        bundles, slopes = self._of_drives(x)
+        if not self.has_length_tendons:
+            return InnerActivations(bundles, slopes)
+        tensions = self.law.tensions(bundles)
+        inner = self.law.inner(bundles, tensions.tension)
+        return self.on_taut(x, tensions, self.law.shortening_slopes(inner))
+
+    def on_taut(self, x: Array, tensions: Tensions, of_strains: Array) -> InnerActivations:
+        """γ with ∂γ/∂x on the taut tendons.
+
+        Args:
+            x: Inputs, shape (n, inputs).
+            tensions: Those that they lead to.
+            of_strains: ∂s/∂γ there, shape (n or 1, tendon, inner bundle).
+        """
+        bundles, of_drives = self._of_drives(x)
+        inner = self.law.inner(bundles, tensions.tension)
+        slopes = self.law.slopes(inner, tensions.is_taut, of_strains)
+        return InnerActivations(inner, slopes @ of_drives)
+
+
+def inner_arm(arm: Manipulator) -> Manipulator:
+    """The arm as tables and kernels see it, with bounds that hold what activations lead to.
+
+    Raises:
+        InvalidDesign: Displacements within the bounds shorten the arm to nothing.
+    """
+    driving, body = Driving(arm), body_of(arm)
+    bounds = driving.ranges.copy()
+    if not driving.has_length_tendons:
+        return body.with_bounds(bounds)
+    low, high = arm.input_bounds.T
+    gamma = driving.activations(low + pilot(arm.inputs) * (high - low))
+    rates = tables(body, strain_stations(body)).extension
+    least = float(1.0 + (gamma @ rates.T).min())
+    if not least > 0.0:
+        allowed = f"reaches extension ζ = {least:.4g}; must keep ζ > 0: narrow the bounds"
+        pulled = bounds[driving.law.columns].tolist()
+        raise InvalidDesign([Fault("displacement_bounds", pulled, allowed)])
+    most = _SAFETY * gamma.max(axis=0) + _against_loads(arm)
+    columns = driving.law.columns
+    bounds[columns] = np.stack([np.zeros(len(columns)), most[columns]], axis=1)
+    return body.replace(actuators=tuple(_by_tension(body, _fitting(bounds, columns, rates))))
+
+
+def _against_loads(arm: Manipulator) -> float:
+    """A tension that is enough to balance loads, with the lever arm of the farthest tendon [N]."""
+    if arm.loads is None:
+        return 0.0
+    per_length, force = arm.loads.sizes(arm.section, arm.profile)
+    force += per_length * arm.length
+    outline, radius = arm.outline(np.zeros(1)), float(arm.profile.radius(0.0))
+    lever = radius * float(outline.middle_ratio[0].max())
+    return 2.0 * force * max(1.0, arm.length / lever)
+
+
+def body_of(arm: Manipulator) -> Manipulator:
+    """The arm without drives, its rest shape as a bundle held at 1 behind the others."""
+    if arm.drives:
+        arm = arm.replace(drives=())
+    if arm.rest.is_straight:
+        return arm
+    held = RestStrains(
+        name=_unused("rest shape", arm.bundle_names),
+        shape=arm.rest,
+        activation_bounds=(1.0, 1.0),
+    )
+    return arm.replace(actuators=(*arm.actuators, held), rest=STRAIGHT)
+
+
+def pilot(count: int) -> Array:
+    """Corners of the unit cube, no more than 1,024 of them, and points inside."""
+    rng = np.random.default_rng(0)
+    if 2**count <= _MOST_CORNERS:
+        corners = np.indices((2,) * count).reshape(count, 2**count).T.astype(float)
+    else:
+        corners = rng.integers(0, 2, (_MOST_CORNERS, count)).astype(float)
+        corners[:2] = [[0.0], [1.0]]
+    return np.concatenate([corners, rng.random((_INSIDE, count))])
+
+
+def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:
+    """The bounds, with lower tensions where all of them at once would shorten the arm to nothing.
+
+    Displacements never lead to all at once: what they lead to was looked at before.
+    """
+    ends = (rates[..., None] * bounds).min(-1)
+    others = 1.0 + np.delete(ends, columns, axis=1).sum(1)
+    pulled = -ends[:, columns].sum(1)
+    share = float(((1.0 - _LEAST_EXTENSION) * others / np.maximum(pulled, 1e-300)).min())
+    fitting = bounds.copy()
+    fitting[columns] *= min(1.0, share)
+    return fitting
+
+
+def _by_tension(body: Manipulator, bounds: Array) -> Iterator[object]:
+    """Actuators with tendons by tension in place of those by length."""
+    first = 0
+    for actuator in body.actuators:
+        last = first + actuator.bundles
+        is_pulled = isinstance(actuator, LengthTendon)
+        own = bounds[first:last]
+        yield actuator.by_tension(own) if is_pulled else actuator.with_bounds(own)
+        first = last
+
+
+def _unused(name: str, taken: Sequence[str]) -> str:
+    """The name, with a mark for each time that it is taken."""
+    return _unused(name + "'", taken) if name in taken else name

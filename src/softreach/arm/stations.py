@@ -1,0 +1,238 @@
+"""Stations of an arm by name, and parts that begin, end or stand there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+
+from softreach.arm.number import Number, Station, fields_of, number
+from softreach.arm.part import Part
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
+
+if TYPE_CHECKING:
+    from softreach.arm.profile import Profile
+    from softreach.arm.section import Section
+
+__all__ = ["PLACE", "Located", "Span", "Stations", "placed"]
+
+Made = TypeVar("Made", bound=Part)
+
+PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
+"""Declaration of the place of a named station."""
+
+
+class Stations(Mapping[str, float]):
+    """Z [m] of stations by name; frozen.
+
+    Raises:
+        InvalidDesign: No mapping from names to places, or a name that paths cannot hold.
+    """
+
+    def __init__(self, places: Any = ()) -> None:
+        """Those of a mapping from names to Z [m]."""
+        try:
+            pairs = {name: plain(z) for name, z in dict(places).items()}
+        except (TypeError, ValueError):
+            allowed = "must be a mapping from names to Z in m"
+            raise InvalidDesign([Fault("", places, allowed)]) from None
+        faults = [Fault(str(name), z, allowed) for name, z, allowed in _wrong(pairs)]
+        if faults:
+            raise InvalidDesign(faults)
+        self._places = {str(name): float(z) for name, z in pairs.items()}
+
+    def replace(self, **places: float) -> Stations:
+        """Those with some in other places."""
+        return Stations(self._places | places)
+
+    def __getitem__(self, name: str) -> float:
+        return self._places[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._places.items()))
+
+    def __repr__(self) -> str:
+        return f"Stations({self._places})"
+
+
+def _wrong(pairs: Mapping[Any, Any]) -> Iterator[tuple[Any, Any, Range | str]]:
+    """Names that paths cannot hold, and places that are none, with what is allowed."""
+    for name, z in pairs.items():
+        if not isinstance(name, str) or not name or set(name) & set(".[]") or not _is_line(name):
+            yield name, z, "must be named by one line without dots and brackets"
+        elif not PLACE.allowed.admits(z):
+            yield name, z, PLACE.allowed
+
+
+def _is_line(name: str) -> bool:
+    return name.isprintable() and name == name.strip()
+
+
+class Located(Part):
+    """A part at one place along the arm or more, each given over L, in m, or by a station's name.
+
+    Raises:
+        InvalidDesign: A place off the arm, or given twice.
+    """
+
+    _places: ClassVar[tuple[str, ...]]
+    """Its places: the fields in m or by name, beside each of which one is over L."""
+
+    def station_at(self, field: str, length: float) -> float:
+        """Z [m] of a place on an arm of a length [m].
+
+        Raises:
+            InvalidDesign: The name of a station, while it is part of no arm.
+        """
+        place = getattr(self, field)
+        if isinstance(place, str):
+            allowed = "must be Z in m: names of stations are known in an arm alone"
+            raise InvalidDesign([Fault(field, place, allowed)])
+        ratio = getattr(self, f"{field}_over_length")
+        return length * ratio if place is None else float(place)
+
+    def station_over_length_at(self, field: str, length: float) -> float:
+        """The same over L [-]."""
+        if getattr(self, field) is None:
+            return getattr(self, f"{field}_over_length")
+        return self.station_at(field, length) / length
+
+    def place_faults(self, length: float) -> list[Fault]:
+        """Faults of places that an arm of a length [m] does not have."""
+        allowed = f"must be on the arm, at most {length:g} m"
+        return [
+            Fault(field, z, allowed)
+            for field in self._places
+            # of a named station, the arm refuses that
+            if (z := self.station_at(field, length)) > length
+            and not isinstance(getattr(self, field), Station)
+        ]
+
+    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
+        """Value of a number when this part belongs to an arm with this profile and section."""
+        del section
+        if field in self._places:
+            return self.station_at(field, profile.length)
+        if (place := field.removesuffix("_over_length")) in self._places:
+            return self.station_over_length_at(place, profile.length)
+        return getattr(self, field)
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed; a new place takes that of the one given otherwise."""
+        for field in self._places:
+            ratio = f"{field}_over_length"
+            if changes.get(field) is not None:
+                changes.setdefault(ratio, _default(type(self), ratio))
+            if changes.get(ratio) is not None:
+                changes.setdefault(field, None)
+        return super().replace(**changes)
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        for field in self._places:
+            ratio = f"{field}_over_length"
+            value = getattr(self, field), getattr(self, ratio)
+            if value[0] is not None and value[1] != _default(type(self), ratio):
+                allowed = f"give exactly one of {field} and {ratio}"
+                faults.append(Fault(f"{field}, {ratio}", value, allowed))
+        return faults
+
+
+@dataclass(frozen=True, kw_only=True)
+class Span(Located):
+    """A part between two places along the arm.
+
+    Raises:
+        InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
+    """
+
+    _places: ClassVar[tuple[str, ...]] = ("start", "end")
+
+    start_over_length: float = number(
+        "Z0/L", "", "where it begins", low=0.0, high=1.0, open_high=True, default=0.0
+    )
+    """Z0/L, where along the arm it begins [-]."""
+    end_over_length: float = number(
+        "Z1/L", "", "where it ends", low=0.0, high=1.0, open_low=True, default=1.0
+    )
+    """Z1/L, where it ends [-]."""
+    start: float | str | None = number(
+        "Z0", "m", "where it begins", low=0.0, named=True, default=None
+    )
+    """Z0 [m], or the name of a station of the arm, in place of `start_over_length`."""
+    end: float | str | None = number(
+        "Z1", "m", "where it ends", low=0.0, open_low=True, named=True, default=None
+    )
+    """Z1 [m], or the name of a station of the arm, in place of `end_over_length`."""
+
+    def span(self, length: float) -> tuple[float, float]:
+        """Stations [m] between which it is on an arm of a length [m]."""
+        return self.station_at("start", length), self.station_at("end", length)
+
+    def span_over_length(self, length: float) -> tuple[float, float]:
+        """The same over L [-]."""
+        return self.station_over_length_at("start", length), self.station_over_length_at(
+            "end", length
+        )
+
+    def place_faults(self, length: float) -> list[Fault]:
+        """Faults of ends that an arm of a length [m] does not have."""
+        faults = super().place_faults(length)
+        start, end = self.span(length)
+        if faults or start < end:
+            return faults
+        if self.end is None:
+            return [Fault("start", start, f"must be below its end at Z = {end:g} m")]
+        return [Fault("end", end, f"must be above its start at Z = {start:g} m")]
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        start, end = self.start_over_length, self.end_over_length
+        in_meters = self.start is not None or self.end is not None
+        blamed = any(fault.path.endswith("_over_length") for fault in faults)
+        if in_meters or blamed or start < end:
+            return faults
+        allowed = f"must be above start_over_length = {start:g}"
+        return [*faults, Fault("end_over_length", end, allowed)]
+
+
+def placed(part: Made, stations: Mapping[str, float]) -> Made:
+    """The part where the stations that it names are.
+
+    Raises:
+        InvalidDesign: It names a station that is none of these.
+    """
+    names: dict[str, str] = {}
+    for field, declared in fields_of(type(part)).items():
+        place = getattr(part, field) if declared.named else None
+        if isinstance(place, str | Station):
+            names[field] = place.name if isinstance(place, Station) else place
+    if faults := [
+        Fault(field, name, _allowed(name, stations))
+        for field, name in names.items()
+        if name not in stations
+    ]:
+        raise InvalidDesign(faults)
+    if not names:
+        return part
+    return part.replace(**{field: Station(name, stations[name]) for field, name in names.items()})
+
+
+def _allowed(name: str, stations: Mapping[str, float]) -> str:
+    if not stations:
+        return "must be Z in m: the arm has no stations by name"
+    hint = did_you_mean(name, stations)
+    return f"must be Z in m or a station of the arm: {', '.join(stations)}" + (
+        f"; {hint}" if hint else ""
+    )
+
+
+def _default(kind: type, field: str) -> Any:
+    return getattr(kind, "__dataclass_fields__")[field].default  # noqa: B009

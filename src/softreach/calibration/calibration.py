@@ -1,0 +1,397 @@
+"""Calibration: from measured poses to the arm on the bench, with honest errors."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm import design_file
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.calibration.baselines import constant_curvature, quadratic
+from softreach.calibration.errors import (
+    Misses,
+    Repeatability,
+    Verdict,
+    judged,
+    misses,
+    repeatability,
+)
+from softreach.calibration.fit import Fit, fitted, started
+from softreach.calibration.free_numbers import free_numbers
+from softreach.calibration.measurements import Measurements, read_measurements
+from softreach.calibration.model import MarkerModel
+from softreach.calibration.uncertainty import Uncertainty, uncertainty
+from softreach.support.arguments import as_flag, as_integer, as_number, as_path
+from softreach.support.errors import InvalidInput, Range, warn
+from softreach.support.files.atomic import writing
+from softreach.support.progress import Progress, as_progress
+from softreach.support.versions import versions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Calibration", "Rival", "calibrate"]
+
+Array = NDArray[np.float64]
+
+_OUTLIER = 5.0
+"""Robust widths from which a sample is listed."""
+_CORRELATED = 0.95
+
+
+class Rival(NamedTuple):
+    """Another law, fitted to the same samples."""
+
+    name: str
+    numbers: int
+    """How many were fitted."""
+    train: Misses
+    held_out: Misses
+
+
+def calibrate(
+    arm: Manipulator,
+    data: Any,
+    *,
+    free: Sequence[str],
+    prior: Mapping[str, Any] | None = None,
+    hold_out: float = 0.0,
+    robust: bool = True,
+    noise: float | None = None,
+    rivals: bool = True,
+    inputs: Mapping[str, str] | None = None,
+    markers: Mapping[str, str] | None = None,
+    run: str | None = None,
+    order: str | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Calibration:
+    """The arm whose markers come nearest to measured ones, and how sure that is.
+
+    Least squares on exact derivatives, by SciPy's trust region within the ranges of the numbers.
+
+    Args:
+        arm: The design to start from.
+        data: Measured poses: see `read_measurements`, which takes `inputs`, `markers`, `run` and
+            `order` too; or its result.
+        free: Numbers that may change: paths of parameters, with `*` for any text; several tied by
+            "=" share one value; "pose" for the base (its start follows from the data).
+        prior: What is known of a number beforehand, by its name: its width about the value of the
+            design, or (mean, width).
+        hold_out: Share of the samples, by chance, that the fit does not see.
+        robust: Let samples far off count less than their squares.
+        noise: Standard deviation of a measured coordinate [m], against which priors are weighed;
+            by default that of the residuals.
+        rivals: Fit constant curvature and a quadratic ridge as well.
+        inputs: Column of each input.
+        markers: Start of the columns of each marker.
+        run: Column that says which samples belong together.
+        order: Column that says in which order they were taken.
+        seed: Of the samples held out.
+        progress: Called with 1 for each step of the fit.
+
+    Raises:
+        InvalidInput: Data that cannot be read, numbers that it cannot tell apart, or mirrored axes.
+        InvalidDesign: No such arm can exist.
+
+    Warns:
+        SoftreachWarning: The fit did not converge, or numbers end at a bound.
+    """
+    begin = perf_counter()
+    arm = a_manipulator("arm", arm)
+    hold_out = as_number("hold_out", hold_out, Range(0.0, 0.9))
+    robust, rivals = as_flag("robust", robust), as_flag("rivals", rivals)
+    noise = None if noise is None else as_number("noise", noise, Range(0.0, 1.0, "m", True))
+    table = (
+        data
+        if isinstance(data, Measurements)
+        else read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
+    )
+    held = _held_out(table, hold_out, as_integer("seed", seed))
+    train = table.of(~held)
+    numbers = free_numbers(arm, free, prior)
+    model = MarkerModel.of(numbers, train)
+    model = replace(model, free=started(model, train.places))
+    progress = as_progress(progress)
+    fit = fitted(model, train.places, robust=robust, noise=noise, progress=progress)
+    if not fit.converged:
+        warn(f"the fit did not converge in {fit.evaluations} evaluations: look at its residuals")
+    if fit.at_bound.any():
+        ends = [n for n, end in zip(numbers.names, fit.at_bound, strict=True) if end]
+        warn(f"numbers that end at a bound of their range: {', '.join(ends)}")
+    result = Calibration(
+        arm=fit.free.made(fit.values),
+        start=arm,
+        data=table,
+        held=held,
+        fit=fit,
+        uncertainty=uncertainty(fit, train, noise),
+        rivals=(),
+        seconds=perf_counter() - begin,
+        date=dt.datetime.now(dt.UTC).date().isoformat(),
+    )
+    return replace(result, rivals=_rivals(arm, table, held)) if rivals else result
+
+
+def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
+    held = np.zeros(len(data), bool)
+    count = round(share * len(data))
+    held[np.random.default_rng(seed).permutation(len(data))[:count]] = True
+    return held
+
+
+def _rivals(arm: Manipulator, data: Measurements, held: NDArray[np.bool_]) -> tuple[Rival, ...]:
+    train = data.of(~held)
+    laws = {
+        "constant curvature": lambda test: constant_curvature(arm, train, test),
+        "quadratic ridge": lambda test: quadratic(train, test),
+    }
+    result = []
+    for name, law in laws.items():
+        places, count = law(data)
+        left = places - data.places
+        result.append(Rival(name, count, misses(left[~held]), misses(left[held])))
+    return tuple(result)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration:
+    """A calibrated arm, the numbers that were fitted, and all that the data says of them."""
+
+    arm: Manipulator
+    """The calibrated arm."""
+    start: Manipulator
+    """The design before."""
+    data: Measurements
+    """All samples."""
+    held: NDArray[np.bool_]
+    """Samples that the fit did not see, shape (n,)."""
+    fit: Fit
+    uncertainty: Uncertainty
+    rivals: tuple[Rival, ...]
+    """Other laws on the same samples."""
+    seconds: float
+    date: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the fitted numbers."""
+        return self.fit.free.names
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted numbers by name, in their units."""
+        return dict(zip(self.names, self.fit.values.tolist(), strict=True))
+
+    @property
+    def sigma(self) -> dict[str, float]:
+        """Their standard deviations."""
+        return dict(zip(self.names, self.uncertainty.sigma.tolist(), strict=True))
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Predicted minus measured places of all samples [m], (n, marker, 3)."""
+        return self._model(self.data).of_arm(self.arm).places - self.data.places
+
+    @property
+    def train(self) -> Misses:
+        """Errors of the samples of the fit."""
+        return misses(self.residuals[~self.held])
+
+    @property
+    def held_out(self) -> Misses:
+        """Errors of the samples that it did not see."""
+        return misses(self.residuals[self.held])
+
+    @property
+    def by_marker(self) -> dict[str, Misses]:
+        """Errors of each marker: of held-out samples, or of all if none is held out."""
+        rows = self.held if self.held.any() else ~self.held
+        each = enumerate(self.data.marker_names)
+        return {name: misses(self.residuals[rows, k]) for k, name in each}
+
+    @cached_property
+    def before(self) -> Misses:
+        """Errors of the design before, with the pose of its base alone fitted, on all samples."""
+        numbers = free_numbers(self.start, ["pose"])
+        model = MarkerModel.of(numbers, self.data)
+        free = started(model, self.data.places)
+        return misses(model.of_arm(free.made(free.start)).places - self.data.places)
+
+    @cached_property
+    def repeatability(self) -> Repeatability:
+        """By how much the data repeats itself."""
+        return repeatability(self.data)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """What limits the fit."""
+        known = self.held_out if self.held.any() else self.train
+        return judged(self.data, self.residuals, known.rms, self.repeatability)
+
+    @property
+    def outliers(self) -> NDArray[np.intp]:
+        """Rows of the data whose markers are more than five robust widths off."""
+        distance = np.linalg.norm(self.residuals, axis=2)
+        middle = np.nanmedian(distance, axis=0)
+        far = np.nanmax(distance / (middle / 1.5382), axis=1, initial=0.0) > _OUTLIER * 1.7
+        return self.data.rows[far]
+
+    @property
+    def correlated(self) -> list[tuple[str, str, float]]:
+        """Pairs of numbers that the data hardly tells apart, with their correlation."""
+        matrix = self.uncertainty.correlation
+        j, k = np.nonzero(np.triu(np.abs(matrix) > _CORRELATED, 1))
+        return [
+            (self.names[a], self.names[b], float(matrix[a, b]))
+            for a, b in zip(j.tolist(), k.tolist(), strict=True)
+        ]
+
+    def errors_on(self, data: Any, **columns: Any) -> Misses:
+        """Errors of the calibrated arm on other measurements."""
+        return misses(self.residuals_on(data, **columns))
+
+    def residuals_on(self, data: Any, **columns: Any) -> Array:
+        """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
+        table = (
+            data
+            if isinstance(data, Measurements)
+            else read_measurements(self.start, data, **columns)
+        )
+        return self._model(table).of_arm(self.arm).places - table.places
+
+    def predict(self, inputs: ArrayLike) -> tuple[Array, Array]:
+        """Places of the markers and the standard deviations that calibration leaves.
+
+        Args:
+            inputs: Of the arm, in their units, shape (n, input).
+
+        Returns:
+            Places in the world [m] and their standard deviations [m], (n, marker, 3) each.
+        """
+        from softreach.support.arrays import as_rows
+
+        allowed = f"shape (n, {self.arm.inputs})"
+        x = as_rows("inputs", inputs, self.arm.inputs, allowed)
+        prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
+        assert prediction.slopes is not None
+        covariance = self.uncertainty.covariance
+        square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
+        return prediction.places, np.sqrt(np.maximum(square, 0.0))
+
+    def draws(self, count: int = 32, seed: int = 0) -> list[Manipulator]:
+        """Arms as likely as the data leaves them, for bands of whatever is computed from an arm."""
+        rng = np.random.default_rng(as_integer("seed", seed))
+        root = np.linalg.svd(self.uncertainty.covariance, hermitian=True)
+        factor = root[0] * np.sqrt(root[1])
+        low, high = self.fit.free.bounds
+        arms = []
+        for _ in range(as_integer("count", count, 2, 10_000)):
+            shift = factor @ rng.standard_normal(len(self.names))
+            arms.append(self.fit.free.made(np.clip(self.fit.values + shift, low, high)))
+        return arms
+
+    def band(
+        self, quantity: Callable[[Manipulator], ArrayLike], count: int = 32, seed: int = 0
+    ) -> tuple[Array, Array]:
+        """A quantity of the calibrated arm and the standard deviation that calibration leaves.
+
+        Args:
+            quantity: Function of an arm, such as `lambda arm: sr.reachable_set(arm).volume`.
+            count: Arms that it is computed of.
+            seed: Of the draws.
+        """
+        best = np.asarray(quantity(self.arm), float)
+        others = [np.asarray(quantity(arm), float) for arm in self.draws(count, seed)]
+        return best, np.sqrt(np.mean([(other - best) ** 2 for other in others], axis=0))
+
+    def _model(self, data: Measurements) -> MarkerModel:
+        return MarkerModel.of(self.fit.free, data)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Numbers with their errors over `number`, residuals over `sample`, `marker`, `axis`."""
+        import xarray as xr
+
+        free = self.fit.free
+        place = ("sample", "marker", "axis")
+        values = {
+            "value": ("number", self.fit.values),
+            "sigma": ("number", self.uncertainty.sigma),
+            "start": ("number", np.array([number.start for number in free.numbers])),
+            "at_bound": ("number", self.fit.at_bound),
+            "correlation": (("number", "other"), self.uncertainty.correlation),
+            "measured": (place, self.data.places, {"units": "m"}),
+            "residual": (place, self.residuals, {"units": "m"}),
+            "held_out": ("sample", self.held),
+            "run": ("sample", self.data.runs),
+            "input": (("sample", "input"), self.data.inputs),
+        }
+        names = {
+            "number": list(self.names),
+            "other": list(self.names),
+            "unit": ("number", [number.unit for number in free.numbers]),
+            "marker": list(self.data.marker_names),
+            "axis": ["x", "y", "z"],
+            "input": list(self.arm.input_names),
+        }
+        return xr.Dataset(values, names, self.provenance)
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """What the calibration was made of."""
+        return {
+            "softreach_version": str(versions()["softreach_version"]),
+            "date": self.date,
+            "data": self.data.source,
+            "data_sha256": self.data.digest,
+            "samples": f"{len(self.data)}, of which {int(self.held.sum())} held out",
+            "free": ", ".join(self.names),
+            "error": self.held_out.text(self.arm.length)
+            if self.held.any()
+            else self.train.text(self.arm.length),
+            "verdict": self.verdict.sentence,
+        }
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the calibrated arm as a design file whose first lines say where it comes from.
+
+        Raises:
+            InvalidInput: Something is there that is no design, and `overwrite` is not given.
+            NotWritten: It cannot be written.
+        """
+        lines = [f"# {key}: {value}" for key, value in self.provenance.items()]
+        numbers = (
+            f"# {name} = {value:.6g} ± {sigma:.2g} {number.unit}".replace(" 1\n", "\n")
+            for name, value, sigma, number in zip(
+                self.names,
+                self.fit.values.tolist(),
+                self.uncertainty.sigma.tolist(),
+                self.fit.free.numbers,
+                strict=True,
+            )
+        )
+        head = "\n".join(["# Calibrated from measured poses.", *lines, *numbers])
+        text = f"{head}\n\n{self.arm.to_toml()}{design_file.display_text(self.arm.display_unit)}"
+        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+        with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
+            stream.write(text.encode())
+
+    def __repr__(self) -> str:
+        from softreach.calibration.report import summary_text
+
+        return summary_text(self)
+
+
+def as_calibration(value: object) -> Calibration:
+    """An argument that is a calibration."""
+    if not isinstance(value, Calibration):
+        raise InvalidInput("calibration", type(value).__name__, "a Calibration")
+    return value

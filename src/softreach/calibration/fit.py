@@ -1,0 +1,312 @@
+"""Least squares of measured places: robust, bounded, with priors; what the data cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.calibration.free_numbers import POSE, FreeNumbers
+from softreach.calibration.model import MarkerModel, Prediction
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.progress import Progress
+
+__all__ = ["Fit", "fitted", "identifiable", "robust_width", "started"]
+
+Array = NDArray[np.float64]
+
+_SAME = 1e-7
+"""Smallest singular value over the largest, in scales of the numbers, that data can tell."""
+_ROBUST = 3.0
+"""Residuals beyond so many widths count less than their squares."""
+_FINE, _COARSE = 1e-7, 1e-3
+"""Least share by which a step must improve: of the last round, of those before."""
+_MOST = 60
+_FAR = 1.0  # m, what a sample without equilibrium misses
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Values of the free numbers at which residuals are least."""
+
+    free: FreeNumbers
+    values: Array
+    prediction: Prediction
+    residuals: Array
+    """Predicted minus measured places [m], NaN where none was seen, (n, marker, 3)."""
+    weights: Array
+    """Of each marker of each sample in the fit: 1, less for outliers; (n, marker)."""
+    at_bound: NDArray[np.bool_]
+    """Numbers that end at a bound, shape (number,)."""
+    evaluations: int
+    converged: bool
+
+
+def started(model: MarkerModel, places: Array) -> FreeNumbers:
+    """Numbers to start from: the pose by which predicted places match measured ones [Kabsch1976].
+
+    Raises:
+        InvalidInput: Axes that only a mirror brings together.
+    """
+    free = model.free
+    turning = [name for name in POSE[3:] if name in free.names]
+    moving = [name for name in POSE[:3] if name in free.names]
+    if not moving:
+        return free
+    predicted = model.predict(free.start).places.reshape(-1, 3)
+    measured = places.reshape(-1, 3)
+    known = np.isfinite(predicted).all(axis=1) & np.isfinite(measured).all(axis=1)
+    if not known.any():
+        return free
+    predicted, measured = predicted[known], measured[known]
+    start = np.array(free.arm.base.position)
+    if len(turning) < 3 or len(moving) < 3:
+        shift = np.median(measured - predicted, axis=0)
+        return free.started_at(
+            {name: start[POSE.index(name)] + shift[POSE.index(name)] for name in moving}
+        )
+    rotation, shift = _kabsch(predicted, measured)
+    _refuse_mirror(predicted, measured)
+    vector = _rotation_vector(rotation)
+    place = rotation @ start + shift
+    pose = dict(zip(POSE, [*place, *vector], strict=True))
+    return free.started_at({name: pose[name] for name in (*moving, *turning)})
+
+
+def _kabsch(predicted: Array, measured: Array, mirror: bool = False) -> tuple[Array, Array]:
+    """Rotation and shift that carry predicted places to measured ones, least squares."""
+    here, there = predicted.mean(axis=0), measured.mean(axis=0)
+    left, _, right = np.linalg.svd((measured - there).T @ (predicted - here))
+    sign = np.sign(np.linalg.det(left @ right)) * (-1.0 if mirror else 1.0)
+    rotation = left @ np.diag([1.0, 1.0, sign]) @ right
+    return rotation, there - rotation @ here
+
+
+def _refuse_mirror(predicted: Array, measured: Array) -> None:
+    """Refuse places whose mirror image matches far better than they do."""
+    misses = []
+    for mirror in (False, True):
+        rotation, shift = _kabsch(predicted, measured, mirror)
+        misses.append(np.median(np.linalg.norm(predicted @ rotation.T + shift - measured, axis=1)))
+    size = np.median(np.linalg.norm(measured - measured.mean(axis=0), axis=1))
+    if misses[1] < 0.35 * misses[0] and misses[0] > 0.1 * size:
+        raise InvalidInput(
+            "axes of the data",
+            f"a miss of {1e3 * misses[0]:.3g} mm in the middle, {1e3 * misses[1]:.3g} mm mirrored",
+            "right-handed, as those of the design: exchange two of x, y and z, or turn one over",
+        )
+
+
+def _rotation_vector(rotation: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(rotation).as_rotvec()
+
+
+def identifiable(free: FreeNumbers, slopes: Array) -> None:
+    """Refuse numbers that the data cannot tell: those that do nothing, and those that trade.
+
+    Args:
+        free: The numbers.
+        slopes: Derivatives of all residuals, those of priors among them, shape (residual, number).
+
+    Raises:
+        InvalidInput: The names of the numbers, and which to leave out.
+    """
+    scaled = slopes * free.scale
+    sizes = np.linalg.norm(scaled, axis=0)
+    idle = [
+        name for name, size in zip(free.names, sizes, strict=True) if size <= 1e-9 * sizes.max()
+    ]
+    if idle or not sizes.max() > 0:
+        allowed = "numbers that move some marker of some sample: leave out what does nothing here"
+        raise InvalidInput("free", ", ".join(idle or free.names), allowed)
+    _, values, axes = np.linalg.svd(scaled, full_matrices=False)
+    if len(scaled) < len(free):
+        allowed = f"at most {len(scaled)} numbers, as many as the data has"
+        raise InvalidInput("free", f"{len(free)} numbers", allowed)
+    if values[-1] > _SAME * values[0]:
+        return
+    shares = zip(free.names, np.abs(axes[-1]), strict=True)
+    trading = [name for name, share in shares if share > 0.05]
+    allowed = (
+        "numbers that the data can tell apart: these change together without moving any marker, "
+        f"as only their ratio or their sum shows; leave out one, such as {trading[-1]}, or give "
+        "it a prior"
+    )
+    raise InvalidInput("free", ", ".join(trading), allowed)
+
+
+def fitted(
+    model: MarkerModel,
+    places: Array,
+    *,
+    robust: bool,
+    noise: float | None,
+    progress: Progress,
+) -> Fit:
+    """The numbers at which predicted places are nearest to measured ones.
+
+    Args:
+        model: Markers as functions of the free numbers.
+        places: Measured places [m], NaN where none was seen, shape (n, marker, 3).
+        robust: Let samples far off count less.
+        noise: Standard deviation of a coordinate [m], against which priors are weighed; None to
+            take that of the residuals.
+        progress: Called with 1 for each step.
+
+    Raises:
+        InvalidInput: Numbers that the data cannot tell, or no equilibrium at the start.
+    """
+    problem = _Problem(model, places, noise, progress)
+    values = np.clip(model.free.start, *problem.bounds)
+    problem.look(values)
+    if not np.isfinite(problem.residuals(values)).all():
+        raise InvalidInput("arm", "no equilibrium", "one at the start for some sample at least")
+    rounds = [None, _ROBUST] if robust else [None]
+    converged, count = False, 0
+    for width in rounds:
+        if width is not None:
+            problem.robust_at(values, width)
+        if any(number.prior for number in model.free.numbers):
+            problem.weigh_priors(values)
+        result = problem.solved(values, _FINE if width == rounds[-1] else _COARSE)
+        values, converged = result.x, bool(result.status > 0)
+        count += int(result.nfev)
+    prediction = model.predict(values, slopes=True)
+    residuals = prediction.places - places
+    low, high = problem.bounds
+    hair = 1e-6 * model.free.scale
+    return Fit(
+        model.free,
+        values,
+        prediction,
+        residuals,
+        problem.weights_of(residuals),
+        (values <= low + hair) | (values >= high - hair),
+        count,
+        converged,
+    )
+
+
+class _Problem:
+    """Residuals and their derivatives, the last evaluation kept."""
+
+    def __init__(
+        self, model: MarkerModel, places: Array, noise: float | None, progress: Progress
+    ) -> None:
+        self.model, self.places, self.progress = model, places, progress
+        self.seen = np.isfinite(places).all(axis=2)
+        self.noise = noise
+        self.width: float | None = None
+        self.unit = 1.0  # of priors, in m
+        self.kept: tuple[bytes, Prediction] | None = None
+        self.good: Array | None = None
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        return self.model.free.bounds
+
+    def look(self, values: Array) -> None:
+        """Refuse numbers that the data cannot tell."""
+        identifiable(self.model.free, self.slopes(values))
+
+    def _at(self, values: Array) -> Prediction:
+        key = values.tobytes()
+        if self.kept is None or self.kept[0] != key:
+            self.kept = (key, self.model.predict(values, slopes=True))
+            self.progress(1)
+        return self.kept[1]
+
+    def residuals(self, values: Array) -> Array:
+        """Of all that was seen [m], then of the priors."""
+        free = self.model.free
+        try:
+            miss = (self._at(values).places - self.places)[self.seen]
+        except InvalidDesign:
+            return np.full(3 * int(self.seen.sum()) + self._priors(values)[0].size, _FAR)
+        miss = np.where(np.isfinite(miss), miss, _FAR * 0.1 * free.arm.length)
+        return np.concatenate([miss.ravel(), self._priors(values)[0]])
+
+    def slopes(self, values: Array) -> Array:
+        """Derivatives of the residuals."""
+        prediction = self._at(values)
+        assert prediction.slopes is not None
+        slopes = prediction.slopes[self.seen].reshape(-1, len(self.model.free))
+        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+        return np.concatenate([slopes, self._priors(values)[1]])
+
+    def _priors(self, values: Array) -> tuple[Array, Array]:
+        numbers = self.model.free.numbers
+        known = [k for k, number in enumerate(numbers) if number.prior is not None]
+        rows, slopes = np.zeros(len(known)), np.zeros((len(known), len(numbers)))
+        for row, k in enumerate(known):
+            mean, width = numbers[k].prior or (0.0, 1.0)
+            rows[row] = self.unit * (values[k] - mean) / width
+            slopes[row, k] = self.unit / width
+        return rows, slopes
+
+    def robust_at(self, values: Array, widths: float) -> None:
+        """From here on residuals beyond so many widths count less."""
+        miss = (self._at(values).places - self.places)[self.seen]
+        self.width = widths * robust_width(miss)
+
+    def weigh_priors(self, values: Array) -> None:
+        """Priors count as much as a coordinate of one width."""
+        miss = (self._at(values).places - self.places)[self.seen]
+        self.unit = self.noise or robust_width(miss)
+
+    def solved(self, values: Array, fine: float) -> Any:
+        """The end of SciPy's trust region, from these values."""
+        from scipy.optimize import least_squares
+
+        return least_squares(
+            self.residuals,
+            values,
+            jac=self.slopes,  # pyright: ignore[reportArgumentType]
+            bounds=self.bounds,
+            x_scale=self.model.free.scale,
+            loss=_loss(self.seen, self.width),
+            f_scale=1.0,
+            ftol=fine,
+            xtol=fine,
+            gtol=1e-14,
+            max_nfev=_MOST,
+        )
+
+    def weights_of(self, residuals: Array) -> Array:
+        """Weight of each marker of each sample in the fit, (n, marker)."""
+        if self.width is None:
+            return self.seen.astype(float)
+        distance = np.linalg.norm(np.where(self.seen[..., None], residuals, 0.0), axis=2)
+        return self.seen / np.sqrt(1.0 + (distance / self.width) ** 2)
+
+
+def _loss(seen: Array, width: float | None) -> str | Callable[[Array], Array]:
+    """Loss of places, by their distance, so that it does not depend on the axes; pseudo-Huber."""
+    if width is None:
+        return "linear"
+    count = int(seen.sum())
+
+    def loss(squares: Array) -> Array:
+        # SciPy takes ρ of each squared residual: that of a place is shared by its three.
+        rho = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
+        place = squares[: 3 * count].reshape(count, 3)
+        whole = place.sum(axis=1) / width**2
+        root = np.sqrt(1.0 + whole)
+        share = np.where(whole > 1e-12, 2.0 * (root - 1.0) / np.maximum(whole, 1e-12), 1.0)
+        rho[0, : 3 * count] = (place * share[:, None]).ravel()
+        rho[1, : 3 * count] = np.repeat(1.0 / root, 3)
+        return rho
+
+    return loss
+
+
+def robust_width(miss: Array) -> float:
+    """Standard deviation of a coordinate from the middle of the distances of places."""
+    distance = np.linalg.norm(miss, axis=-1)
+    known = distance[np.isfinite(distance)]
+    return max(float(np.median(known)) / 1.5382 if known.size else 0.0, 1e-9)  # χ of 3 degrees

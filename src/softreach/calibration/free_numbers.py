@@ -1,0 +1,287 @@
+"""Free numbers of a calibration: parameters of the design, the pose of its base, what is tied."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.base import Base, rotation_matrices
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import Parameter, find_parameters, parameters
+from softreach.arm.parameters.draft import Draft
+from softreach.arm.rest_shape import RestShape
+from softreach.support.arguments import as_names, plain
+from softreach.support.errors import InvalidInput, Range
+
+__all__ = ["FreeNumber", "FreeNumbers", "free_numbers"]
+
+Array = NDArray[np.float64]
+
+POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
+"""Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
+
+_UNSEEN = 1e-12
+"""Angle by which an arm that counts as bent is bent at least [rad]."""
+_STEP = 1e-3  # of the scale of a number, for derivatives of tables of fourth order
+_CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
+_FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 12))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeNumber:
+    """A number that a fit may change."""
+
+    name: str
+    """Path of a parameter, one of the six of the pose, or paths tied by "="."""
+    unit: str
+    """SI unit; "1" for none."""
+    start: float
+    """Value of the design."""
+    range: Range
+    """Values that it may have."""
+    scale: float
+    """A change that matters."""
+    prior: tuple[float, float] | None = None
+    """Mean and width of what is known before."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreeNumbers:
+    """All free numbers of an arm, and the arm with other values of them."""
+
+    arm: Manipulator
+    numbers: tuple[FreeNumber, ...]
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(number.name for number in self.numbers)
+
+    @property
+    def start(self) -> Array:
+        """Their values on the design."""
+        return np.array([number.start for number in self.numbers])
+
+    @property
+    def scale(self) -> Array:
+        """Changes that matter."""
+        return np.array([number.scale for number in self.numbers])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest values; those that are excluded by a hair."""
+        return (
+            np.array([_inside(n.range.low, n.range.open_low, n.scale) for n in self.numbers]),
+            np.array([_inside(n.range.high, n.range.open_high, -n.scale) for n in self.numbers]),
+        )
+
+    def made(self, values: Array) -> Manipulator:
+        """The arm with these values.
+
+        Raises:
+            InvalidDesign: No such arm can exist.
+        """
+        pose, paths = {}, {}
+        for number, value in zip(self.numbers, values.tolist(), strict=True):
+            if number.name in POSE:
+                pose[number.name] = value
+            else:
+                paths |= dict.fromkeys(_tied(number.name), value)
+        arm = self._changed(paths)
+        return arm.replace(base=_moved(arm.base, pose)) if pose else arm
+
+    def _changed(self, values: Mapping[str, float]) -> Manipulator:
+        """As `changed`, with parameters that were found before."""
+        draft = Draft(self.arm)
+        for name, parameter in self._parameters.items():
+            parameter.change(draft, values[name])
+        return draft.made() if values else self.arm
+
+    @cached_property
+    def _parameters(self) -> dict[str, Parameter]:
+        names = [number.name for number in self.numbers if number.name not in POSE]
+        return find_parameters(self.arm, tuple(path for name in names for path in _tied(name)))
+
+    def neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator]]:
+        """Arms around these values along one number, with the factors of a derivative by it.
+
+        Differences of fourth order, inside the range of the number. Those of the pose differ in
+        their base alone.
+        """
+        number, (low, high) = self.numbers[k], self.bounds
+        step = _STEP * max(number.scale, abs(float(values[k])))
+        value = float(values[k])
+        points, sign = _CENTRAL, 1.0
+        if value - 2 * step < low[k]:
+            points = _FORWARD
+        elif value + 2 * step > high[k]:
+            points, sign = _FORWARD, -1.0
+        result = []
+        for offset, factor in points:
+            other = values.copy()
+            other[k] = value + sign * offset * step
+            result.append((sign * factor / step, self.made(other)))
+        return result
+
+    def moves_base(self, k: int) -> bool:
+        """True of a number of the pose."""
+        return self.numbers[k].name in POSE
+
+    def base_neighbors(self, values: Array, k: int) -> list[tuple[float, Base]]:
+        """As `neighbors`, for a number of the pose: the bases alone."""
+        step = _STEP * self.numbers[k].scale
+        result = []
+        for offset, factor in _CENTRAL:
+            other = values.copy()
+            other[k] += offset * step
+            pairs = zip(self.numbers, other.tolist(), strict=True)
+            pose = {number.name: value for number, value in pairs if number.name in POSE}
+            result.append((factor / step, _moved(self.arm.base, pose)))
+        return result
+
+    def started_at(self, values: Mapping[str, float]) -> FreeNumbers:
+        """The same with other values to start from."""
+        numbers = tuple(
+            replace(number, start=float(values.get(number.name, number.start)))
+            for number in self.numbers
+        )
+        return replace(self, numbers=numbers)
+
+    def without(self, names: Sequence[str]) -> FreeNumbers:
+        """The same with some held where they are."""
+        kept = tuple(number for number in self.numbers if number.name not in names)
+        return replace(self, numbers=kept)
+
+
+def free_numbers(
+    arm: Manipulator, free: Sequence[str], prior: Mapping[str, Any] | None = None
+) -> FreeNumbers:
+    """Free numbers by their names.
+
+    Args:
+        arm: The design.
+        free: Paths of parameters, with `*` for any text; several tied by "=" have one value;
+            "pose" for the base; "pose.position" and "pose.rotation" for parts of it.
+        prior: Mean and width of what is known of a number, by its name; a width alone is about the
+            value of the design.
+
+    Raises:
+        InvalidInput: A name that no number has, a number that counts something, or a prior that is
+            no width above 0.
+    """
+    if arm.rest.is_straight and any("rest." in name for name in as_names("free", free)):
+        # All arms on the way have a rest shape, were it of the size of rounding.
+        arm = arm.replace(rest=RestShape(curvature_x=_UNSEEN / arm.length))
+    priors = dict(prior or {})
+    numbers = tuple(
+        replace(number, prior=_prior(number, priors.pop(number.name, None)))
+        for number in _each(arm, as_names("free", free))
+    )
+    if priors:
+        allowed = f"of a free number: {', '.join(number.name for number in numbers)}"
+        raise InvalidInput("prior", next(iter(priors)), allowed)
+    names = [number.name for number in numbers]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InvalidInput("free", twice[0], "given once")
+    if not numbers:
+        raise InvalidInput("free", "none", "the name of one or more")
+    return FreeNumbers(arm, numbers)
+
+
+def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
+    known: dict[str, Parameter] | None = None
+    for name in free:
+        if name == "pose" or name.startswith("pose."):
+            yield from _of_pose(arm, name)
+            continue
+        paths = _tied(name)
+        if "*" in name:
+            known = parameters(arm) if known is None else known
+            hits = [key for key in known if fnmatchcase(key, name.replace("[", "[[]"))]
+            if not hits:
+                find_parameters(arm, (name,))
+            for hit in hits:
+                yield _of_parameters(arm, hit, (hit,))
+        else:
+            yield _of_parameters(arm, " = ".join(paths), paths)
+
+
+def _tied(name: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in name.split("="))
+
+
+def _of_parameters(arm: Manipulator, name: str, paths: tuple[str, ...]) -> FreeNumber:
+    found = find_parameters(arm, paths)
+    first = found[paths[0]]
+    if first.whole:
+        raise InvalidInput("free", name, "a number that can change a little: this one counts")
+    if len({parameter.unit for parameter in found.values()}) > 1:
+        raise InvalidInput("free", name, "tied to numbers of the same unit")
+    values = [value for p in found.values() for value in p.values(arm) if math.isfinite(value)]
+    start = float(np.mean(values)) if values else _typical(arm, first.unit)
+    return FreeNumber(
+        name=name,
+        unit=first.unit,
+        start=start,
+        range=first.range,
+        scale=max(0.1 * abs(start), 1e-2 * _typical(arm, first.unit)),
+    )
+
+
+def _typical(arm: Manipulator, unit: str) -> float:
+    """A size of numbers in a unit, for those that are zero."""
+    radius = float(arm.profile.radius(0.0))
+    pulls = [
+        abs(bound)
+        for bounds, own in zip(arm.bounds, arm.bundle_units, strict=True)
+        if own == unit
+        for bound in bounds
+    ]
+    lengths = {"m": radius, "1/m": 1.0 / arm.length, "rad": 1.0, "kg": 0.01, "kg/m³": 1000.0}
+    return lengths.get(unit, max([*pulls, 1e-3]) if unit in ("N", "Pa") else 1.0)
+
+
+def _of_pose(arm: Manipulator, name: str) -> Iterator[FreeNumber]:
+    parts = {"pose": POSE, "pose.position": POSE[:3], "pose.rotation": POSE[3:]}
+    if name not in parts and name not in POSE:
+        allowed = f"one of {', '.join([*parts, *POSE])}"
+        raise InvalidInput("free", name, allowed)
+    for each in parts.get(name, (name,)):
+        axis = POSE.index(each)
+        start = arm.base.position[axis] if axis < 3 else 0.0
+        unit, scale = ("m", 1e-2 * arm.length) if axis < 3 else ("rad", 0.02)
+        yield FreeNumber(name=each, unit=unit, start=start, range=Range(unit=unit), scale=scale)
+
+
+def _moved(base: Base, pose: Mapping[str, float]) -> Base:
+    """The base at another place, and turned in the world about its own place."""
+    place = [pose.get(name, at) for name, at in zip(POSE[:3], base.position, strict=True)]
+    vector = np.array([pose.get(name, 0.0) for name in POSE[3:]])
+    half = 0.5 * float(np.linalg.norm(vector))
+    quaternion = np.append(np.cos(half), 0.5 * np.sinc(half / np.pi) * vector)
+    turned = rotation_matrices(quaternion) @ base.rotation
+    return Base(position=tuple(place), points=turned)  # pyright: ignore[reportArgumentType]
+
+
+def _prior(number: FreeNumber, given: Any) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    values = np.ravel(np.asarray(plain(given), float))
+    mean, width = (number.start, values[0]) if len(values) == 1 else values[:2]
+    if len(values) > 2 or not (0 < width < math.inf and math.isfinite(mean)):
+        raise InvalidInput(f"prior of {number.name}", given, "a width above 0, or (mean, width)")
+    return float(mean), float(width)
+
+
+def _inside(bound: float, is_open: bool, scale: float) -> float:
+    return bound + 1e-6 * scale if is_open and math.isfinite(bound) else bound

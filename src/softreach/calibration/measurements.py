@@ -1,0 +1,366 @@
+"""Measured poses of an arm: a table of inputs and of the places of markers, with units in names."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.support.arguments import as_given
+from softreach.support.errors import InvalidInput, counted, did_you_mean, in_short
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Measurements", "read_measurements"]
+
+Array = NDArray[np.float64]
+
+_SIZES = {
+    "m": ("m", 1.0),
+    "cm": ("m", 1e-2),
+    "mm": ("m", 1e-3),
+    "um": ("m", 1e-6),
+    "in": ("m", 0.0254),
+    "n": ("N", 1.0),
+    "mn": ("N", 1e-3),
+    "kn": ("N", 1e3),
+    "gf": ("N", 9.80665e-3),
+    "pa": ("Pa", 1.0),
+    "kpa": ("Pa", 1e3),
+    "mpa": ("Pa", 1e6),
+    "bar": ("Pa", 1e5),
+    "mbar": ("Pa", 1e2),
+    "psi": ("Pa", 6894.757293168361),
+    "percent": ("1", 1e-2),
+}
+"""Suffixes of columns, in small letters: unit and size in it."""
+
+_RUNS = ("run", "pattern", "group", "trial", "cluster", "sequence")
+_ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")
+_PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNORECASE)
+_MOST_ROWS = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Poses of an arm, one row for each sample."""
+
+    inputs: Array
+    """Inputs of the arm, in their units, shape (n, input)."""
+    places: Array
+    """Markers in the axes of the data [m], NaN where one was not seen, shape (n, marker, 3)."""
+    input_names: tuple[str, ...]
+    """Columns that the inputs were read from; "" for one that stays at 0."""
+    marker_names: tuple[str, ...]
+    """Names of the markers."""
+    runs: NDArray[np.intp]
+    """Number of the run of each sample: those of one run may share errors; shape (n,)."""
+    run_names: tuple[str, ...]
+    """Names of the runs."""
+    order: NDArray[np.intp]
+    """Samples in the order in which they were taken, shape (n,)."""
+    rows: NDArray[np.intp]
+    """Row of each sample in the source, the first below the header being 0; shape (n,)."""
+    source: str = "data"
+    """Name of the file."""
+    digest: str = ""
+    """SHA-256 of all numbers."""
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+    @property
+    def markers(self) -> int:
+        """Number of markers."""
+        return self.places.shape[1]
+
+    @property
+    def has_runs(self) -> bool:
+        """True if the source said which samples belong together."""
+        return len(self.run_names) > 1
+
+    def of(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
+        """Some of them, in the order in which they were taken."""
+        rows = np.arange(len(self))[rows]
+        rank = np.empty(len(self), np.intp)
+        rank[self.order] = np.arange(len(self))
+        return replace(
+            self,
+            inputs=self.inputs[rows],
+            places=self.places[rows],
+            runs=self.runs[rows],
+            order=np.argsort(rank[rows], kind="stable"),
+            rows=self.rows[rows],
+        )
+
+
+def read_measurements(
+    arm: Manipulator,
+    data: Any,
+    *,
+    inputs: Mapping[str, str] | None = None,
+    markers: Mapping[str, str] | None = None,
+    run: str | None = None,
+    order: str | None = None,
+) -> Measurements:
+    """Measured poses of an arm from a table.
+
+    Units stand at the end of the names of columns: `tension1_N`, `q3_mm`, `chamber_kPa`,
+    `marker2_x_mm`, `x1_m`. Inputs are found by the names of those of the arm, or by their unit and
+    order; markers by theirs. A table with one place for each sample and an arm without markers
+    speaks of the tip.
+
+    Args:
+        arm: The design, whose inputs and markers the columns are.
+        data: Path of a CSV or Parquet file, a DataFrame, a dataset of xarray, or a dictionary of
+            columns.
+        inputs: Column of each input by the name of the input, where names do not tell.
+        markers: Start of the columns of each marker by its name, such as {"tip": "disk3"}.
+        run: Column that says which samples belong together; by default `run`, `pattern`, `group`,
+            `trial`, `cluster` or `sequence`, if there is one.
+        order: Column to sort by, in which samples were taken; by default `time_s` or `sample`, or
+            the order of the rows.
+
+    Raises:
+        InvalidInput: No such file, columns that are missing, in no unit that is known or in one
+            that an input does not have, text or NaN among inputs, or no rows.
+    """
+    table, source = _table(data)
+    if not len(table):
+        raise InvalidInput("data", source, "a table with at least one row")
+    if len(table) > _MOST_ROWS:
+        raise InvalidInput("data", f"{len(table):,} rows", f"at most {_MOST_ROWS:,}")
+    columns = [str(name) for name in table.columns]
+    table = table.set_axis(columns, axis=1)
+    run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
+    triples = _triples(columns, {run, order})
+    chosen = _chosen_markers(arm, triples, markers or {})
+    taken = {run, order, *(name for triple in triples.values() for name in triple)}
+    plain = [name for name in columns if name not in taken]
+    sources = _input_columns(arm, plain, inputs or {})
+    values = np.zeros((len(table), arm.inputs))
+    for k, (name, unit) in enumerate(zip(sources, arm.input_units, strict=True)):
+        if name:
+            values[:, k] = _numbers(table, name) * _size(name, unit)
+    if not np.isfinite(values).all():
+        row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
+        raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
+    places = np.stack([_place(table, triples[start]) for start in chosen.values()], axis=1)
+    seen = np.isfinite(places).all(axis=2)
+    if not seen.any():
+        raise InvalidInput("places of markers", "no number", "seen in at least one sample")
+    places[~seen] = np.nan
+    runs, run_names = _runs(table, run)
+    digest = hashlib.sha256(np.ascontiguousarray(np.c_[values, places.reshape(len(values), -1)]))
+    return Measurements(
+        inputs=values,
+        places=places,
+        input_names=tuple(sources),
+        marker_names=tuple(chosen),
+        runs=runs,
+        run_names=run_names,
+        order=_order(table, run, order),
+        rows=np.arange(len(values)),
+        source=source,
+        digest=digest.hexdigest(),
+    )
+
+
+def _table(data: Any) -> tuple[pd.DataFrame, str]:
+    """The data as a table, and a name for it."""
+    import pandas as pd
+
+    if isinstance(data, pd.DataFrame):
+        return data.reset_index(drop=True), "a DataFrame"
+    if isinstance(data, Mapping) and not hasattr(data, "to_dataframe"):
+        try:
+            return pd.DataFrame(dict(data)), "a dictionary"
+        except ValueError as error:
+            raise InvalidInput("data", str(error), "columns of one length") from None
+    if hasattr(data, "to_dataframe"):
+        return data.to_dataframe().reset_index(), "a dataset"
+    if isinstance(data, str | PathLike):
+        return _read(Path(data))
+    raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
+
+
+def _read(path: Path) -> tuple[pd.DataFrame, str]:
+    """The table of a file, and its name."""
+    import pandas as pd
+
+    if not path.is_file():
+        raise InvalidInput("data", str(path), "a file that exists")
+    try:
+        if path.suffix.lower() in (".parquet", ".pq"):
+            return pd.read_parquet(path), path.name
+        return pd.read_csv(path, skipinitialspace=True, comment="#"), path.name
+    except (ValueError, UnicodeDecodeError, OSError, ImportError) as error:
+        text = str(error).splitlines()[0]
+        raise InvalidInput("data", str(path), f"a table in CSV or Parquet: {text}") from None
+
+
+def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:
+    """The column that was asked for, or the first of the usual names."""
+    if given is not None:
+        if given not in columns:
+            raise _missing(what, given, columns)
+        return given
+    by_name = {name.lower(): name for name in columns}
+    return next((by_name[name] for name in usual if name in by_name), None)
+
+
+def _missing(what: str, name: str, columns: list[str]) -> InvalidInput:
+    listed = ", ".join(columns[:12]) + (", ..." if len(columns) > 12 else "")
+    return InvalidInput(what, name, f"a column: {listed}", did_you_mean(name, columns))
+
+
+def _unit(column: str) -> tuple[str, str, float]:
+    """Name without its unit, the SI unit and its size; no unit where none is known."""
+    name, _, suffix = column.rpartition("_")
+    if not (match := re.fullmatch(r"(.*?)\s*[\[(](.*)[\])]", column)) and not name:
+        return column, "", 1.0
+    if match:
+        name, suffix = match[1], match[2]
+    unit = _SIZES.get(suffix.lower())
+    return (column, "", 1.0) if unit is None else (name, *unit)
+
+
+def _triples(columns: list[str], taken: set[str | None]) -> dict[str, list[str]]:
+    """Columns x, y, z of places by the start, or the number, that they share."""
+    found: dict[str, dict[str, str]] = {}
+    for column in columns:
+        name, unit, _ = _unit(column)
+        if column in taken or unit != "m":
+            continue
+        if match := _PLACE.fullmatch(name):
+            start = match["head"].rstrip("_ ") or match["number"]
+            start += match["number"] if match["head"].rstrip("_ ") else ""
+            found.setdefault(start, {})[match["axis"].lower()] = column
+    for start, axes in found.items():
+        if lacking := [axis for axis in "xyz" if axis not in axes]:
+            what = f"columns of {start or 'the place'}"
+            raise InvalidInput(
+                what, ", ".join(axes.values()), f"x, y and z: {lacking[0]} is missing"
+            )
+    if not found:
+        raise InvalidInput(
+            "places of markers", "none", "columns such as x_mm, y_mm, z_mm or marker1_x_mm"
+        )
+    return {start: [axes[axis] for axis in "xyz"] for start, axes in found.items()}
+
+
+def _chosen_markers(
+    arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
+) -> dict[str, str]:
+    """Start of the columns of each marker of the arm."""
+    names = [marker.name for marker in arm.markers] or ["tip"]
+    chosen: dict[str, str] = {}
+    for name, start in given.items():
+        if name not in names:
+            raise InvalidInput("markers", name, f"one of {', '.join(names)}")
+        if start not in triples:
+            raise _missing(f"columns of marker {name}", start, list(triples))
+        chosen[name] = start
+    simple = {_simple(start): start for start in triples}
+    free = [name for name in names if name not in chosen]
+    by_name = {name: simple[_simple(name)] for name in free if _simple(name) in simple}
+    if by_name or given:
+        return {name: (chosen | by_name)[name] for name in names if name in chosen | by_name}
+    if len(names) != len(triples):
+        listed = ", ".join(start or "x, y, z" for start in triples)
+        allowed = f"as many as the arm has: {counted(len(names), 'marker')} ({', '.join(names)})"
+        raise InvalidInput("markers of the data", listed, allowed, "name them by `markers`")
+    return dict(zip(names, triples, strict=True))
+
+
+def _simple(name: str) -> str:
+    return re.sub(r"[\s_\-.]+", "", name).lower()
+
+
+def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:
+    """Column of each input of the arm; "" for one that stays at zero."""
+    chosen: dict[str, str] = {}
+    for name, column in given.items():
+        if name not in arm.input_names:
+            allowed = f"one of {', '.join(arm.input_names)}"
+            raise InvalidInput("inputs", name, allowed, did_you_mean(name, arm.input_names))
+        if column and column not in columns:
+            raise _missing(f"column of {name}", column, columns)
+        chosen[name] = column
+    units = dict(zip(arm.input_names, arm.input_units, strict=True))
+    simple = {_simple(_unit(column)[0]): column for column in columns}
+    for name in arm.input_names:
+        if name not in chosen and _simple(name) in simple:
+            chosen[name] = simple[_simple(name)]
+    left = [name for name in arm.input_names if name not in chosen]
+    for unit in dict.fromkeys(units[name] for name in left):
+        wanting = [name for name in left if units[name] == unit]
+        free = [c for c in columns if c not in chosen.values() and _fits(c, unit)]
+        if len(free) != len(wanting):
+            have = ", ".join(free) or "none"
+            allowed = (
+                f"{counted(len(wanting), 'column')} in {_unit_text(unit)} for {', '.join(wanting)}"
+            )
+            raise InvalidInput("inputs of the data", have, allowed, "name them by `inputs`")
+        chosen |= dict(zip(wanting, free, strict=True))
+    return [chosen[name] for name in arm.input_names]
+
+
+def _fits(column: str, unit: str) -> bool:
+    """True if a column may be an input in this unit; one without a unit is a plain number."""
+    own = _unit(column)[1]
+    return own == unit or (not own and unit not in ("m", "N", "Pa"))
+
+
+def _unit_text(unit: str) -> str:
+    return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
+
+
+def _size(column: str, unit: str) -> float:
+    """Size of a unit of a column in that of an input."""
+    _, own, size = _unit(column)
+    if own and own != unit:
+        raise InvalidInput(f"column {column}", f"in {own}", f"in {_unit_text(unit)}")
+    if not own and unit in ("m", "N", "Pa"):
+        allowed = f"a name that ends in its unit, such as {column}_{'mm' if unit == 'm' else unit}"
+        raise InvalidInput("column", column, allowed)
+    return size
+
+
+def _numbers(table: pd.DataFrame, column: str) -> Array:
+    try:
+        return table[column].to_numpy(float)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(f"column {column}", in_short(str(error)), "numbers") from None
+
+
+def _place(table: pd.DataFrame, columns: list[str]) -> Array:
+    return np.stack([_numbers(table, name) * _unit(name)[2] for name in columns], axis=1)
+
+
+def _runs(table: pd.DataFrame, column: str | None) -> tuple[NDArray[np.intp], tuple[str, ...]]:
+    if column is None:
+        return np.zeros(len(table), np.intp), ("all",)
+    names, numbers = np.unique(table[column].astype(str).to_numpy(str), return_inverse=True)
+    return numbers.astype(np.intp), tuple(names.tolist())
+
+
+def _order(table: pd.DataFrame, run: str | None, order: str | None) -> NDArray[np.intp]:
+    """Samples in the order in which they were taken: run by run, as the file has them."""
+    if order is None or table[order].dtype.kind not in "iuf":  # names of samples say nothing
+        return np.arange(len(table))
+    keys = _numbers(table, order)
+    if run is None:
+        return np.argsort(keys, kind="stable").astype(np.intp)
+    first = {name: k for k, name in reversed(list(enumerate(table[run].astype(str))))}
+    place = np.array([first[name] for name in table[run].astype(str)])
+    return np.lexsort((keys, place)).astype(np.intp)

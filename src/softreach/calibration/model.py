@@ -1,0 +1,348 @@
+"""Predicted places of markers and their exact derivatives by the free numbers of an arm.
+
+Tables are differentiated by differences of fourth order, which are good to ten digits and cost no
+equilibrium; all that follows from them, how the arm moves, is the linear response of the rod.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.base import Base
+from softreach.arm.driving import Driving, body_of
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tensions import LengthLaw
+from softreach.calibration.free_numbers import FreeNumbers
+from softreach.calibration.measurements import Measurements
+from softreach.rod.arm_rod import ArmRod
+from softreach.rod.free import FreeRod
+from softreach.rod.loaded.pulled import LoadedLengths
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.response import (
+    NodeTables,
+    RodState,
+    StepGrid,
+    dead_force,
+    linear_response,
+    node_tables,
+    payload_weight,
+    rod_state,
+    step_grid,
+)
+from softreach.rod.tip_map import TipStatus
+from softreach.support import parallel
+
+__all__ = ["MarkerModel", "Prediction", "marker_stations"]
+
+Array = NDArray[np.float64]
+
+_BLOCK = 1024
+"""Samples at once: their shapes at all nodes are kept."""
+_TOL = 1e-6
+_STEPS = 24
+
+
+class Prediction(NamedTuple):
+    """Predicted places of the markers of all samples."""
+
+    places: Array
+    """In the world [m], NaN without an equilibrium, shape (n, marker, 3)."""
+    slopes: Array | None
+    """Derivatives by the free numbers, shape (n, marker, 3, number)."""
+    status: NDArray[np.int8]
+    """`TipStatus`, shape (n,)."""
+
+
+class _Explicit(NamedTuple):
+    """All that an arm says without its equilibrium."""
+
+    table: NodeTables
+    rotation: Array
+    position: Array
+    offsets: Array
+    bundles: Array
+    """Activations of all bundles, displacements among them, (n, bundle)."""
+    taut_from: Array
+    compliance: Array
+    measures: Array
+    """M and N of tendons that are driven by length at the nodes, (step, 3, 4, tendon)."""
+    rest: Array
+    """û at rest at the nodes, (step, 3, 3)."""
+
+
+def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
+    """Stations Z [m] of the markers of an arm, and their offsets in the directors [m].
+
+    An arm without markers has one at its tip.
+    """
+    if not arm.markers:
+        return np.array([arm.length]), np.zeros((1, 3))
+    places = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
+    return places, np.array([marker.offset for marker in arm.markers])
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerModel:
+    """Markers of an arm as functions of its free numbers, at given inputs."""
+
+    free: FreeNumbers
+    inputs: Array
+    """Shape (n, input)."""
+    markers: NDArray[np.intp]
+    """Those of the arm's markers that were measured."""
+
+    @classmethod
+    def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
+        """The model of measured poses."""
+        names = [marker.name for marker in free.arm.markers] or ["tip"]
+        return cls(free, data.inputs, np.array([names.index(name) for name in data.marker_names]))
+
+    def predict(self, values: Array, *, slopes: bool = False) -> Prediction:
+        """Places of the markers, and their derivatives if asked for.
+
+        Raises:
+            InvalidDesign: No such arm can exist.
+        """
+        return self.of_arm(self.free.made(values), values if slopes else None)
+
+    def of_arm(self, arm: Manipulator, values: Array | None = None) -> Prediction:
+        """Places of the markers of an arm that has these values."""
+        grid = self._grid(arm)
+        neighbors: list[list[tuple[float, Manipulator | Base]]] = []
+        if values is not None:
+            neighbors = [self._neighbors(values, k) for k in range(len(self.free))]
+        blocks = [
+            self._block(arm, neighbors, grid, rows, values is not None)
+            for rows in parallel.blocks(len(self.inputs), _BLOCK)
+        ]
+        places, slopes, status = zip(*blocks, strict=True)
+        return Prediction(
+            np.concatenate(places),
+            None if values is None else np.concatenate([s for s in slopes if s is not None]),
+            np.concatenate(status),
+        )
+
+    def _neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator | Base]]:
+        if self.free.moves_base(k):
+            return [*self.free.base_neighbors(values, k)]
+        return [*self.free.neighbors(values, k)]
+
+    def _grid(self, arm: Manipulator) -> StepGrid:
+        stations, _ = marker_stations(arm)
+        return step_grid(body_of(arm), stations[self.markers], _STEPS)
+
+    def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
+        stations, offsets = marker_stations(arm)
+        body, law = body_of(arm), LengthLaw(body_of(arm))
+        table = node_tables(body, stations[self.markers], grid)
+        columns = law.columns
+        stiffness = np.zeros((*table.length.shape, 4))
+        if len(columns):
+            k = arm.section.stiffness_at(arm.profile, table.stations)
+            stiffness = np.stack([k.bending, k.bending, k.torsion, k.axial], axis=-1)
+        measures = np.concatenate(
+            [table.curvature[..., columns], table.extension[:, :, None, columns]], axis=2
+        )
+        rest = table.curvature[..., arm.bundles :].sum(axis=-1)
+        return _Explicit(
+            table,
+            arm.base.rotation,
+            np.array(arm.base.position),
+            offsets[self.markers],
+            Driving(arm).bundles(inputs),
+            law.taut_from,
+            law.compliance,
+            measures * stiffness[..., None],
+            rest,
+        )
+
+    def _block(
+        self,
+        arm: Manipulator,
+        neighbors: list[list[tuple[float, Manipulator | Base]]],
+        grid: StepGrid,
+        rows: slice,
+        slopes: bool,
+    ) -> tuple[Array, Array | None, NDArray[np.int8]]:
+        inputs = self.inputs[rows]
+        at = self._explicit(arm, grid, inputs)
+        rod = _rod(arm, grid)
+        gamma = _activations(arm, rod, at.bundles)
+        lost = ~np.isfinite(gamma).all(axis=1)
+        gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
+        state = rod_state(rod, gamma, at.table)
+        state.status[lost] = TipStatus.NO_EQUILIBRIUM
+        places = _places(at, state)
+        places[lost] = np.nan
+        if not slopes:
+            return places, None, state.status
+        known = np.isfinite(places).all(axis=(1, 2))
+        changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
+        result = np.full((*places.shape, len(changes)), np.nan)
+        result[known] = _slopes(rod.arm, at, _some(state, known), changes, known)
+        return places, result, state.status
+
+    def _change(
+        self,
+        arm: Manipulator,
+        at: _Explicit,
+        neighbors: list[tuple[float, Manipulator | Base]],
+        grid: StepGrid,
+        inputs: Array,
+    ) -> _Explicit:
+        """Derivative of all that is explicit by one number."""
+        factors = [factor for factor, _ in neighbors]
+        each = [
+            self._explicit(other, grid, inputs)
+            if isinstance(other, Manipulator)
+            else _on_base(arm, at, other)
+            for _, other in neighbors
+        ]
+        table = each[0].table.combined([one.table for one in each], factors)
+        others = (
+            sum(f * values for f, values in zip(factors, columns, strict=True))
+            for columns in zip(*(one[1:] for one in each), strict=True)
+        )
+        return _Explicit(table, *others)
+
+
+def _on_base(arm: Manipulator, at: _Explicit, base: Base) -> _Explicit:
+    """The same on another base: gravity alone is another one in its frame."""
+    table = at.table
+    force = dead_force(arm, base, table.stations, table.length)
+    return at._replace(
+        table=replace(table, force=force, weight=payload_weight(arm, base)),
+        rotation=base.rotation,
+        position=np.array(base.position),
+    )
+
+
+def _rod(arm: Manipulator, grid: StepGrid) -> ArmRod:
+    """The rod of an inner arm in as many steps as the grid has, whatever its bounds."""
+    body = body_of(arm)
+    bounds = body.bounds * 0.0
+    bounds[arm.bundles :] = 1.0
+    inner = body.with_bounds(bounds)
+    rod = (FreeRod if arm.loads is None else LoadedRod)(inner, _TOL)
+    return rod.in_steps(int(grid.counts.sum()))
+
+
+def _activations(arm: Manipulator, rod: ArmRod, bundles: Array) -> Array:
+    """Activations of the inner arm: tensions in place of displacements."""
+    law = LengthLaw(body_of(arm))
+    if not len(law.columns):
+        return bundles
+    lengths = law if arm.loads is None else LoadedLengths(law, rod)
+    return law.inner(bundles, lengths.tensions(bundles).tension)
+
+
+def _some(state: RodState, rows: NDArray[np.bool_]) -> RodState:
+    values = (getattr(state, name)[rows] for name in RodState.__dataclass_fields__)
+    return RodState(*values)
+
+
+def _places(at: _Explicit, state: RodState) -> Array:
+    """p + R (r + offset in the directors)."""
+    return at.position + _beyond(at, state)[1] @ at.rotation.T
+
+
+def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:
+    """Offsets in the frame of the base, and places there, (n, marker, 3) each."""
+    offset = np.einsum("mk,nmka->nma", at.offsets, state.asked_directors)
+    return offset, state.position + offset
+
+
+def _slopes(
+    arm: Manipulator,
+    at: _Explicit,
+    state: RodState,
+    changes: list[_Explicit],
+    rows: NDArray[np.bool_],
+) -> Array:
+    """Derivatives of the places by all numbers, (n, marker, 3, number)."""
+    bundles = state.gamma.shape[1]
+    tables = [change.table for change in changes]
+    response = linear_response(at.table, state, tables, at.measures)
+    driven = np.stack([change.bundles[rows] for change in changes], axis=-1)
+    if at.measures.shape[-1]:
+        driven = _with_tensions(arm, at, state, changes, driven, response.works)
+    moves = response.moves[..., bundles:] + _products(response.moves[..., :bundles], driven)
+    turns = response.turns[..., bundles:] + _products(response.turns[..., :bundles], driven)
+    offset, place = _beyond(at, state)
+    slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
+    for k, change in enumerate(changes):
+        slopes[..., k] += np.einsum("mk,nmka->nma", change.offsets, state.asked_directors)
+    slopes = np.einsum("ab,nmbk->nmak", at.rotation, slopes)
+    for k, change in enumerate(changes):
+        slopes[..., k] += change.position + place @ change.rotation.T
+    return slopes
+
+
+def _products(by_activation: Array, driven: Array) -> Array:
+    return np.einsum("nmaj,njk->nmak", by_activation, driven)
+
+
+def _with_tensions(
+    arm: Manipulator,
+    at: _Explicit,
+    state: RodState,
+    changes: list[_Explicit],
+    driven: Array,
+    works: Array,
+) -> Array:
+    """Derivatives of activations with those of tensions in place of displacements.
+
+    A taut tendon keeps s + τ/k = q - taut_from, with s the work of its tension on the strains.
+    """
+    law = LengthLaw(arm)
+    columns, bundles = law.columns, state.gamma.shape[1]
+    tension = state.gamma[:, columns]
+    bend, rise = _strains(at, state)
+    own = [
+        _explicit_shortening(at, change, bend, rise)
+        + tension * change.compliance
+        + change.taut_from
+        for change in changes
+    ]
+    wanted = driven[:, columns] - np.stack(own, axis=-1) - works[..., bundles:]
+    others = driven.copy()
+    others[:, columns] = 0.0
+    wanted -= np.einsum("ntj,njk->ntk", works[..., :bundles], others)
+    matrix = works[..., columns] + np.diag(at.compliance)
+    taut = tension > 0
+    both = taut[:, :, None] & taut[:, None, :]
+    matrix = np.where(both, matrix, np.eye(len(columns)))
+    others[:, columns] = np.linalg.solve(matrix, wanted * taut[..., None])
+    return others
+
+
+def _strains(at: _Explicit, state: RodState) -> tuple[Array, Array]:
+    """ω dZ (n, step, 3, 3) and (ζ - 1) dZ (n, step, 3) at the nodes."""
+    table, gamma = at.table, state.gamma
+    growth = table.length * (1.0 + np.einsum("kij,nj->nki", table.growth, gamma))
+    bend = np.einsum("kicj,nj->nkic", table.curvature, gamma)
+    bend = growth[..., None] * (bend + table.compliance[..., 1:] * state.moment)
+    thrust = np.einsum("nkic,kic->nki", state.directors[..., 2, :], table.force)
+    rise = table.length * np.einsum("kij,nj->nki", table.extension, gamma)
+    return bend, rise + growth * table.compliance[..., 0] * thrust
+
+
+def _explicit_shortening(at: _Explicit, change: _Explicit, bend: Array, rise: Array) -> Array:
+    """Change of s at the same strains, (n, tendon): theory of `LengthLaw`."""
+    from softreach.kernels.rod.linear_response import WEIGHTS
+
+    weights, turn, force = WEIGHTS, at.measures[:, :, :3], at.measures[:, :, 3]
+    new_turn, new_force = change.measures[:, :, :3], change.measures[:, :, 3]
+    length, grown = at.table.length[..., None], change.table.length
+    bent = bend - (length * at.rest)[None]
+    moved = length * change.rest + grown[..., None] * at.rest
+    return (
+        np.einsum("i,kict,nkic->nt", weights, new_turn, bent)
+        + np.einsum("i,kit,nki->nt", weights, new_force, rise)
+        - np.einsum("i,kit,ki->t", weights, force, grown)
+        - np.einsum("i,kict,kic->t", weights, turn, moved)
+    )

@@ -1,0 +1,198 @@
+"""Tendons driven by length on an arm under loads: tensions by Newton steps on the active set.
+
+Under loads the shortening s of the paths is no longer linear in the tensions τ. Each step solves
+the complementarity problem of s linearized; its slopes begin as those of the arm without loads and
+are corrected by what each step shows (BFGS), which keeps them symmetric and positive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.tables import quadrature
+from softreach.arm.tensions import LengthLaw, Tensions
+from softreach.rod.tip_map import TipMap
+from softreach.support import parallel
+
+__all__ = ["LoadedLengths"]
+
+Array = NDArray[np.float64]
+
+_BLOCK = 256
+_PIECES = 8  # of the arm, on which its strains are smooth
+_MOST_STEPS = 40
+_CONVERGED = 1e-11  # of the length
+_HALVINGS = 6
+_DIFFERENCE = 1e-4  # of the widest range, for derivatives
+
+
+class _State(NamedTuple):
+    """Tensions on their way, for some samples."""
+
+    tension: Array
+    """τ [N], shape (n, tendon)."""
+    shortening: Array
+    """s [m], shape (n, tendon)."""
+    slopes: Array
+    """Estimate of ∂s/∂τ [m/N], shape (n, tendon, tendon)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedLengths:
+    """Tensions, and their slopes, of tendons driven by length under loads."""
+
+    law: LengthLaw
+    """That of the arm without loads."""
+    rod: TipMap
+    """The map of the inner arm under loads, accurate enough for s."""
+
+    @cached_property
+    def shortening(self) -> Callable[[Array], Array]:
+        """s [m] as a function of activations with tensions; NaN without an equilibrium."""
+        turns = [abs(getattr(each, "revolution", 0.0)) for each in self.law.arm.actuators]
+        z, weights, _ = quadrature(self.law.arm, _PIECES + int(max(turns)))
+        force, moment = self.law.loads_at(z, weights)
+        moment, at_rest = moment.reshape(-1, len(self.law.columns)), self.law.at_rest
+        strains_at = self.rod.strains_at(z)
+
+        def shortening(inner: Array) -> Array:
+            strains = strains_at(inner)
+            turn = (strains.curvature * strains.extension[..., None]).reshape(len(inner), 1, -1)
+            # One product for each sample, so that none depends on those beside it.
+            work = np.matmul(strains.extension[:, None] - 1.0, force) + np.matmul(turn, moment)
+            return work[:, 0] - at_rest
+
+        return shortening
+
+    def tensions(self, bundles: Array) -> Tensions:
+        """Tensions at activations with displacements, shape (n, bundles); NaN where none is found.
+
+        Blocks of samples are independent of each other.
+        """
+        tension = np.empty((len(bundles), len(self.law.columns)))
+        taut = np.empty(tension.shape, bool)
+
+        def fill(block: slice) -> None:
+            tension[block], taut[block] = self._of_block(bundles[block])
+
+        parallel.run(
+            (lambda block=block: fill(block)) for block in parallel.blocks(len(bundles), _BLOCK)
+        )
+        return Tensions(tension, taut)
+
+    def _of_block(self, bundles: Array) -> Tensions:
+        law, n = self.law, len(bundles)
+        pulled = bundles[:, law.columns] - law.taut_from
+        start = law.tensions(bundles)
+        tension, taut = np.full_like(start.tension, np.nan), start.is_taut.copy()
+        inner = law.inner(bundles, start.tension)
+        slopes = np.broadcast_to(
+            law.shortening_slopes(inner)[..., law.columns], (n, *law.compliance.shape * 2)
+        )
+        rows = np.arange(n)
+        state = _State(start.tension, self.shortening(inner), slopes.copy())
+        state, rows = self._lowered(state, rows, bundles)
+        for _ in range(_MOST_STEPS):
+            if not len(rows):
+                break
+            aim = self._aimed(state, pulled[rows])
+            open_ = ~self._is_solved(state, pulled[rows])
+            tension[rows[~open_]], taut[rows[~open_]] = (
+                state.tension[~open_],
+                aim.is_taut[~open_],
+            )
+            rows, state, aimed = rows[open_], _rows(state, open_), aim.tension[open_]
+            state, kept = self._stepped(state, aimed, bundles[rows])
+            rows, state = rows[kept], _rows(state, kept)
+        return Tensions(tension, taut)
+
+    def _lowered(
+        self, state: _State, rows: NDArray[np.intp], bundles: Array
+    ) -> tuple[_State, NDArray[np.intp]]:
+        """Tensions that have an equilibrium to start with: less and less of the first ones."""
+        for _ in range(_HALVINGS):
+            lost = np.flatnonzero(_has_nan(state.shortening))
+            if not len(lost):
+                return state, rows
+            state.tension[lost] *= 0.5
+            inner = self.law.inner(bundles[rows[lost]], state.tension[lost])
+            state.shortening[lost] = self.shortening(inner)
+        kept = ~_has_nan(state.shortening)
+        return _rows(state, kept), rows[kept]
+
+    def _aimed(self, state: _State, pulled: Array) -> Tensions:
+        """Tensions of the complementarity problem of s linearized."""
+        excess = pulled - state.shortening
+        excess += np.einsum("nij,nj->ni", state.slopes, state.tension)
+        return self.law.complementary(state.slopes + np.diag(self.law.compliance), excess)
+
+    def _is_solved(self, state: _State, pulled: Array) -> NDArray[np.bool_]:
+        """Samples whose tendons are as long as they are to be, or slack."""
+        law = self.law
+        left = state.tension * law.compliance + state.shortening - pulled
+        own = np.diagonal(state.slopes, axis1=1, axis2=2) + law.compliance
+        miss = np.abs(np.minimum(left, own * state.tension)).max(axis=1)
+        return miss <= _CONVERGED * law.arm.length
+
+    def _stepped(
+        self, state: _State, aimed: Array, bundles: Array
+    ) -> tuple[_State, NDArray[np.bool_]]:
+        """The state after a step, halved where it has no equilibrium, and where there is one."""
+        step = aimed - state.tension
+        shortening = np.full_like(state.shortening, np.nan)
+        todo = np.flatnonzero(np.isfinite(step).all(axis=1))
+        for _ in range(_HALVINGS):
+            if not len(todo):
+                break
+            inner = self.law.inner(bundles[todo], state.tension[todo] + step[todo])
+            shortening[todo] = self.shortening(inner)
+            todo = todo[_has_nan(shortening[todo])]
+            step[todo] *= 0.5
+        slopes = _corrected(state.slopes, step, shortening - state.shortening)
+        after = _State(state.tension + step, shortening, slopes)
+        return after, ~_has_nan(shortening)
+
+    def slopes(self, inner: Array) -> Array:
+        """∂s/∂γ at activations with tensions, by central differences, (n, tendon, bundle)."""
+        n, count = inner.shape
+        slopes = np.zeros((n, len(self.law.columns), count))
+        widths = _DIFFERENCE * self.rod.box.widths
+        for k in np.flatnonzero(widths > 0):
+            ends = [inner.copy(), inner.copy()]
+            ends[0][:, k] -= widths[k]
+            ends[1][:, k] += widths[k]
+            s = [self._in_blocks(each) for each in ends]
+            slopes[..., k] = (s[1] - s[0]) / (2.0 * widths[k])
+        return slopes
+
+    def _in_blocks(self, inner: Array) -> Array:
+        blocks = parallel.blocks(len(inner), _BLOCK)
+        none = np.empty((0, len(self.law.columns)))
+        return np.concatenate([none, *(self.shortening(inner[block]) for block in blocks)])
+
+
+def _rows(state: _State, chosen: NDArray[np.bool_]) -> _State:
+    return _State(*(values[chosen] for values in state))
+
+
+def _has_nan(values: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.isnan(values).any(axis=1))
+
+
+def _corrected(slopes: Array, step: Array, change: Array) -> Array:
+    """Slopes that explain a change after a step, else as they were (BFGS); those of NaN stay."""
+    along = np.einsum("nij,nj->ni", slopes, step)
+    expected, seen = (step * along).sum(axis=1), (step * change).sum(axis=1)
+    good = (expected > 0.0) & (seen > 0.1 * expected)
+    corrected = slopes.copy()
+    for values, size, sign in ((along, expected, -1.0), (change, seen, 1.0)):
+        chosen = values[good]
+        squares = chosen[:, :, None] * chosen[:, None, :]
+        corrected[good] += sign * squares / size[good, None, None]
+    return corrected

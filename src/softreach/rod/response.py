@@ -1,0 +1,419 @@
+"""Linear response of an arm in equilibrium: how places move when its tables change a little.
+
+Tables are those of the steps between all places where the arm is not smooth or is asked for. Each
+node stays at its share of its step while the arm changes, so that steps grow with the arm and no
+actuator ends inside one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.base import Base
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.rigid import RigidPiece
+from softreach.arm.tables import compliance, tables
+from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
+from softreach.rod.arm_rod import ArmRod
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.support import parallel
+from softreach.support.errors import InvalidInput
+
+__all__ = [
+    "NodeTables",
+    "Response",
+    "RodState",
+    "StepGrid",
+    "dead_force",
+    "linear_response",
+    "node_tables",
+    "payload_weight",
+    "rod_state",
+    "step_grid",
+]
+
+Array = NDArray[np.float64]
+
+_TOGETHER = 64
+"""Samples to a task."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepGrid:
+    """Steps of an arm between the places where something begins or ends."""
+
+    counts: NDArray[np.intp]
+    """Steps between neighbors of these places, in their order along the arm."""
+    stations: int
+    """Number of stations that are asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodeTables:
+    """Tables of an arm at the nodes of its steps, base first."""
+
+    stations: Array
+    """Z [m], shape (step, 3)."""
+    length: Array
+    """dZ [m], shape (step, 3)."""
+    extension: Array
+    """z per activation [-], shape (step, 3, bundle)."""
+    growth: Array
+    """Its part in η, likewise."""
+    curvature: Array
+    """U [1/m], shape (step, 3, 3, bundle)."""
+    compliance: Array
+    """1/K0, 1/K1, 1/K1, 1/K3, shape (step, 3, 4); zero without loads."""
+    force: Array
+    """Dead force n in the frame of the base [N], shape (step, 3, 3)."""
+    lever: Array
+    """Of the payload in the directors of the tip [m], shape (3,)."""
+    weight: Array
+    """Force of the payload in the frame of the base [N], shape (3,)."""
+    asked: Array
+    """Z of the stations that were asked for [m], shape (station,)."""
+
+    def combined(self, others: list[Self], factors: list[float]) -> Self:
+        """Σ factor x other, of differences."""
+        values: dict[str, Any] = {
+            field.name: sum(
+                f * getattr(o, field.name) for f, o in zip(factors, others, strict=True)
+            )
+            for field in fields(self)
+        }
+        return type(self)(**values)
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Changes of places per unit of each column, in the frame of the base."""
+
+    moves: Array
+    """ρ of the centerline [m], shape (n, station, 3, column)."""
+    turns: Array
+    """θ of the section [rad], likewise."""
+    works: Array
+    """Work of the measures, shape (n, work, column)."""
+
+
+def _places(arm: Manipulator, stations: Array) -> Array:
+    """All places where something begins or ends [m], unsorted, with repetitions.
+
+    An actuator that ends at the tip has its own place there, so that it may end before.
+    """
+    profile = arm.profile
+    breaks = [z for actuator in arm.actuators for z in actuator.breakpoints(profile)]
+    breaks += [arm.length * x for x in arm.section.breaks]
+    spans = [*arm.actuators, *arm.rigid_pieces]
+    ends = [(a.station_at("start", arm.length), a.station_at("end", arm.length)) for a in spans]
+    breaks += [z for piece in arm.rigid_pieces for z in _inside(piece, arm.length)]
+    breaks += [0.0 for start, _ in ends if start <= 0.0]
+    breaks += [arm.length for _, end in ends if end >= arm.length]
+    points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
+    return np.array([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
+
+
+def _inside(piece: RigidPiece, length: float) -> list[float]:
+    """Ends of a rigid piece between base and tip [m]."""
+    ends = piece.station_at("start", length), piece.station_at("end", length)
+    return [z for z in ends if 0.0 < z < length]
+
+
+def step_grid(arm: Manipulator, stations: Array, steps: int) -> StepGrid:
+    """Steps of an inner arm, none longer in S than so many even ones.
+
+    Args:
+        arm: The inner arm.
+        stations: Z that are asked for [m], in any order.
+        steps: Even steps; a step should not turn the arm by much more than a third of a radian.
+    """
+    s = arm.profile.slender_coordinate(np.sort(_places(arm, stations)))
+    counts = np.ceil(np.diff(s) / arm.profile.slender_length * steps - 1e-9)
+    return StepGrid(np.maximum(counts, 1).astype(np.intp), len(stations))
+
+
+def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables:
+    """Tables of an inner arm at the nodes of its steps.
+
+    Raises:
+        InvalidInput: Loads other than gravity, a payload and dead forces; or more or fewer places
+            than the grid was made for.
+    """
+    profile = arm.profile
+    s = profile.slender_coordinate(np.sort(_places(arm, stations)))
+    if len(s) != len(grid.counts) + 1:
+        raise InvalidInput("breakpoints of the arm", len(s) - 1, f"{len(grid.counts)} as before")
+    width = np.repeat(np.diff(s) / grid.counts, grid.counts)
+    first = np.concatenate(
+        [a + d / n * np.arange(n) for a, d, n in zip(s, np.diff(s), grid.counts, strict=False)]
+    )
+    at = first[:, None] + width[:, None] * NODES
+    z = profile.station(at)
+    # Steps without length stand where something ends: the inside of the arm decides.
+    length = width[:, None] * profile.radius(z)
+    table = tables(arm, z.ravel())
+    soft = np.zeros((*z.shape, 4))
+    if arm.loads is not None:
+        axial, bending, torsion = (c.reshape(z.shape) for c in compliance(arm, z.ravel()))
+        soft = np.stack([axial, bending, bending, torsion], axis=-1)
+    shape, bundles = z.shape, arm.bundles
+    return NodeTables(
+        stations=z,
+        length=length,
+        extension=table.extension.reshape(*shape, bundles),
+        growth=table.growth.reshape(*shape, bundles),
+        curvature=table.curvature.reshape(*shape, 3, bundles),
+        compliance=soft,
+        force=dead_force(arm, arm.base, z, length),
+        lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
+        weight=payload_weight(arm, arm.base),
+        asked=np.asarray(stations, float),
+    )
+
+
+def payload_weight(arm: Manipulator, base: Base) -> Array:
+    """Force of the payload in the frame of a base [N], shape (3,)."""
+    if arm.loads is None:
+        return np.zeros(3)
+    return arm.loads.payload * np.array(arm.loads.seen_from(base).gravity)
+
+
+def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
+    """n [N] at the nodes in the frame of a base, shape (step, 3, 3): dead forces beyond, (60).
+
+    Args:
+        arm: The arm, wherever its own base is.
+        base: Pose of the base.
+        z: Z of the nodes [m], shape (step, 3).
+        length: dZ there [m], likewise.
+    """
+    if arm.loads is None:
+        return np.zeros((*z.shape, 3))
+    loads = arm.loads.seen_from(base)
+    others = [loads.follower_force, loads.follower_moment, loads.tip_moment]
+    others += [load.moment for load in loads.point_loads]
+    if any(map(any, others)):
+        allowed = "gravity, a payload and dead forces: moments and forces that follow have none"
+        raise InvalidInput("loads", "others", allowed)
+    gravity = np.array(loads.gravity)
+    mass = np.zeros(z.shape)
+    if gravity.any():
+        mass = arm.section.mass_per_length_at(arm.profile, z) * length
+    steps = mass @ WEIGHTS
+    beyond = np.cumsum(steps[::-1])[::-1] - steps
+    beyond = beyond[:, None] + (steps[:, None] - mass @ GAUSS.T)
+    force = (loads.payload + beyond)[..., None] * gravity + np.array(loads.tip_force)
+    force = force + (arm.length - z)[..., None] * np.array(loads.force_per_length)
+    for load in loads.point_loads:
+        force = force + np.where((z < load.station)[..., None], np.array(load.force), 0.0)
+    return force
+
+
+@dataclass(frozen=True, eq=False)
+class RodState:
+    """Shapes of one arm in equilibrium at the nodes of its steps, in the frame of the base."""
+
+    gamma: Array
+    """Activations of the inner arm, shape (n, bundle)."""
+    directors: Array
+    """d1, d2, d3 as rows at the nodes, shape (n, step, 3, 3, 3)."""
+    moment: Array
+    """m in the directors [N m], shape (n, step, 3, 3)."""
+    position: Array
+    """r at the stations that are asked for [m], shape (n, station, 3)."""
+    asked_directors: Array
+    """Directors there, shape (n, station, 3, 3)."""
+    tip_directors: Array
+    """Directors of the tips, shape (n, 3, 3)."""
+    status: NDArray[np.int8]
+    """`TipStatus`, shape (n,)."""
+
+
+def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
+    """Equilibria of a rod at activations of its arm, at the nodes of its tables."""
+    z = np.concatenate([table.stations.ravel(), table.asked, [rod.length]])
+    order = np.argsort(z, kind="stable")
+    back = np.empty_like(order)
+    back[order] = np.arange(len(z))
+    status = np.zeros(len(gamma), np.int8)
+    ascending = np.clip(z[order], 0.0, rod.length)
+    if isinstance(rod, LoadedRod):
+        shapes = rod.shapes(gamma, ascending, status)
+        frames, moment = shapes.frames, shapes.moment[:, back]
+    else:
+        frames = rod.frames(gamma, ascending, status)
+        moment = np.zeros((len(gamma), len(z), 3))
+    position, directors = frames.position[:, back], frames.directors[:, back]
+    steps, count, asked = table.stations.shape[0], table.stations.size, len(table.asked)
+    return RodState(
+        gamma,
+        directors[:, :count].reshape(-1, steps, 3, 3, 3),
+        moment[:, :count].reshape(-1, steps, 3, 3),
+        position[:, count : count + asked],
+        directors[:, count : count + asked],
+        directors[:, -1],
+        status,
+    )
+
+
+def linear_response(
+    table: NodeTables,
+    state: RodState,
+    changes: list[NodeTables],
+    measures: Array | None = None,
+) -> Response:
+    """Movements of equilibria per unit of each activation and of each change of the tables.
+
+    Args:
+        table: Tables of the inner arm at the nodes.
+        state: Its equilibria.
+        changes: Changes of the tables, one for each column after those of the activations.
+        measures: M and N at the nodes whose work is asked for, shape (step, 3, 4, work).
+    """
+    n, bundles = state.gamma.shape
+    if measures is None:
+        measures = np.zeros((*table.length.shape, 4, 0))
+    job = _Job(
+        table,
+        state,
+        _at_rest_and_per_activation(table, changes),
+        np.ascontiguousarray(measures),
+        np.einsum("c,nca->na", table.lever, state.tip_directors),
+        _tipping(table, state, changes),
+        np.searchsorted(table.stations[:, 1], np.sort(table.asked)),
+    )
+    asked, columns = len(table.asked), bundles + len(changes)
+    moves, turns = np.zeros((2, n, asked, 3, columns))
+    works = np.zeros((n, measures.shape[-1], columns))
+    parallel.run(
+        partial(job.respond, block, moves, turns, works) for block in parallel.blocks(n, _TOGETHER)
+    )
+    back = np.argsort(np.argsort(table.asked, kind="stable"), kind="stable")
+    return Response(moves[:, back], turns[:, back], works)
+
+
+def _tipping(table: NodeTables, state: RodState, changes: list[NodeTables]) -> Array:
+    """Change of the moment of the payload at the same directors, (n, 3, column)."""
+    n, bundles = state.gamma.shape
+    result = np.zeros((n, 3, bundles + len(changes)))
+    arm = np.einsum("c,nca->na", table.lever, state.tip_directors)
+    for k, change in enumerate(changes):
+        moved = np.einsum("c,nca->na", change.lever, state.tip_directors)
+        tipping = np.cross(arm, change.weight) + np.cross(moved, table.weight)
+        result[..., bundles + k] = tipping
+    return result
+
+
+class _Changes(NamedTuple):
+    """Changes of tables: rows of columns; the last place of a product is its value at rest."""
+
+    stretch: Array
+    """Of ζ̂ dZ, shape (step, 3, column, bundle + 1)."""
+    growth: Array
+    """Of η dZ, likewise."""
+    curvature: Array
+    """Of U, shape (step, 3, 3, column, bundle)."""
+    compliance: Array
+    """Shape (step, 3, 4, column)."""
+    force: Array
+    """Shape (step, 3, 3, column)."""
+
+
+def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) -> _Changes:
+    def stacked(name: str, axis: int) -> Array:
+        whole = getattr(table, name)
+        if not changes:
+            return np.zeros(np.insert(np.array(whole.shape), whole.ndim + axis + 1, 0))
+        return np.stack([getattr(change, name) for change in changes], axis=axis)
+
+    length = stacked("length", -1)[..., None]
+    each = table.length[..., None, None]
+
+    def product(name: str) -> Array:
+        by = length * getattr(table, name)[:, :, None] + each * stacked(name, -2)
+        return np.concatenate([by, length], axis=-1)
+
+    return _Changes(
+        product("extension"),
+        product("growth"),
+        stacked("curvature", -2),
+        stacked("compliance", -1),
+        stacked("force", -1),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """Everything that the response of a sample needs."""
+
+    table: NodeTables
+    state: RodState
+    changes: _Changes
+    measures: Array
+    lever: Array
+    tipping: Array
+    marks: NDArray[np.intp]
+
+    def respond(self, rows: slice, moves: Array, turns: Array, works: Array) -> None:
+        """Put the response of some samples into place."""
+        for row in range(rows.start, rows.stop):
+            self._respond(row, moves[row], turns[row], works[row])
+
+    def _respond(self, row: int, moves: Array, turns: Array, works: Array) -> None:
+        table, change = self.table, self.changes
+        gamma, d = self.state.gamma[row], self.state.directors[row]
+        moment, length = self.state.moment[row], table.length
+        whole = np.append(gamma, 1.0)
+        axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
+        squeeze = axial * np.einsum("kic,kic->ki", d[..., 2, :], table.force)  # n3/K0
+        growth = length * (1.0 + table.growth @ gamma)
+        stretch = length * (1.0 + table.extension @ gamma) + growth * squeeze
+        bend = table.curvature @ gamma + bending * moment
+        each = length[..., None]
+        grown, stretched = change.growth @ whole, change.stretch @ whole
+        bent = change.curvature @ gamma + change.compliance[..., 1:, :] * moment[..., None]
+        turning = np.concatenate(
+            [
+                (each * table.growth)[:, :, None] * bend[..., None]
+                + growth[..., None, None] * table.curvature,
+                grown[:, :, None] * bend[..., None] + growth[..., None, None] * bent,
+            ],
+            axis=-1,
+        )
+        thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)[..., None]
+        pushing = np.concatenate(
+            [
+                each * (table.extension + table.growth * squeeze[..., None]),
+                stretched
+                + grown * squeeze[..., None]
+                + growth[..., None] * change.compliance[..., 0, :] * thrust,
+            ],
+            axis=-1,
+        )
+        yielding = np.zeros((*table.force.shape, turning.shape[-1]))
+        yielding[..., len(gamma) :] = change.force
+        respond(
+            growth,
+            stretch,
+            np.ascontiguousarray(bending),
+            np.ascontiguousarray(axial),
+            np.ascontiguousarray(d),
+            np.einsum("kic,kica->kia", moment, d),
+            table.force,
+            turning,
+            pushing,
+            yielding,
+            self.measures,
+            self.lever[row],
+            table.weight,
+            self.tipping[row],
+            self.marks,
+            moves,
+            turns,
+            works,
+        )

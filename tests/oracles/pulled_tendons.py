@@ -1,0 +1,137 @@
+"""Strains of least energy of an arm without loads, some of whose tendons are pulled in by lengths.
+
+The strains at Gauss nodes are the unknowns of SciPy's SLSQP; pulling in a tendon is an inequality
+for the length of its path, and a tendon that stretches has one more unknown. Tensions appear
+nowhere. Paths are those of lines at p = ρ (cos θ, sin θ): a small change of the strains changes
+their length by ∫ t3 dζ + dω·(p × t) dZ, with t along the straight arm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import BarycentricInterpolator
+from scipy.optimize import minimize
+
+from softreach.arm import LengthTendon, Manipulator
+from softreach.arm.tables import tables
+
+Array = NDArray[np.float64]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+@dataclass(frozen=True)
+class PulledArm:
+    """An arm, and activations of all its bundles with displacements among them [m]."""
+
+    arm: Manipulator
+    activation: Array
+
+    @cached_property
+    def edges(self) -> Array:
+        """Ends of the pieces in which the strains are smooth [m]."""
+        return np.array([0.0, *self.arm.breakpoints, self.arm.length])
+
+    @cached_property
+    def nodes(self) -> tuple[Array, Array]:
+        """Gauss nodes Z and their weights [m], shape (piece, node)."""
+        half = np.diff(self.edges)[:, None] / 2.0
+        return self.edges[:-1, None] + half * (1.0 + _NODES), half * _WEIGHTS
+
+    @cached_property
+    def unpulled(self) -> tuple[Array, Array]:
+        """(ζ, ω) at the nodes without these tendons, and η, shape (station, 4) and (station,)."""
+        gamma = np.where(self.is_pulled, 0.0, self.activation)
+        table = tables(self.arm, self.nodes[0].ravel())
+        growth = 1.0 + table.growth @ gamma
+        turn = growth[:, None] * (table.curvature @ gamma)
+        return np.column_stack([1.0 + table.extension @ gamma, turn]), growth
+
+    @property
+    def is_pulled(self) -> NDArray[np.bool_]:
+        """Mask of the bundles that are tendons driven by length."""
+        return np.array([isinstance(each, LengthTendon) for each in self.arm.bundle_actuators])
+
+    def paths(self) -> Array:
+        """Shortening per (ζ, ω) at the nodes, shape (tendon, station, 4)."""
+        z, rows = self.nodes[0].ravel(), []
+        for tendon in self.arm.actuators:
+            if not isinstance(tendon, LengthTendon):
+                continue
+            start, end = (
+                x * self.arm.length for x in (tendon.start_over_length, tendon.end_over_length)
+            )
+            rate = tendon.revolution / (end - start)
+            for k in range(tendon.bundles):
+                angle = tendon.offset + 2 * np.pi * k / tendon.bundles + rate * (z - start)
+                out = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(z))], 1)
+                around = np.stack([-np.sin(angle), np.cos(angle), np.zeros(len(z))], 1)
+                along = tendon.distance * rate * around + [0.0, 0.0, 1.0]
+                t = along / np.linalg.norm(along, axis=1)[:, None]
+                shortens = -np.column_stack([t[:, 2], np.cross(tendon.distance * out, t)])
+                rows.append(np.where(((z > start) & (z < end))[:, None], shortens, 0.0))
+        return np.array(rows)
+
+    def strains(self) -> Array:
+        """(ζ, ω) of least energy at the nodes, shape (station, 4)."""
+        before, growth = self.unpulled
+        stiffness = self.arm.section.stiffness_at(self.arm.profile, self.nodes[0].ravel())
+        resists = np.stack(
+            [
+                stiffness.axial,
+                stiffness.bending / growth,
+                stiffness.bending / growth,
+                stiffness.torsion / growth,
+            ],
+            axis=1,
+        )
+        size = np.sqrt(self.nodes[1].ravel()[:, None] * resists)  # energy is ½ |size d|²
+        paths = self.paths() * self.nodes[1].ravel()[:, None]
+        at_rest = np.column_stack([np.ones(len(before)), np.zeros((len(before), 3))])
+        shortened = np.einsum("tsc,sc->t", paths, before - at_rest)
+        tendons = [self.arm.bundle_actuators[k] for k in np.flatnonzero(self.is_pulled)]
+        pulled = self.activation[self.is_pulled] - [tendon.slack for tendon in tendons]
+        springs = np.array([tendon.tendon_stiffness or np.inf for tendon in tendons])
+        pulled = pulled + [tendon.pretension for tendon in tendons] / springs - shortened
+        stretch = np.diag(1.0 / np.sqrt(springs))[:, np.isfinite(springs)]
+        slopes = np.concatenate([(paths / size).reshape(len(paths), -1), stretch], axis=1)
+        scale = 1.0 / np.linalg.norm(slopes, axis=1)  # constraints of like size
+        slopes, pulled = slopes * scale[:, None], pulled * scale
+        largest = np.abs(pulled).max() or 1.0
+        found = minimize(
+            lambda x: (0.5 * x @ x, x),
+            np.zeros(slopes.shape[1]),
+            jac=True,
+            method="SLSQP",
+            constraints={
+                "type": "ineq",
+                "fun": lambda x: slopes @ x - pulled / largest,
+                "jac": lambda x: slopes,
+            },
+            options={"ftol": 1e-18, "maxiter": 200},
+        )
+        change = largest * found.x[: before.size].reshape(before.shape) / size
+        return before + change
+
+    def tip(self) -> Array:
+        """The tip, by SciPy's DOP853 through the strains [m]."""
+        pieces = self.strains().reshape(len(self.edges) - 1, len(_NODES), 4)
+        state = np.concatenate([np.zeros(3), np.eye(3).ravel()])
+        for k, (z, values) in enumerate(zip(self.nodes[0], pieces, strict=True)):
+            between = BarycentricInterpolator(z, values)
+
+            def rhs(place: float, state: Array, between=between) -> Array:
+                zeta, *turn = between(place)
+                directors = state[3:].reshape(3, 3)  # rows d1, d2, d3
+                return np.concatenate(
+                    [zeta * directors[2], np.cross(turn @ directors, directors).ravel()]
+                )
+
+            span = (self.edges[k], self.edges[k + 1])
+            state = solve_ivp(rhs, span, state, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+        return state[:3]

@@ -1,0 +1,161 @@
+"""Laws of tendons driven by length: least energy, closed forms, slack, and derivatives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softreach.arm import (
+    FiberArchitecture,
+    LengthTendon,
+    LinearTaper,
+    Manipulator,
+    Material,
+    Ring,
+    Section,
+)
+from softreach.arm.lines import tensions_of_lengths
+from softreach.arm.tensions import LengthLaw
+from softreach.rod.rods import tip_map
+from softreach.support.errors import InvalidDesign
+from tests.oracles.pulled_tendons import PulledArm
+
+LENGTH, RADIUS, MODULUS, DISTANCE = 0.3, 0.01, 1e6, 0.008
+K0, K1 = math.pi * MODULUS * RADIUS**2, math.pi / 4 * MODULUS * RADIUS**4
+SECTION = Section(
+    rings=(Ring(inner_ratio=0.0, material=Material(young_modulus=MODULUS, poisson_ratio=0.4)),)
+)
+BOUNDS = (-0.02, 0.02)
+
+
+def arm_of(*actuators, taper=0.0):
+    profile = LinearTaper(length=LENGTH, outer_radius=RADIUS, taper=taper)
+    return Manipulator(profile=profile, section=SECTION, actuators=actuators)
+
+
+def tendons(bundles=3, **fields):
+    defaults = {"distance": DISTANCE, "activation_bounds": BOUNDS, "bundles": bundles}
+    return LengthTendon(**(defaults | fields))
+
+
+@st.composite
+def pulled_arms(draw):
+    """Arms with one or two sets of tendons of any route and stiffness, perhaps with a fiber."""
+    number = st.floats
+    sets = []
+    for k in range(draw(st.integers(1, 2))):
+        stiffness = draw(st.none() | number(200, 1e5))
+        sets.append(
+            tendons(
+                bundles=draw(st.integers(1, 4)),
+                name=f"t{k}",
+                distance=draw(number(0.003, 0.012)),
+                offset=draw(number(-3, 3)),
+                revolution=draw(st.just(0.0) | number(-3, 3)),
+                start_over_length=draw(st.sampled_from([0.0, 0.2])),
+                end_over_length=draw(st.sampled_from([0.55, 1.0])),
+                tendon_stiffness=stiffness,
+                slack=draw(number(-0.002, 0.002)),
+                pretension=draw(number(0, 1)) if stiffness else 0.0,
+            )
+        )
+    fiber = FiberArchitecture(revolution=1.0, extent=0.6, activation_bounds=(-0.2, 0.0))
+    others = (fiber,) if draw(st.booleans()) else ()
+    return arm_of(*sets, *others, taper=draw(number(-0.005, 0.015)))
+
+
+def random_activations(arm, n, seed=0):
+    low, high = arm.bounds.T
+    return low + np.random.default_rng(seed).random((n, arm.bundles)) * (high - low)
+
+
+def test_one_parallel_tendon_takes_its_length_from_the_arm():
+    """q = τ L (1/K0 + ρ²/K1), as bending and shortening share the work."""
+    (tension,) = tensions_of_lengths(arm_of(tendons(1)), [[0.01]])[0]
+    assert tension == pytest.approx(0.01 / LENGTH / (1 / K0 + DISTANCE**2 / K1), rel=1e-12)
+
+
+def test_a_tendon_that_is_anchored_halfway_is_shortened_there_alone():
+    halfway = arm_of(tendons(1, end_over_length=0.5, activation_bounds=(0.0, 0.005)))
+    (tension,) = tensions_of_lengths(halfway, [[0.005]])[0]
+    assert tension == pytest.approx(0.01 / LENGTH / (1 / K0 + DISTANCE**2 / K1), rel=1e-12)
+    assert np.isfinite(tip_map(halfway).tips([[0.005]])).all()
+
+
+def test_a_soft_cable_stretches_in_series():
+    stiffness, pretension, slack = 500.0, 0.7, 0.001
+    tendon = tendons(1, tendon_stiffness=stiffness, pretension=pretension, slack=slack)
+    (tension,) = tensions_of_lengths(arm_of(tendon), [[0.01]])[0]
+    arm = LENGTH * (1 / K0 + DISTANCE**2 / K1)
+    expected = (0.01 - slack + pretension / stiffness) / (arm + 1 / stiffness)
+    assert tension == pytest.approx(expected, rel=1e-12)
+
+
+def test_alike_tendons_compress_the_arm():
+    """All pulled in by q: the arm stays straight, and Σ τ = K0 q/L is large but finite."""
+    tension = tensions_of_lengths(arm_of(tendons(3)), [[0.01] * 3])[0]
+    np.testing.assert_allclose(tension, K0 * 0.01 / LENGTH / 3, rtol=1e-12)
+
+
+def test_a_tendon_that_is_paid_out_is_slack_and_pulls_nothing():
+    tension = tensions_of_lengths(arm_of(tendons(3)), [[0.01, -0.02, -0.02], [-0.01] * 3])
+    assert tension[0, 0] > 0
+    assert (tension[0, 1:] == 0).all()
+    assert (tension[1] == 0).all()
+
+
+def test_tensions_of_redundant_tendons_are_some_that_shorten_them_as_wanted():
+    """Four inextensible tendons around one section: three numbers decide its strains."""
+    law = LengthLaw(arm_of(tendons(4)))
+    pulled = random_activations(law.arm, 200)
+    tension, taut = law.tensions(pulled)
+    left = law.shortening(tension) - pulled
+    assert (tension >= 0).all()
+    assert (left > -1e-15).all()
+    assert (np.abs(left[taut]) < 1e-15).all()
+
+
+@settings(max_examples=20)
+@given(arm=pulled_arms())
+def test_slopes_are_those_of_differences_where_the_taut_stay_taut(arm):
+    law, step = LengthLaw(arm), 1e-7
+    pulled = random_activations(arm, 8)
+    tension, taut = law.tensions(pulled)
+    inner = law.inner(pulled, tension)
+    slopes = law.slopes(inner, taut, law.shortening_slopes(inner))[:, law.columns]
+    for k in range(arm.bundles):
+        moved = pulled + step * np.array([[[-1.0]], [[1.0]]]) * np.eye(arm.bundles)[k]
+        ends = [law.tensions(each) for each in moved]
+        same = np.all([(each.is_taut == taut).all(axis=1) for each in ends], axis=0)
+        difference = (ends[1].tension - ends[0].tension) / (2 * step)
+        scale = np.abs(slopes).max() + np.abs(tension).max() / step * 1e-12
+        np.testing.assert_allclose(difference[same], slopes[same, :, k], atol=1e-5 * scale)
+
+
+def test_a_pretension_needs_a_cable_that_stretches():
+    with pytest.raises(InvalidDesign, match=r"pretension = 2.*tendon_stiffness"):
+        tendons(1, pretension=2.0)
+
+
+def tip_misses(arm, count, seed=0):
+    """Distances of tips from those of least energy [m]."""
+    pulled = random_activations(arm, count, seed)
+    tips = tip_map(arm, 1e-10).tips(pulled)
+    return [math.dist(tip, PulledArm(arm, x).tip()) for tip, x in zip(tips, pulled, strict=True)]
+
+
+@settings(max_examples=4)
+@given(arm=pulled_arms())
+def test_tips_are_those_of_least_energy(arm):
+    assert max(tip_misses(arm, 2)) < 1e-7 * LENGTH
+
+
+@pytest.mark.large
+@settings(max_examples=50)
+@given(arm=pulled_arms(), seed=st.integers(0, 2**32 - 1))
+def test_tips_of_many_arms_are_those_of_least_energy(arm, seed):
+    assert max(tip_misses(arm, 3, seed)) < 1e-7 * LENGTH
