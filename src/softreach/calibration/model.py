@@ -172,7 +172,7 @@ class MarkerModel:
         at = self._explicit(arm, grid, inputs)
         rod = _rod(arm, grid)
         gamma = _activations(arm, rod, at.bundles)
-        lost = ~np.isfinite(gamma).all(axis=1)
+        lost = np.asarray(~np.isfinite(gamma).all(axis=1))
         gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
         state = rod_state(rod, gamma, at.table)
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
@@ -180,7 +180,7 @@ class MarkerModel:
         places[lost] = np.nan
         if not slopes:
             return places, None, state.status
-        known = np.isfinite(places).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
         changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
         result = np.full((*places.shape, len(changes)), np.nan)
         result[known] = _slopes(rod.arm, at, _some(state, known), changes, known)
@@ -204,7 +204,7 @@ class MarkerModel:
         ]
         table = each[0].table.combined([one.table for one in each], factors)
         others = (
-            sum(f * values for f, values in zip(factors, columns, strict=True))
+            np.tensordot(factors, np.stack(columns), axes=1)
             for columns in zip(*(one[1:] for one in each), strict=True)
         )
         return _Explicit(table, *others)
