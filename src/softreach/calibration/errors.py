@@ -102,17 +102,20 @@ class Verdict:
     """Share of the squared residuals that the last command explains, by cross-validation [-]."""
 
 
-def judged(data: Measurements, residuals: Array, error: float, repeated: Repeatability) -> Verdict:
+def judged(
+    data: Measurements, residuals: Array, error: float, repeated: Repeatability, name: str
+) -> Verdict:
     """What limits a fit, from its residuals in the order in which samples were taken.
 
     Args:
         data: All samples.
         residuals: Predicted minus measured places, NaN where unknown, (n, marker, 3) [m].
-        error: Held-out error, rms [m].
+        error: Error that is judged, rms [m].
         repeated: What the data repeats.
+        name: "held-out error" or "fitted error".
     """
     share = _memory(data, residuals)
-    text = f"held-out error {1e3 * error:.3g} mm rms"
+    text = f"{name} {1e3 * error:.3g} mm rms"
     known = np.isfinite(repeated.rms)
     if known:
         text += f", repeated inputs differ by {1e3 * repeated.rms:.3g} mm"

@@ -108,6 +108,12 @@ class MarkerModel:
     markers: NDArray[np.intp]
     """Those of the arm's markers that were measured."""
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the markers that were measured."""
+        known = [marker.name for marker in self.free.arm.markers] or ["tip"]
+        return tuple(known[k] for k in self.markers)
+
     @classmethod
     def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
         """The model of measured poses."""
