@@ -158,7 +158,7 @@ def read_measurements(
         row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
         raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
     places = np.stack([_place(table, triples[start]) for start in chosen.values()], axis=1)
-    seen = np.isfinite(places).all(axis=2)
+    seen = np.asarray(np.isfinite(places).all(axis=2))
     if not seen.any():
         raise InvalidInput("places of markers", "no number", "seen in at least one sample")
     places[~seen] = np.nan
