@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import Marker, Measured, Pieces, RigidPiece
+from softreach.arm import LengthTendon, Marker, Measured, Pieces, RestShape, RigidPiece, Samples
 from softreach.arm.parameters import changed, parameters
 from softreach.arm.tables import compliance, tables
 from softreach.rod import marker_positions
@@ -37,6 +37,35 @@ def test_a_rigid_end_is_a_tool_at_the_tip_of_a_shorter_arm():
     expected = marker_positions(arm(SHORT, markers=(tool,)), FREE)[:, 0]
     rigid = arm(rigid_pieces=(RigidPiece(start=SHORT),))
     np.testing.assert_allclose(sr.tip_positions(rigid, FREE), expected, atol=1e-7)
+
+
+def test_a_tendon_that_is_pulled_in_shortens_by_nothing_in_a_rigid_piece():
+    pulled = {
+        "actuators": (
+            LengthTendon(name="q", distance=0.008, activation_bounds=(0.0, 0.004)),
+            LengthTendon(name="p", distance=0.006, offset=2.0, activation_bounds=(0.0, 0.002)),
+        ),
+        "rest": RestShape(curvature_x=2.0),
+    }
+    lengths = [[0.003, 0.0], [0.002, 0.001]]
+    short = arm(SHORT, markers=(Marker(name="tool", offset=(0.0, 0.0, LENGTH - SHORT)),), **pulled)
+    straight = Samples(
+        stations_over_length=(0.0, SHORT / LENGTH, SHORT / LENGTH + 1e-9, 1.0),
+        values=(2.0, 2.0, 0.0, 0.0),
+        interpolation="linear",
+    )
+    pulled["rest"] = RestShape(curvature_x=straight)
+    rigid = arm(rigid_pieces=(RigidPiece(start=SHORT),), **pulled)
+    expected = marker_positions(short, lengths)[:, 0]
+    np.testing.assert_allclose(sr.tip_positions(rigid, lengths), expected, atol=1e-7)
+
+
+def test_a_rigid_piece_keeps_its_shape_at_rest():
+    bent = arm(rest=RestShape(curvature_x=3.0, twist=1.0), rigid_pieces=(RigidPiece(),))
+    (free, driven) = sr.tip_positions(bent, [[0.0, 0.0], [-0.5, 2.0]])
+    plain = arm(rest=RestShape(curvature_x=3.0, twist=1.0))
+    np.testing.assert_array_equal(driven, free)
+    np.testing.assert_allclose(free, sr.tip_positions(plain, [0.0, 0.0])[0], atol=1e-7)
 
 
 def test_a_load_on_a_rigid_end_acts_by_its_lever_arm():

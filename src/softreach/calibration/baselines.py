@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import Actuator
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
@@ -121,7 +120,7 @@ class _Arcs:
         stations, offsets = marker_stations(arm)
         names = [marker.name for marker in arm.markers] or ["tip"]
         measured = [names.index(name) for name in data.marker_names]
-        ends = [z for part in arm.actuators for z in Actuator.breakpoints(part, arm.profile)]
+        ends = [part.span(arm.length)[1] for part in arm.actuators]
         whole = np.unique(np.round([*ends, arm.length], 9))
         middles = 0.5 * (np.append(0.0, whole[:-1]) + whole)
         each = (part.acts(arm.profile, middles) for part in arm.actuators)

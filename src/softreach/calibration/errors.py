@@ -31,7 +31,8 @@ class Misses(NamedTuple):
     rms: float
     most: float
     """95 % of them are below it."""
-    count: int
+    number: int
+    """How many places."""
 
     def text(self, length: float) -> str:
         """Of the command line: "median 3.1, mean 4.0, rms 5.2, 95 % below 9.9 mm (1.4 % of L)"."""
@@ -75,11 +76,11 @@ def repeatability(data: Measurements) -> Repeatability:
     moving = spans > 0
     if not moving.any() or len(data) < 2:
         return Repeatability(np.nan, 0, False)
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     scaled = data.inputs[:, moving] / spans[moving]
-    distance, partner = cKDTree(scaled).query(scaled, k=2)
-    distance, partner = distance[:, 1], partner[:, 1]
+    near = KDTree(scaled).query(scaled, k=2)
+    distance, partner = (np.asarray(values)[:, 1] for values in near)
     for limit, exact in ((1e-9, True), (_NEAR, False)):
         rows = np.flatnonzero(distance <= limit)
         apart = (data.places[rows] - data.places[partner[rows]])[..., :]

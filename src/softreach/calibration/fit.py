@@ -70,16 +70,14 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
     start = np.array(free.arm.base.position)
     if len(turning) < 3 or len(moving) < 3:
         shift = np.median(measured - predicted, axis=0)
-        return free.started_at(
-            {name: start[POSE.index(name)] + shift[POSE.index(name)] for name in moving}
-        )
+        moved = zip(POSE[:3], start + shift, strict=True)
+        return free.started_at({name: place for name, place in moved if name in moving})
     rotation, shift = _kabsch(predicted, measured)
     _refuse_mirror(predicted, measured)
     _refuse_exchanged(each, places, model.names)
     vector = _rotation_vector(rotation)
     place = rotation @ start + shift
-    pose = dict(zip(POSE, [*place, *vector], strict=True))
-    return free.started_at({name: pose[name] for name in (*moving, *turning)})
+    return free.started_at(dict(zip(POSE, [*place, *vector], strict=True)))
 
 
 def _kabsch(predicted: Array, measured: Array, mirror: bool = False) -> tuple[Array, Array]:
@@ -229,7 +227,7 @@ class _Problem:
         self, model: MarkerModel, places: Array, noise: float | None, progress: Progress
     ) -> None:
         self.model, self.places, self.progress = model, places, progress
-        self.seen = np.isfinite(places).all(axis=2)
+        self.seen = np.asarray(np.isfinite(places).all(axis=2))
         self.noise = noise
         self.width: float | None = None
         self.unit = 1.0  # of priors, in m
@@ -299,7 +297,7 @@ class _Problem:
             jac=self.slopes,  # pyright: ignore[reportArgumentType]
             bounds=self.bounds,
             x_scale=self.model.free.scale,
-            loss=_loss(self.seen, self.width),
+            loss=_loss(int(self.seen.sum()), self.width),  # pyright: ignore[reportArgumentType]
             f_scale=1.0,
             ftol=fine,
             xtol=fine,
@@ -315,11 +313,10 @@ class _Problem:
         return self.seen / np.sqrt(1.0 + (distance / self.width) ** 2)
 
 
-def _loss(seen: Array, width: float | None) -> str | Callable[[Array], Array]:
+def _loss(count: int, width: float | None) -> str | Callable[[Array], Array]:
     """Loss of places, by their distance, so that it does not depend on the axes; pseudo-Huber."""
     if width is None:
         return "linear"
-    count = int(seen.sum())
 
     def loss(squares: Array) -> Array:
         # SciPy takes ρ of each squared residual: that of a place is shared by its three.

@@ -162,7 +162,7 @@ def read_measurements(
         row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
         raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
     places = np.stack([_place(table, triples[start]) for start in chosen.values()], axis=1)
-    seen = np.isfinite(places).all(axis=2)
+    seen = np.asarray(np.isfinite(places).all(axis=2))
     if not seen.any():
         raise InvalidInput("places of markers", "no number", "seen in at least one sample")
     places[~seen] = np.nan
@@ -172,7 +172,7 @@ def read_measurements(
         chosen = {name: start for name, start in chosen.items() if name not in lost}
     _refuse_far(arm, places)
     runs, run_names = _runs(table, run)
-    digest = hashlib.sha256(np.ascontiguousarray(np.c_[values, places.reshape(len(values), -1)]))
+    numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
         inputs=values,
         places=places,
@@ -183,7 +183,7 @@ def read_measurements(
         order=_order(table, run, order),
         rows=np.arange(len(values)),
         source=source,
-        digest=digest.hexdigest(),
+        digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
     )
 
 
@@ -193,13 +193,13 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
 
     if isinstance(data, pd.DataFrame):
         return data.reset_index(drop=True), "a DataFrame"
-    if isinstance(data, Mapping) and not hasattr(data, "to_dataframe"):
+    if hasattr(data, "to_dataframe"):
+        return data.to_dataframe().reset_index(), "a dataset"
+    if isinstance(data, Mapping):
         try:
             return pd.DataFrame(dict(data)), "a dictionary"
         except ValueError as error:
             raise InvalidInput("data", str(error), "columns of one length") from None
-    if hasattr(data, "to_dataframe"):
-        return data.to_dataframe().reset_index(), "a dataset"
     if isinstance(data, str | PathLike):
         return _read(Path(data))
     raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")

@@ -244,5 +244,5 @@ def _errors(errors: Misses) -> dict[str, float]:
         "median_m": errors.median,
         "mean_m": errors.mean,
         "below_95_percent_m": errors.most,
-        "places": errors.count,
+        "places": errors.number,
     }
