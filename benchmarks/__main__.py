@@ -21,6 +21,7 @@ PARTS = (
     "geometry",
     "workspace",
     "loads",
+    "calibration",
     "inverse",
     "redundancy",
     "atlas",
