@@ -362,6 +362,11 @@ class Session:
     def _follow_change(self, old: StudioState | None) -> None:
         self.follow(*what_follows(self._jobs, old, self.state))
 
+    @property
+    def shows_sample(self) -> bool:
+        """True while the arm is at a measured pose."""
+        return self.bench is not None and self.bench.distances is not None
+
     def job(self, kind: type[_Kind]) -> _Kind:
         """The job of a kind."""
         job = self._jobs[kind]

@@ -63,6 +63,7 @@ class DrawSample(Job):
         session, state, bench = self.session, self.session.state, self.session.bench
         if bench is None:
             session.scene.remove("/sample")
+            session.follow(FollowCamera)
             return
         if bench.fits(state.design) and bench.posed(state).activation == state.activation:
             self._draw(bench, state)

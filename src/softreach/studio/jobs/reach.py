@@ -230,7 +230,7 @@ class FollowCamera(Job):
             most = _DRAGGED if session.is_dragged else None
             session.scene.clouds.look(viewpoint, session.state.appearance.cut, most)
             session.scene.axes.turn(viewpoint.position, session.camera.focal)
-            hides = session.bench is not None or self._hides_handle(viewpoint.position)
+            hides = session.shows_sample or self._hides_handle(viewpoint.position)
             session.scene.see_through_arm(hides)
 
     def _hides_handle(self, camera: Array) -> bool:

@@ -109,7 +109,7 @@ _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
-_MEASURED, _MEASURED_SIZE = (0, 140, 120), 0.03
+_MEASURED_SIZE = 0.03
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
 
@@ -256,13 +256,13 @@ class Scene:
 
     def draw_sample(self, measured: Array, predicted: Array) -> None:
         """Measured and predicted markers [L], shapes (marker, 3), and lines between them."""
-        self.draw_dots("/sample/measured", measured, _MEASURED, _MEASURED_SIZE)
+        self.draw_dots("/sample/measured", measured, _MARK, _MEASURED_SIZE)
         self.draw_dots("/sample/predicted", predicted, _MARKER)
         pairs = np.stack([measured, predicted], axis=1)
         pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))].astype(np.float32)
         self.remove("/sample/residuals")
         if len(pairs):
-            self._api.add_line_segments("/sample/residuals", pairs, _MEASURED, thickness=0.005)
+            self._api.add_line_segments("/sample/residuals", pairs, _MARK, thickness=0.005)
 
     def draw_dots(self, path: str, points: Array, color: Color, size: float = _MARKER_SIZE) -> None:
         """Small dots at the places that are known [L]."""

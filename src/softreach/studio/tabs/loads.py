@@ -112,11 +112,11 @@ class LoadsPanel:
             )
             fields.vector(
                 "base at [mm]",
-                _of_base("position"),
+                base_field("position"),
                 "r(0): where the arm is clamped, as x, y, z in the world",
             )
             fields.number(
-                "turn [deg]", _of_base("turn"), "ψ: turn of the base about the way the arm points"
+                "turn [deg]", base_field("turn"), "ψ: turn of the base about the way the arm points"
             )
             fields.dropdown(
                 "gravity",
@@ -206,7 +206,7 @@ def _based(state: StudioState, name: str) -> StudioState:
     return state.replace(design=design.replace(base=design.base.replace(points=name)))
 
 
-def _of_base(name: str) -> Attribute:
+def base_field(name: str) -> Attribute:
     """Position in mm, or turn in degrees."""
     scale = math.radians(1.0) if name == "turn" else 1e-3
 
