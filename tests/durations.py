@@ -1,4 +1,4 @@
-"""How long each test takes, for `make quick`: it leaves out what took over a tenth of a second.
+"""How long each test takes, for `make quick`: it leaves out what took over a twentieth of a second.
 
 `pytest --record` writes `durations.json` after a run of all tests: the seconds of each such test
 function with its slowest fixture; the slowest of its cases counts.
@@ -14,7 +14,7 @@ from time import perf_counter
 import pytest
 
 FILE = Path(__file__).with_suffix(".json")
-SLOW = 0.1  # [s]
+SLOW = 0.05  # [s]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -73,5 +73,5 @@ class Durations:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         config = session.config
         if config.getoption("record") and not hasattr(config, "workerinput"):
-            slow = {name: round(s, 1) for name, s in sorted(self.tests.items()) if s > SLOW}
+            slow = {name: round(s, 2) for name, s in sorted(self.tests.items()) if s > SLOW}
             FILE.write_text(json.dumps(slow, indent=0) + "\n", "utf-8")

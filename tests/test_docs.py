@@ -43,7 +43,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
-FEW = 20_000  # samples
+FEW = 5_000  # samples
 NOT_EXECUTED = re.compile(r"# not executed: \w.+")
 FILE = re.compile(r"# (\w+\.py)\n")
 FENCE = re.compile(r"^ *(`{3,})(.*)\n(?:.*\n)*?^ *\1 *$", re.MULTILINE)
@@ -77,7 +77,14 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
 
 
 @pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=on_page)
+@pytest.mark.parametrize(
+    "notebook",
+    [  # what the others do is on pages too
+        pytest.param(path, marks=[] if path.stem == "paper" else [pytest.mark.large])
+        for path in NOTEBOOKS
+    ],
+    ids=on_page,
+)
 def test_every_notebook_runs_and_is_stored_without_outputs(notebook, tmp_path, monkeypatch):
     """As Jupyter runs it: in one namespace, and what a cell ends with is shown."""
     monkeypatch.chdir(tmp_path)

@@ -51,6 +51,7 @@ def test_the_wheel_is_what_runs(installed, tmp_path):
     assert str(SOURCE) not in printed_by(installed, tmp_path, sys.executable, "-c", where)
 
 
+@pytest.mark.large
 def test_my_tendon_arm(installed, tmp_path):
     text = printed_by(
         installed, tmp_path, "bash", EXAMPLES / "tendon_arm.sh", EXAMPLES / "tendon_arm.toml"
@@ -68,6 +69,7 @@ def test_a_requirement_is_checked(installed, tmp_path):
     assert text.count(": missed by") == 2
 
 
+@pytest.mark.large
 def test_an_actuator_of_ones_own_and_an_atlas_that_is_interrupted(installed, tmp_path):
     files = EXAMPLES / "spine.toml", EXAMPLES / "magnets.py"
     text = printed_by(installed, tmp_path, "bash", EXAMPLES / "own_actuator.sh", *files)

@@ -79,8 +79,9 @@ def test_where_no_linear_program_is_solved_the_search_is_unfinished(monkeypatch)
     assert not found.limit.values.any()
 
 
-def test_the_bundles_named_are_at_their_bounds():
-    found = blocked(LOADED, SIDE, 0)
+@pytest.mark.parametrize("first", [1, pytest.param(0, marks=pytest.mark.large)])
+def test_the_bundles_named_are_at_their_bounds(first):
+    found = blocked(LOADED, SIDE, first)
     bound = found.status.values == Stop.BOUND
     assert bound.any()
     gamma, low, high = found.activation.values, *LOADED.bounds.T

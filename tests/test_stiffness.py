@@ -34,7 +34,11 @@ LOADS = {
 }
 CONSERVATIVE = {"none", "gravity", "payload with a lever", "forces in several directions"}
 of_loads = pytest.mark.parametrize("name", LOADS)
-WITHIN_OTHERS = {"gravity", "forces in several directions"}  # kinds of load that others have too
+WITHIN_OTHERS = {
+    "gravity",
+    "forces in several directions",
+    "force that follows",
+}  # kinds of load that others have too
 
 
 def forced(loads, force):

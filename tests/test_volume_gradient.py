@@ -58,7 +58,8 @@ def test_where_the_flux_holds_it_is_exact_to_a_millionth(narrow, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["taper", "lower", pytest.param("left.offset", marks=pytest.mark.large)]
+    "name",
+    ["taper", *(pytest.param(name, marks=pytest.mark.large) for name in ("lower", "left.offset"))],
 )
 def test_the_convex_volume_s_derivative_is_within_its_error(narrow, name):
     def convex(arm):
@@ -117,7 +118,10 @@ SHARED = {
 }
 of_shared = pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.large] if name == "upper" else []) for name in SHARED],
+    [
+        pytest.param(name, marks=[pytest.mark.large] if name in ("upper", "extent") else [])
+        for name in SHARED
+    ],
 )
 
 

@@ -199,7 +199,7 @@ def test_volume_scales_with_the_cube_of_the_length(best):
 
 def test_a_tip_map_is_asked_as_its_arm_is(trunk):
     found = solid(tip_map(trunk, 1e-5), accuracy=0.1)
-    assert found.arm is trunk
+    assert found.arm == trunk
     assert found.volume == solid(trunk, accuracy=0.1, tol=1e-5).volume
 
 

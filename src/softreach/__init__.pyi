@@ -1,5 +1,6 @@
 from . import arm as arm
 from . import atlas as atlas
+from . import calibration as calibration
 from . import cloud as cloud
 from . import exchange as exchange
 from . import export as export
@@ -27,6 +28,7 @@ from .arm import designs as designs
 from .atlas import DesignSpace as DesignSpace
 from .atlas import build_atlas as build_atlas
 from .atlas import open_atlas as open_atlas
+from .calibration import calibrate as calibrate
 from .cloud import compute_cloud as compute_cloud
 from .cloud import curvature as curvature
 from .cloud import dexterity as dexterity

@@ -62,6 +62,10 @@ _CONFIGURATION = {
     "radius": (("station",), "m", "outer radius R2 before activation"),
     "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
+_LINES = {
+    "line_length": (("sample", "line"), "m", "length of the middle line of each bundle"),
+    "bundle_activation": (("sample", "line"), None, "activation that drives and lengths lead to"),
+}
 _MARKERS = {"marker_position": (("sample", "marker", "axis"), "m", "place of each marker")}
 
 
@@ -118,14 +122,18 @@ def configuration_dataset(
     import xarray as xr
 
     marked = "marker_position" in arrays
-    table = _CONFIGURATION | (_MARKERS if marked else {})
+    others = {name: about for name, about in (_MARKERS | _LINES).items() if name in arrays}
+    table = _CONFIGURATION | others
     variables = _variables(table, arm, {**arrays, "activation": activation}, names)
+    if "bundle_activation" in variables:
+        variables["bundle_activation"][2]["units"] = _listed_units(arm.inner.bundle_units)
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "axis": list(AXES),
         "director": ["d1", "d2", "d3"],
         "component": ["u1", "u2", "u3"],
         **({"marker": [marker.name for marker in arm.markers]} if marked else {}),
+        **({"line": list(arm.bundle_names)} if "line_length" in arrays else {}),
         **bundle_coordinates(arm, names),
     }
     return xr.Dataset(variables, coordinates, provenance(arm, frame))
@@ -247,6 +255,11 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
     units = _units(arm, names)
     each = {} if len(set(units)) == 1 else {"unit": ("bundle", list(units))}
     return {"bundle": list(arm.input_names if names is None else names), **each}
+
+
+def _listed_units(units: Sequence[str]) -> str:
+    """The unit that all share, or that of each."""
+    return units[0] if len(set(units)) == 1 else ", ".join(units)
 
 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:

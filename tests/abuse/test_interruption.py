@@ -41,7 +41,14 @@ def _draw(name: str) -> tuple[signal.Signals, float]:
     return draw.choice(list(SAID)), draw.uniform(0.0, longest)
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+USUAL = {"cloud", "cloud, while it writes", "atlas, 2 workers", "warmup, empty cache", "studio"}
+"""Commands that compute, write, have workers, compile and serve."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in USUAL else [pytest.mark.large]) for name in COMMANDS],
+)
 def test_a_signal_at_any_moment_ends_a_command_as_promised(name, tmp_path, monkeypatch):
     monkeypatch.setattr(bench_interruption, "LIMIT", math.inf)  # how soon is for the benchmark
     prepare(tmp_path)

@@ -150,7 +150,12 @@ START = f"{sys.executable} -m softreach"
         (f"{START} --help >/dev/full", 2, "No space left on device"),
         (f"LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0 {START} --help", 0, ""),
         (f"PYTHONIOENCODING=ascii {START} volume --help", 0, ""),
-        (f"MPLBACKEND=nonsense {START} show minimal_trunk --n 500 --out a.png", 0, ""),
+        pytest.param(
+            f"MPLBACKEND=nonsense {START} show minimal_trunk --n 500 --out a.png",
+            0,
+            "",
+            marks=pytest.mark.large,
+        ),
     ],
 )
 def test_processes_end_as_they_should(line, code, error, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from softreach.arm import (
     Tendon,
     parameters,
 )
+from softreach.cli.app import run
 from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign
 from tests.made_arms import one_ring_arm
@@ -149,6 +151,18 @@ def test_an_input_that_reaches_a_place_is_found():
     wanted = np.array([[0.4, -0.3, -0.2]])
     (solutions,) = sr.solve_inverse(arm, sr.tip_positions(arm, wanted))
     assert np.abs(solutions.activations - wanted).max(axis=1).min() < 1e-4
+
+
+def test_the_command_line_speaks_inputs(tmp_path, capsys):
+    path = str(tmp_path / "arm.toml")
+    pairs(four()).save(path)
+    run(["design", path])
+    assert "drive x" in (said := capsys.readouterr().out)
+    assert "-1 to 1 turns: +0.8 t 1, -0.8 t 3" in said
+    run(["design", path, "--json"])
+    inputs = json.loads(capsys.readouterr().out)["inputs"]
+    assert inputs[0] == {"name": "x", "unit": "turns", "bounds": [-1.0, 1.0]}
+    assert [each["name"] for each in inputs] == ["x", "y", "fiber"]
 
 
 def test_drives_are_plain_values():

@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given, settings
 
 import softreach as sr
-from softreach.arm.lines import limit_shortening, line_lengths, line_strains
+from softreach.arm import LengthTendon
+from softreach.arm.lines import (
+    limit_shortening,
+    line_lengths,
+    line_strains,
+    tensions_of_lengths,
+)
 from tests.kinds import fibers_and_a_tendon
 from tests.laws import arms, in_box
 
@@ -68,3 +74,26 @@ def test_no_bundle_shortens_by_more_than_the_limit_and_one_that_does_not_reach_i
     assert limit_shortening(limited, 0.15) == limited
     with pytest.raises(sr.InvalidInput, match="most = 2"):
         limit_shortening(arm, 2)
+
+
+@pytest.mark.parametrize("loads", [None, sr.Loads(payload=0.1, tip_force=(0.2, 0, 0))])
+def test_a_configuration_has_the_lengths_that_it_draws(loads):
+    arm = fibers_and_a_tendon().replace(loads=loads)
+    gamma = in_box(arm, 1)
+    shape = sr.configuration(arm, gamma[0])
+    np.testing.assert_allclose(shape.line_length, drawn_lengths(arm, gamma[0]), rtol=2e-5)
+    assert list(shape.line.values) == list(arm.bundle_names)
+
+
+def test_a_configuration_has_the_tensions_that_displacements_lead_to():
+    """And lengths that are as much shorter, where the tendon is parallel and does not stretch."""
+    arm = sr.designs.three_tendon_robot()
+    pulled = LengthTendon(distance=0.01, bundles=3, activation_bounds=(-0.01, 0.01))
+    arm = arm.replace(actuators=(pulled,))
+    shape = sr.configuration(arm, [0.004, -0.01, 0.001])
+    tension = tensions_of_lengths(arm, [[0.004, -0.01, 0.001]])[0]
+    np.testing.assert_allclose(shape.bundle_activation, tension, rtol=1e-9)
+    assert shape.bundle_activation.attrs["units"] == "N"
+    assert tension[1] == 0
+    length = arm.length - np.array([0.004, 0.001])
+    np.testing.assert_allclose(shape.line_length.values[[0, 2]], length, rtol=1e-9)

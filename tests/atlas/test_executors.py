@@ -59,6 +59,7 @@ def deadly(body: str, always: bool = False) -> str:
     return f"ALWAYS = {always}\n" + textwrap.dedent(DEADLY) + textwrap.dedent(body)
 
 
+@pytest.mark.large
 def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
     store = tmp_path / "a.zarr"
     body = """

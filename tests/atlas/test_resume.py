@@ -18,7 +18,8 @@ from tests.atlas.scripts import build16, ended, run_script
 from tests.laws import of_length
 
 
-def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
+@pytest.mark.parametrize("kills", [2, pytest.param(3, marks=pytest.mark.large)])
+def test_kills_leave_the_same_numbers_as_no_kill(kills, whole, tmp_path):
     store = tmp_path / "killed.zarr"
     body = """
         from softreach.atlas import store as stores
@@ -36,7 +37,8 @@ def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
         build(sys.argv[1], progress=count_down if place == "after a design" else None)
     """
     done = 0
-    for count, place in ((2, "after a design"), (5, "within a write"), (3, "after a design")):
+    moments = (2, "after a design"), (5, "within a write"), (3, "after a design")
+    for count, place in moments[:kills]:
         process = run_script(tmp_path, body, str(store), str(count), place)
         assert ended(process) == (None, "")
         assert process.returncode == -signal.SIGKILL

@@ -14,6 +14,7 @@ from softreach.arm import (
     Section,
     Tendon,
 )
+from softreach.arm.parameters import changed
 
 STEEL = Material(young_modulus=50e9, poisson_ratio=0.3, density=7800.0)
 SILICONE = Material(young_modulus=3e5, poisson_ratio=0.45, density=1100.0)
@@ -80,3 +81,21 @@ def random_inputs(arm, count, seed=0):
     """Inputs within the bounds of an arm."""
     low, high = arm.bounds.T
     return low + np.random.default_rng(seed).random((count, arm.bundles)) * (high - low)
+
+
+MODULUS = "rings[0].material.young_modulus"
+"""Young's modulus of all arms here."""
+
+
+def measured(arm, count=20, noise=2e-4, seed=0, inputs=None):
+    """Poses of an arm as a laboratory would have them: columns of inputs, and places with noise."""
+    inputs = random_inputs(arm, count, seed) if inputs is None else inputs
+    places = sr.rod.marker_positions(arm, inputs, 1e-8)
+    places = places + noise * np.random.default_rng(seed + 1).standard_normal(places.shape)
+    return table(places, inputs, arm.input_names, [marker.name for marker in arm.markers])
+
+
+def on_the_bench(arm):
+    """An arm that is a little stiffer than it was designed, and stands elsewhere."""
+    base = arm.base.replace(position=(0.01, 0.02, 0.03))
+    return changed(arm, {MODULUS: 1.1 * SILICONE.young_modulus}).replace(base=base)

@@ -42,7 +42,9 @@ def test_tips_of_a_hanging_arm_on_its_bounds_are_solved_back(hanging, place):
         assert np.abs(solution.activations - wanted).max(axis=1).min() < 1e-4
 
 
-@pytest.mark.parametrize("bundles", [3, 5, pytest.param(4, marks=pytest.mark.large)])
+@pytest.mark.parametrize(
+    "bundles", [5, *(pytest.param(k, marks=pytest.mark.large) for k in (3, 4))]
+)
 def test_tips_of_arms_under_payload_on_their_bounds_are_reached(bundles):
     arm = bounded_design(bundles, bundles, loaded=True)
     targets = tip_positions(arm, activations(arm, 12, "faces"))
@@ -78,7 +80,9 @@ def test_an_activation_on_a_bound_is_found_beside_others_that_lead_to_its_tip(pl
         assert away.max() <= 16 * TOL * arm.length
 
 
-@pytest.mark.parametrize("tol", [1e-4, 1e-8, pytest.param(TOL, marks=pytest.mark.large)])
+@pytest.mark.parametrize(
+    "tol", [1e-4, *(pytest.param(tol, marks=pytest.mark.large) for tol in (1e-8, TOL))]
+)
 def test_a_proof_says_more_than_the_error_of_tips(trunk, tol):
     gamma = np.random.default_rng(0).uniform(*trunk.bounds.T, (20, 3))
     gamma[:, 0] = 0.0

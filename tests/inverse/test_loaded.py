@@ -112,7 +112,7 @@ def test_a_shooting_from_the_base_puts_the_tip_of_a_root_at_its_target(heavy, st
 
 
 def test_unstable_activations_are_no_answers(heavy):
-    gamma = np.random.default_rng(0).uniform(*heavy.bounds.T, (1000, 3))
+    gamma = np.random.default_rng(0).uniform(*heavy.bounds.T, (300, 3))
     gamma[:, 1] = gamma[:, 0]  # one that leans a little would fall to that side
     found = loaded(heavy).equilibria(gamma)
     one = np.flatnonzero(found.status == TipStatus.UNSTABLE)[3]

@@ -135,3 +135,91 @@ class PulledArm:
             span = (self.edges[k], self.edges[k + 1])
             state = solve_ivp(rhs, span, state, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
         return state[:3]
+
+
+@dataclass(frozen=True)
+class HeavyPulledArm(PulledArm):
+    """The same under gravity and a payload at the tip, of a smooth arm without fibers.
+
+    The potential energy of the places joins that of the strains. Its derivatives are imaginary
+    parts, in the steps of Runge and Kutta from base to tip.
+    """
+
+    steps: int = 160
+
+    @cached_property
+    def between(self) -> Array:
+        """Strains at both ends and the middle of each step from those at the nodes."""
+        z = np.linspace(0.0, self.arm.length, 2 * self.steps + 1)
+        return BarycentricInterpolator(self.nodes[0][0], np.eye(len(_NODES)))(z)
+
+    def places(self, strains: Array) -> Array:
+        """r at the ends of the steps [m] of strains (..., node, 4), which may be complex."""
+        along = np.einsum("zn,...nc->z...c", self.between, strains)
+        h = self.arm.length / self.steps
+        turn = np.eye(3) + np.zeros(
+            (*strains.shape[:-2], 3, 3), strains.dtype
+        )  # columns d1, d2, d3
+        place = np.zeros((*strains.shape[:-2], 3), strains.dtype)
+        places = [place]
+
+        def rates(values: Array, turn: Array) -> tuple[Array, Array]:
+            x, y, z = (values[..., k, None] for k in (1, 2, 3))
+            one, two, three = turn[..., 0], turn[..., 1], turn[..., 2]
+            columns = [z * two - y * three, x * three - z * one, y * one - x * two]
+            return np.stack(columns, -1), values[..., :1] * three
+
+        for k in range(self.steps):
+            first, middle, last = along[2 * k : 2 * k + 3]
+            a = rates(first, turn)
+            b = rates(middle, turn + 0.5 * h * a[0])
+            c = rates(middle, turn + 0.5 * h * b[0])
+            d = rates(last, turn + h * c[0])
+            turn = turn + h / 6.0 * (a[0] + 2 * b[0] + 2 * c[0] + d[0])
+            place = place + h / 6.0 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
+            places.append(place)
+        return np.stack(places, -2)
+
+    def weight(self) -> Array:
+        """Weight at the ends of the steps [N], by Simpson's rule, shape (place, 3)."""
+        z = np.linspace(0.0, self.arm.length, self.steps + 1)
+        simpson = np.where(np.arange(len(z)) % 2, 4.0, 2.0)
+        simpson[[0, -1]] = 1.0
+        mass = simpson * self.arm.length / self.steps / 3.0
+        mass *= self.arm.section.mass_per_length_at(self.arm.profile, z)
+        assert self.arm.loads is not None
+        mass[-1] += self.arm.loads.payload
+        return mass[:, None] * np.array(self.arm.loads.gravity)
+
+    def tip(self) -> Array:
+        """The tip of least energy [m]."""
+        before, _ = self.unpulled
+        stiffness = self.arm.section.stiffness_at(self.arm.profile, self.nodes[0].ravel())
+        resists = np.stack([*stiffness[:2], *stiffness[1:]], axis=1)
+        size = np.sqrt(self.nodes[1].ravel()[:, None] * resists)
+        paths = self.paths() * self.nodes[1].ravel()[:, None]
+        pulled = self.activation - [each.slack for each in self.arm.bundle_actuators]
+        slopes = (paths / size).reshape(len(paths), -1)
+        scale = 1.0 / np.linalg.norm(slopes, axis=1)
+        weight, count = self.weight(), before.size
+        unit = np.sqrt(np.abs(weight).sum() * self.arm.length)  # of the unknowns
+
+        def energy(x: Array) -> tuple[float, Array]:
+            changes = unit * (x + 1e-30j * np.eye(count)).reshape(count, *before.shape) / size
+            work = np.einsum("px,npx->n", weight, self.places(before + changes))
+            return 0.5 * x @ x - work[0].real / unit**2, x - work.imag / 1e-30 / unit**2
+
+        lengths = {
+            "type": "ineq",
+            "fun": lambda x: scale * (unit * slopes @ x - pulled) / unit,
+            "jac": lambda x: scale[:, None] * slopes,
+        }
+        found = minimize(
+            energy,
+            np.zeros(count),
+            jac=True,
+            method="SLSQP",
+            constraints=lengths,
+            options={"ftol": 1e-17, "maxiter": 500},
+        )
+        return self.places(before + unit * found.x.reshape(before.shape) / size)[-1]

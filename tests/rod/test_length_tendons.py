@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from softreach import compute_cloud, configuration, reachable_set, solve_inverse
 from softreach.arm import (
     FiberArchitecture,
     LengthTendon,
     LinearTaper,
+    Loads,
     Manipulator,
     Material,
     Ring,
@@ -22,7 +24,7 @@ from softreach.arm.lines import tensions_of_lengths
 from softreach.arm.tensions import LengthLaw
 from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign
-from tests.oracles.pulled_tendons import PulledArm
+from tests.oracles.pulled_tendons import HeavyPulledArm, PulledArm
 
 LENGTH, RADIUS, MODULUS, DISTANCE = 0.3, 0.01, 1e6, 0.008
 K0, K1 = math.pi * MODULUS * RADIUS**2, math.pi / 4 * MODULUS * RADIUS**4
@@ -159,3 +161,89 @@ def test_tips_are_those_of_least_energy(arm):
 @given(arm=pulled_arms(), seed=st.integers(0, 2**32 - 1))
 def test_tips_of_many_arms_are_those_of_least_energy(arm, seed):
     assert max(tip_misses(arm, 3, seed)) < 1e-7 * LENGTH
+
+
+HEAVY = Section(
+    rings=(
+        Ring(
+            inner_ratio=0.0,
+            material=Material(young_modulus=4e6, poisson_ratio=0.4, density=1000.0),
+        ),
+    )
+)
+
+
+def heavy(arm, payload=0.02, gravity=(0.0, 9.81, 0.0)):
+    return arm.replace(section=HEAVY, loads=Loads(gravity=gravity, payload=payload))
+
+
+def loaded_miss(arm, pulled):
+    """Distance of the tip from that of least energy [m]."""
+    return math.dist(tip_map(arm, 1e-9).tips([pulled])[0], HeavyPulledArm(arm, pulled).tip())
+
+
+def test_a_tip_under_loads_is_that_of_least_energy():
+    assert loaded_miss(heavy(arm_of(tendons(3))), np.array([0.004, -0.01, 0.002])) < 1e-7 * LENGTH
+
+
+@pytest.mark.large
+@pytest.mark.parametrize("seed", range(50))
+def test_tips_under_loads_are_those_of_least_energy(seed):
+    rng = np.random.default_rng(seed)
+    turns, slack = rng.choice([0.0, rng.uniform(-2, 2)]), rng.uniform(-1e-3, 1e-3)
+    fields = {"revolution": turns, "slack": slack, "distance": rng.uniform(0.004, 0.01)}
+    gravity = 9.81 * rng.normal(size=3)
+    arm = heavy(arm_of(tendons(int(rng.integers(2, 5)), **fields)), rng.uniform(0, 0.03), gravity)
+    assert loaded_miss(arm, random_activations(arm, 1, seed)[0] * 0.7) < 1e-7 * LENGTH
+
+
+@pytest.mark.parametrize("stiffness", [None, 2000.0])
+def test_under_loads_taut_tendons_are_as_long_as_they_are_to_be(stiffness):
+    """By the drawn lengths in a plane; slack ones are no longer than what is paid out."""
+    arm = heavy(arm_of(tendons(2, offset=math.pi / 2, tendon_stiffness=stiffness)))
+    pulled = random_activations(arm, 12)
+    shapes = configuration(arm, pulled, tol=1e-9)
+    tension, compliance = shapes.bundle_activation.values, 1 / stiffness if stiffness else 0.0
+    left = tension * compliance + LENGTH - shapes.line_length.values - pulled
+    assert (tension >= 0).all()
+    assert (tension > 0).any()
+    assert (tension == 0).any()
+    assert (left > -1e-9 * LENGTH).all()
+    assert (np.abs(left[tension > 0]) < 1e-9 * LENGTH).all()
+
+
+@pytest.mark.parametrize("loads", [{}, {"follower_force": (0.02, 0.0, 0.0)}])
+def test_slopes_under_loads_are_those_of_differences(loads):
+    """Dead loads have a linear response; those that follow the tip are moved by hand."""
+    arm = heavy(arm_of(tendons(3)))
+    arm = arm.replace(loads=arm.loads.replace(**loads))
+    rod, step = tip_map(arm, 1e-10), 1e-6
+    pulled = np.array([[0.004, 0.006, 0.005], [0.01, -0.01, 0.002]])
+    slopes = rod.tips_and_slopes(pulled)[1]
+    for k, unit in enumerate(np.eye(3)):
+        change = rod.tips(pulled + step * unit) - rod.tips(pulled - step * unit)
+        np.testing.assert_allclose(slopes[..., k], change / (2 * step), atol=2e-6)
+
+
+def test_a_displacement_beyond_the_length_is_told():
+    with pytest.raises(InvalidDesign, match=r"displacement_bounds.*reaches extension ζ = -"):
+        tip_map(arm_of(tendons(1, activation_bounds=(0.0, 1.5), distance=1e-4)))
+
+
+def test_a_length_driven_arm_has_clouds_sets_and_inverses():
+    arm = arm_of(tendons(3), tendons(1, name="out", end_over_length=0.5, offset=1.0))
+    rod = tip_map(arm)
+    cloud = compute_cloud(arm, n=64)
+    assert cloud.activation.attrs["units"] == "m"
+    np.testing.assert_allclose(rod.tips(cloud.activation.values), cloud.tip, atol=1e-12)
+    wanted = rod.tips([[0.012, 0.008, -0.01, 0.004]])
+    (answer,) = solve_inverse(arm, wanted)
+    assert math.dist(rod.tips(answer.activations)[0], wanted[0]) < 1e-6 * LENGTH
+
+
+def test_the_set_of_a_length_driven_arm_holds_its_tips():
+    arm = arm_of(tendons(3, activation_bounds=(0.0, 0.02)))
+    region = reachable_set(arm, grid=20, cell=LENGTH / 50)
+    tips = tip_map(arm).tips(random_activations(arm, 50))
+    assert np.mean(region.contains(tips)) > 0.9
+    assert not region.contains([[0.0, 0.0, 1.1 * LENGTH]]).any()

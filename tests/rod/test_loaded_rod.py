@@ -50,7 +50,14 @@ KINDS = {
         gravity=SIDE, payload=0.5, payload_arm=(0.05, 0.02, 0.1), tip_force=(0.0, 1.0, 0.0)
     ),
 }
-of_kinds = pytest.mark.parametrize("loads", KINDS.values(), ids=KINDS.keys())
+WITHIN_OTHERS = {"gravity", "tip force", "tip moment"}  # kinds of load that others have too
+of_kinds = pytest.mark.parametrize(
+    "loads",
+    [
+        pytest.param(loads, id=name, marks=[pytest.mark.large] if name in WITHIN_OTHERS else [])
+        for name, loads in KINDS.items()
+    ],
+)
 
 
 def loaded(loads, tol=1e-9, arm=TRUNK, **material):

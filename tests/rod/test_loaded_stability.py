@@ -98,7 +98,10 @@ def test_of_the_reported_equilibria_the_stable_ones_are_minima_of_energy(load, g
         assert stable == (status == TipStatus.STABLE)
 
 
-@pytest.mark.parametrize("gamma", SYMMETRIC)
+@pytest.mark.parametrize(
+    "gamma",
+    [SYMMETRIC[0], *(pytest.param(gamma, marks=pytest.mark.large) for gamma in SYMMETRIC[1:])],
+)
 def test_stability_is_lost_where_a_minimum_of_energy_ends(gamma):
     """The load number is bisected; at a hundredth less and more the energy is asked."""
 

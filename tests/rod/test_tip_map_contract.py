@@ -63,7 +63,13 @@ MAKERS: dict[str, Make] = {
 of_makers = {
     name: functools.cache(make) for name, make in MAKERS.items()
 }  # steps are searched once
-pytestmark = pytest.mark.parametrize("make", of_makers.values(), ids=of_makers.keys())
+pytestmark = pytest.mark.parametrize(
+    "make",
+    [  # what is placed and loaded is placed
+        pytest.param(make, id=name, marks=[pytest.mark.large] if name == "placed" else [])
+        for name, make in of_makers.items()
+    ],
+)
 
 DESIGNS = {
     "minimal": designs.minimal_trunk(),
@@ -74,7 +80,13 @@ DESIGNS = {
     "fibers and a tendon": fibers_and_a_tendon(),
 }
 TOLERANCES = (1e-3, 1e-6, 1e-9)
-of_designs = pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
+of_designs = pytest.mark.parametrize(
+    "arm",
+    [
+        pytest.param(arm, id=name, marks=[pytest.mark.large] if name == "wide" else [])
+        for name, arm in DESIGNS.items()
+    ],
+)
 
 
 def activations(rod: TipMap, n: int, seed: int = 1) -> np.ndarray:

@@ -26,6 +26,7 @@ def studio() -> Iterator[Studio]:
 def page(browser, studio) -> Iterator[Tab]:
     """The tab of all journeys: opening one takes seconds."""
     opened = Tab(browser, studio)
+    assert opened.errors == []  # such as of a rule that the page sets itself and breaks
     yield opened
     opened.close()
 

@@ -51,6 +51,7 @@ def test_a_running_computation_is_canceled_and_taken_up_again(tab):
     tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").first.wait_for()
 
 
+@pytest.mark.large
 def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, monkeypatch):
     def fails(*_, **__):
         raise MemoryError
@@ -102,6 +103,7 @@ def test_an_idle_page_has_nothing_done_by_the_server(tab, monkeypatch):
     assert done == []
 
 
+@pytest.mark.large
 def test_a_hundred_bundles_show_a_cloud_and_say_what_is_left_out(tab):
     changes = {"longitudinal.bundles": 98, "extent": 0.02}
     tab.session.update(lambda s: s.replace(design=changed(designs.minimal_trunk(), changes)))

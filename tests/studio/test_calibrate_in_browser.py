@@ -34,7 +34,7 @@ def test_an_arm_is_calibrated_on_measured_poses_and_saved(tab, tmp_path):
     tab.press("Add to the free numbers")
     tab.wait(lambda: free.input_value() == "pose, taper", "the taper is free too")
     tab.press("Fit")
-    tab.page.get_by_text("Calibration of 7 numbers on 20 samples").wait_for()
+    tab.page.get_by_text("20 fitted").first.wait_for()
     tab.settle()
     assert np.nanmax(tab.session.bench.distances) < 2e-3
     assert tab.drawn("/sample/arm/0")

@@ -100,6 +100,7 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghos
     assert all(tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer)))
 
 
+@pytest.mark.large
 def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse_tab):
     tab = inverse_tab
     begin = pose(tab, (-0.2, -0.1, -0.1))
@@ -167,6 +168,7 @@ def test_the_handle_is_dark_on_a_light_page_and_light_on_a_dark_one(inverse_tab)
     tab.wait(lambda: np.median(around(tab, begin)) < 0.3, "it is dark again")
 
 
+@pytest.mark.large
 def test_the_cloud_is_whole_again_after_a_drag_that_ends_outside_of_the_window(full_tab):
     tab = full_tab
     begin = pose(tab, START)
@@ -179,6 +181,7 @@ def test_the_cloud_is_whole_again_after_a_drag_that_ends_outside_of_the_window(f
     tab.wait(lambda: tab.session.state.target is not None, "the end of the drag is a target")
 
 
+@pytest.mark.large
 def test_a_click_on_the_cloud_sets_a_target_only_where_the_tab_says_so(inverse_tab):
     tab = inverse_tab
     start = (0.0, 0.0, 0.0)

@@ -59,6 +59,7 @@ def test_a_dragged_slider_is_one_step_that_buttons_and_keys_undo(tab):
     assert tab.session.reach.arm == second
 
 
+@pytest.mark.large
 def test_reset_leads_back_to_the_beginning_and_can_be_undone(tab):
     tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"revolution": np.radians(60)})))
     tab.session.update(lambda s: s.showing(color="manipulability"))
@@ -70,6 +71,7 @@ def test_reset_leads_back_to_the_beginning_and_can_be_undone(tab):
     become(tab, lambda: tab.session.state == before, "the reset is undone")
 
 
+@pytest.mark.large
 def test_where_there_is_nothing_to_redo_the_page_says_so(tab):
     tab.session.update(lambda s: s.replace(activation=(-0.1, 0.0, 0.0)))
     tab.press("Redo")
@@ -87,6 +89,20 @@ def reloaded(tab, studio):
     return session
 
 
+def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, folder):
+    with Studio(start(), work=KeptWork(folder)) as studio:
+        tab = Tab(browser, studio)
+        tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.02})))
+        tab.settle()
+        tab.session = reloaded(tab, studio)
+        assert taper(tab) == 0.02
+        tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").wait_for()
+        tab.press("Undo")
+        become(tab, lambda: tab.session.state.design == TRUNK, "the history is there too")
+        tab.close()
+
+
+@pytest.mark.large
 def test_a_page_that_is_reloaded_goes_on_where_it_was_beside_another_tab(browser, folder):
     with Studio(start(), work=KeptWork(folder)) as studio:
         one, other = Tab(browser, studio), None

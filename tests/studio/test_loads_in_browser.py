@@ -84,6 +84,47 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     tab.page.get_by_label("show the cloud without loads").check()
     tab.wait(lambda: tab.drawn("/free"), "the free cloud is back")
 
+    before = loads(tab)
+    for text in ("-5", "1000000000"):
+        typed(tab, "payload [g]", text)
+        alert = tab.page.get_by_role("alert").filter(has_text="payload = ")
+        alert.wait_for()
+        assert loads(tab) == before
+    enter(
+        tab,
+        "payload [g]",
+        "2",
+        lambda one: one.payload == pytest.approx(0.002),
+        "a payload that can be",
+    )
+    alert.wait_for(state="hidden")
+
+    tab.open("Export")
+    design = sr.Manipulator.load(tab.save("Save design (TOML)", tmp_path))
+    assert design.loads == loads(tab)
+    tab.open("Loads")
+
+    tab.press("Take all loads off")
+    tab.wait(lambda: loads(tab) is None, "nothing acts")
+    tab.settle()
+    assert not tab.drawn("/free")
+    assert tab.session.reach.arm == designs.lce_arm()
+    tab.wait(lambda: field(tab, "gravity").input_value() == "none", "the fields are empty")
+    told = tab.page.get_by_text("equilibrium")
+    tab.wait(lambda: told.count() == 0, "nothing is said of equilibria")
+
+    tab.session.update(lambda s: s.replace(design=designs.minimal_trunk()))
+    tab.settle()
+    tab.choose("gravity", "sideways")
+    tab.page.get_by_role("alert").filter(has_text="on the tab Parts").wait_for()
+    assert loads(tab) is None
+
+
+@pytest.mark.large
+def test_postures_under_loads_are_told(loads_tab):
+    tab = loads_tab
+    tab.choose("gravity", "up")
+    become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
     enter(
         tab,
         "payload [g]",
@@ -119,22 +160,12 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     tab.settle()
     assert tab.drawn("/arm/0")
 
-    tab.open("Loads")
-    before = loads(tab)
-    for text in ("-5", "1000000000"):
-        typed(tab, "payload [g]", text)
-        alert = tab.page.get_by_role("alert").filter(has_text="payload = ")
-        alert.wait_for()
-        assert loads(tab) == before
-    enter(
-        tab,
-        "payload [g]",
-        "2",
-        lambda one: one.payload == pytest.approx(0.002),
-        "a payload that can be",
-    )
-    alert.wait_for(state="hidden")
 
+@pytest.mark.large
+def test_a_load_that_is_too_large_shows_nothing_and_a_force_leans_the_arm(loads_tab):
+    tab = loads_tab
+    tab.choose("gravity", "up")
+    become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
     enter(
         tab,
         "payload [g]",
@@ -167,27 +198,8 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     )
     assert field(tab, "gravity").input_value() == "as typed"
 
-    tab.open("Export")
-    design = sr.Manipulator.load(tab.save("Save design (TOML)", tmp_path))
-    assert design.loads == loads(tab)
-    tab.open("Loads")
 
-    tab.press("Take all loads off")
-    tab.wait(lambda: loads(tab) is None, "nothing acts")
-    tab.settle()
-    assert not tab.drawn("/free")
-    assert tab.session.reach.arm == designs.lce_arm()
-    tab.wait(lambda: field(tab, "gravity").input_value() == "none", "the fields are empty")
-    told = tab.page.get_by_text("equilibrium")
-    tab.wait(lambda: told.count() == 0, "nothing is said of equilibria")
-
-    tab.session.update(lambda s: s.replace(design=designs.minimal_trunk()))
-    tab.settle()
-    tab.choose("gravity", "sideways")
-    tab.page.get_by_role("alert").filter(has_text="on the tab Parts").wait_for()
-    assert loads(tab) is None
-
-
+@pytest.mark.large
 def test_an_arm_is_hung_from_its_base_and_its_weight_pulls_it_down(loads_tab):
     tab = loads_tab
     tab.choose("base", "down (hanging)")

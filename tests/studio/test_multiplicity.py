@@ -29,7 +29,10 @@ def folded() -> Reach:
     return fine_reach(*FOLDED[1])
 
 
-@pytest.mark.parametrize(("revolution", "taper"), FOLDED)
+@pytest.mark.parametrize(
+    ("revolution", "taper"),
+    [FOLDED[0], *(pytest.param(*folded, marks=pytest.mark.large) for folded in FOLDED[1:])],
+)
 def test_places_counted_once_for_every_activation_make_up_the_volume(revolution, taper):
     # V = ∫ |det ∂r/∂γ| / m dγ over the box, if every place counts m activations.
     reach = fine_reach(revolution, taper)

@@ -60,6 +60,7 @@ def test_playing_leads_the_arm_to_the_end_and_the_slider_back(tab):
     np.testing.assert_allclose(tab.session.tip, place, atol=2e-5)
 
 
+@pytest.mark.large
 def test_the_page_says_where_the_branch_ends_and_why(tab, tmp_path):
     state = tab.session.state
     tip = sr.tip_positions(state.design, [ACTIVATION])[0]
@@ -77,6 +78,7 @@ def test_the_page_says_where_the_branch_ends_and_why(tab, tmp_path):
     np.testing.assert_allclose(end.position, found.end_position / state.design.length, atol=1e-6)
 
 
+@pytest.mark.large
 def test_a_file_that_is_no_path_is_refused_in_one_line(tab, tmp_path):
     file = tmp_path / "<b>odd.csv"
     file.write_text("x,y,z\n0,0,1\nzero,0,1\n")
@@ -106,6 +108,7 @@ def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
     assert not tab.drawn("/path")
 
 
+@pytest.mark.large
 def test_the_saved_table_is_that_of_the_command_line(tab, tmp_path):
     found = drawn(tab)
     table = tab.save("CSV", tmp_path)

@@ -38,6 +38,7 @@ def test_curvature_along_the_arm_follows_a_slider(tab):
     tab.wait(lambda: ink(tab) != before, "the chart is drawn anew")
 
 
+@pytest.mark.large
 def test_the_volume_against_alpha_is_that_of_the_cloud(tab):
     tab.open("Plots")
     tab.page.get_by_label("V against α").check()
@@ -79,6 +80,7 @@ def test_a_sweep_in_progress_is_dropped_for_that_of_another_design(tab):
     assert tab.session.figures.plots["sweep"].complete
 
 
+@pytest.mark.large
 def test_histograms_are_those_of_the_samples_that_the_slice_leaves(tab):
     tab.open("Plots")
     tab.page.get_by_label("activations", exact=True).check()

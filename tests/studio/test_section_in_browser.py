@@ -30,6 +30,7 @@ def test_the_section_is_that_of_the_exact_set(tab):
     assert np.abs(onto).max() < 2 * reach.exact.image.lattice.cell
 
 
+@pytest.mark.large
 def test_the_section_follows_the_slice_and_the_design(tab):
     tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
     tab.settle()
@@ -68,6 +69,7 @@ def test_the_section_is_drawn_for_a_dark_page_too(tab):
     tab.settle()
 
 
+@pytest.mark.large
 def test_beside_the_set_nothing_is_reached(tab):
     cut = Slice(axis="x", center=1.4, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut, plots=PlotSettings(shown=("section",))))

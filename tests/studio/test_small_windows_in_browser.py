@@ -48,7 +48,7 @@ def labels(tab) -> list:
     return [label for label in found if label is not None]
 
 
-@pytest.mark.parametrize("kind", SIZES)
+@pytest.mark.parametrize("kind", [pytest.param("laptop", marks=pytest.mark.large), "phone"])
 def test_all_twelve_tabs_stand_in_one_line_within_the_window(opened, kind):
     tab = opened(kind)
     tab.page.get_by_role("tab", name="Atlas").wait_for()
@@ -62,6 +62,7 @@ def test_all_twelve_tabs_stand_in_one_line_within_the_window(opened, kind):
     tab.wait(fit, "the page is laid out, all tabs in one line")
 
 
+@pytest.mark.large
 def test_the_arm_is_in_sight_in_the_window_of_a_laptop(opened):
     tab = opened("laptop")
     tab.settle()
@@ -181,6 +182,7 @@ def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(ope
     )
 
 
+@pytest.mark.large
 def test_the_arm_stays_in_sight_in_a_window_that_gets_narrow_and_wide_again(opened):
     tab = opened("laptop")
     see_all(tab)

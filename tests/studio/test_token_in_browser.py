@@ -17,6 +17,7 @@ def guarded():
         yield running
 
 
+@pytest.mark.large
 def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, guarded):
     tab = Tab(browser, guarded)
     assert tab.session.reach is not None

@@ -52,6 +52,7 @@ def test_numbers_are_kept_to_the_last_digit(tab):
             assert value(tab, name) == pytest.approx(wanted, abs=1e-15)
 
 
+@pytest.mark.large
 def test_nothing_happens_before_enter_and_the_field_says_so(tab):
     tab.open("Design")
     before = tab.session.state.design
@@ -81,6 +82,7 @@ def test_refused_numbers_say_why_under_their_field_in_its_own_unit(tab):
         alert.wait_for(state="hidden")
 
 
+@pytest.mark.large
 def test_an_activation_below_zero_is_typed(tab):
     tab.open("Activation")
     typed(tab, "γ left", "-0.05")

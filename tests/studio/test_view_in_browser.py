@@ -104,6 +104,7 @@ def _alike(near: float, far: float) -> bool:
     return near == pytest.approx(far, rel=0.02)
 
 
+@pytest.mark.large
 def test_parallels_stay_parallel_for_the_orthographic_camera(tab):
     def widths():
         """Of two lines along x, the far one behind the near one."""

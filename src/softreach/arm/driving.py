@@ -197,16 +197,17 @@ def _against_loads(arm: Manipulator) -> float:
 
 def body_of(arm: Manipulator) -> Manipulator:
     """The arm without drives, its rest shape as a bundle held at 1 behind the others."""
-    if arm.drives:
-        arm = arm.replace(drives=())
-    if arm.rest.is_straight:
+    if not arm.drives and arm.rest.is_straight:
         return arm
-    held = RestStrains(
-        name=_unused("rest shape", arm.bundle_names),
-        shape=arm.rest,
-        activation_bounds=(1.0, 1.0),
-    )
-    return arm.replace(actuators=(*arm.actuators, held), rest=STRAIGHT)
+    if (known := vars(arm).get("_body")) is None:
+        held = RestStrains(
+            name=_unused("rest shape", arm.bundle_names),
+            shape=arm.rest,
+            activation_bounds=(1.0, 1.0),
+        )
+        actuators = arm.actuators if arm.rest.is_straight else (*arm.actuators, held)
+        known = vars(arm)["_body"] = arm.replace(drives=(), actuators=actuators, rest=STRAIGHT)
+    return known
 
 
 def pilot(count: int) -> Array:

@@ -12,7 +12,13 @@ from softreach.support.arguments import as_number
 from softreach.support.arrays import as_rows
 from softreach.support.errors import Range
 
-__all__ = ["limit_shortening", "line_lengths", "line_strains", "tensions_of_lengths"]
+__all__ = [
+    "lengths_of_strains",
+    "limit_shortening",
+    "line_lengths",
+    "line_strains",
+    "tensions_of_lengths",
+]
 
 Array = NDArray[np.float64]
 
@@ -39,15 +45,28 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     """
     arm = a_manipulator("arm", arm)
     gamma = as_rows("activations", activations, arm.inputs, "of shape (n, inputs)")
-    bundles, gamma = arm.bundles, Driving(arm).activations(gamma)
-    arm = body_of(arm)
-    z, weights, half = quadrature(arm)
-    step = _STEP * half
-    table = tables(arm, z)
+    gamma, body = Driving(arm).activations(gamma), body_of(arm)
+    table = tables(body, quadrature(body)[0])
     zeta = 1.0 + gamma @ table.extension.T
     eta = zeta if table.growth is table.extension else 1.0 + gamma @ table.growth.T
     turn = eta[..., None] * np.einsum("nb,scb->nsc", gamma, table.curvature)
 
+    return lengths_of_strains(arm, turn, zeta)
+
+
+def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
+    """Length of the middle line of each bundle [m] by strains at the nodes of `quadrature`.
+
+    Args:
+        arm: The design.
+        turn: ω, curvature per length before activation [1/m], shape (n, node, 3).
+        zeta: ζ [-], shape (n, node).
+
+    Returns:
+        Shape (n, bundle).
+    """
+    z, weights, half = quadrature(body_of(arm))
+    step = _STEP * half
     place = _places(arm, z)
     along = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
     (x, y), (dx, dy) = place, along
@@ -55,7 +74,7 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     speed = np.sqrt(
         (dx - three * y) ** 2 + (dy + three * x) ** 2 + (zeta[..., None] + one * y - two * x) ** 2
     )
-    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))[:, :bundles]
+    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
 
 
 def tensions_of_lengths(arm: Manipulator, activations: ArrayLike) -> Array:

@@ -1,10 +1,11 @@
-"""Tensions of tendons that are driven by length, from what is pulled in: theory (95) to (98).
+"""Tensions of tendons that are driven by length, from what is pulled in: theory (95) to (97).
 
 A unit of tension loads the sections by N and M, and does work on their strains: it shortens the
 path of its tendon by s = ∫ N (ζ - 1) + M·ω dZ, with ω = η u. This is exact for tendons parallel to
-the axis, and consistent with the loads of `Tendon` for all others. Of an arm without loads s is
-linear in the tensions, and its slopes C are symmetric and positive semidefinite; so tensions solve
-a linear complementarity problem. As every tension shortens the axis, it has a solution for all q.
+the axis of an arm that is not twisted, and consistent with the loads of `Tendon` for all others.
+Without loads s is linear in the tensions, and its slopes C are symmetric and positive semidefinite;
+so tensions solve a linear complementarity problem. As every tension shortens the axis, it has a
+solution for all displacements.
 """
 
 from __future__ import annotations

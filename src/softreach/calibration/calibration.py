@@ -115,6 +115,7 @@ def calibrate(
         if isinstance(data, Measurements)
         else read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
     )
+    _warn_of_copies(table)
     held = _held_out(table, hold_out, as_integer("seed", seed))
     train = table.of(~held)
     numbers = free_numbers(arm, free, prior)
@@ -144,8 +145,16 @@ def calibrate(
 def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
     held = np.zeros(len(data), bool)
     count = round(share * len(data))
+    if count == len(data):
+        raise InvalidInput("hold_out", share, f"such that some of {len(data)} samples are left")
     held[np.random.default_rng(seed).permutation(len(data))[:count]] = True
     return held
+
+
+def _warn_of_copies(data: Measurements) -> None:
+    rows = np.concatenate([data.inputs, data.places.reshape(len(data), -1)], axis=1)
+    if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
+        warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
 
 
 def _rivals(arm: Manipulator, data: Measurements, held: NDArray[np.bool_]) -> tuple[Rival, ...]:
@@ -234,8 +243,9 @@ class Calibration:
     @cached_property
     def verdict(self) -> Verdict:
         """What limits the fit."""
-        known = self.held_out if self.held.any() else self.train
-        return judged(self.data, self.residuals, known.rms, self.repeatability)
+        held = bool(self.held.any())
+        known, name = (self.held_out, "held-out") if held else (self.train, "fitted")
+        return judged(self.data, self.residuals, known.rms, self.repeatability, f"{name} error")
 
     @property
     def outliers(self) -> NDArray[np.intp]:
@@ -332,7 +342,8 @@ class Calibration:
             "residual": (place, self.residuals, {"units": "m"}),
             "held_out": ("sample", self.held),
             "run": ("sample", self.data.runs),
-            "input": (("sample", "input"), self.data.inputs),
+            "rank": ("sample", np.argsort(self.data.order)),
+            "input_value": (("sample", "input"), self.data.inputs),
         }
         names = {
             "number": list(self.names),
@@ -341,8 +352,9 @@ class Calibration:
             "marker": list(self.data.marker_names),
             "axis": ["x", "y", "z"],
             "input": list(self.arm.input_names),
+            "input_unit": ("input", list(self.arm.input_units)),
         }
-        return xr.Dataset(values, names, self.provenance)
+        return xr.Dataset(values, names, {**self.provenance, "length": self.arm.length})
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -383,6 +395,37 @@ class Calibration:
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
             stream.write(text.encode())
+
+    def save_table(
+        self, path: str | PathLike[str], *, unit: str = "m", overwrite: bool = False
+    ) -> None:
+        """Write inputs, measured and predicted places and their distances, a row for each sample.
+
+        Args:
+            path: A .csv file.
+            unit: Of lengths: m, cm, mm or L.
+            overwrite: Whether it may replace any file, and not only such a table.
+        """
+        from softreach.calibration.residual_table import write_table
+
+        write_table(self, path, unit, overwrite=overwrite)
+
+    def save_report(
+        self, path: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
+    ) -> None:
+        """Write a report in one .html file: numbers, errors, verdict and pictures.
+
+        Args:
+            path: The file.
+            unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
+            overwrite: Whether it may replace any file, and not only an older report.
+
+        Raises:
+            MissingExtra: matplotlib or Jinja2 is not installed.
+        """
+        from softreach.calibration.html_report import write_report
+
+        write_report(self, path, unit, overwrite=overwrite)
 
     def __repr__(self) -> str:
         from softreach.calibration.report import summary_text

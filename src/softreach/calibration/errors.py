@@ -31,7 +31,8 @@ class Misses(NamedTuple):
     rms: float
     most: float
     """95 % of them are below it."""
-    count: int
+    number: int
+    """How many places."""
 
     def text(self, length: float) -> str:
         """Of the command line: "median 3.1, mean 4.0, rms 5.2, 95 % below 9.9 mm (1.4 % of L)"."""
@@ -75,11 +76,11 @@ def repeatability(data: Measurements) -> Repeatability:
     moving = spans > 0
     if not moving.any() or len(data) < 2:
         return Repeatability(np.nan, 0, False)
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     scaled = data.inputs[:, moving] / spans[moving]
-    distance, partner = cKDTree(scaled).query(scaled, k=2)
-    distance, partner = distance[:, 1], partner[:, 1]
+    near = KDTree(scaled).query(scaled, k=2)
+    distance, partner = (np.asarray(values)[:, 1] for values in near)
     for limit, exact in ((1e-9, True), (_NEAR, False)):
         rows = np.flatnonzero(distance <= limit)
         apart = (data.places[rows] - data.places[partner[rows]])[..., :]
@@ -101,17 +102,20 @@ class Verdict:
     """Share of the squared residuals that the last command explains, by cross-validation [-]."""
 
 
-def judged(data: Measurements, residuals: Array, error: float, repeated: Repeatability) -> Verdict:
+def judged(
+    data: Measurements, residuals: Array, error: float, repeated: Repeatability, name: str
+) -> Verdict:
     """What limits a fit, from its residuals in the order in which samples were taken.
 
     Args:
         data: All samples.
         residuals: Predicted minus measured places, NaN where unknown, (n, marker, 3) [m].
-        error: Held-out error, rms [m].
+        error: Error that is judged, rms [m].
         repeated: What the data repeats.
+        name: "held-out error" or "fitted error".
     """
     share = _memory(data, residuals)
-    text = f"held-out error {1e3 * error:.3g} mm rms"
+    text = f"{name} {1e3 * error:.3g} mm rms"
     known = np.isfinite(repeated.rms)
     if known:
         text += f", repeated inputs differ by {1e3 * repeated.rms:.3g} mm"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,15 @@ Array = NDArray[np.float64]
 
 _SAME = 1e-7
 """Smallest singular value over the largest, in scales of the numbers, that data can tell."""
+_IDLE = 1e-9
+"""Motion of markers in L, or over that of the other numbers, that is rounding."""
 _ROBUST = 3.0
 """Residuals beyond so many widths count less than their squares."""
 _FINE, _COARSE = 1e-7, 1e-3
 """Least share by which a step must improve: of the last round, of those before."""
 _MOST = 60
+_PERMUTED = 5
+"""Markers of which all orders are tried."""
 _FAR = 1.0  # m, what a sample without equilibrium misses
 
 
@@ -56,8 +61,8 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
     moving = [name for name in POSE[:3] if name in free.names]
     if not moving:
         return free
-    predicted = model.predict(free.start).places.reshape(-1, 3)
-    measured = places.reshape(-1, 3)
+    each = model.predict(free.start).places
+    predicted, measured = each.reshape(-1, 3), places.reshape(-1, 3)
     known = np.isfinite(predicted).all(axis=1) & np.isfinite(measured).all(axis=1)
     if not known.any():
         return free
@@ -65,15 +70,14 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
     start = np.array(free.arm.base.position)
     if len(turning) < 3 or len(moving) < 3:
         shift = np.median(measured - predicted, axis=0)
-        return free.started_at(
-            {name: start[POSE.index(name)] + shift[POSE.index(name)] for name in moving}
-        )
+        moved = zip(POSE[:3], start + shift, strict=True)
+        return free.started_at({name: place for name, place in moved if name in moving})
     rotation, shift = _kabsch(predicted, measured)
     _refuse_mirror(predicted, measured)
+    _refuse_exchanged(each, places, model.names)
     vector = _rotation_vector(rotation)
     place = rotation @ start + shift
-    pose = dict(zip(POSE, [*place, *vector], strict=True))
-    return free.started_at({name: pose[name] for name in (*moving, *turning)})
+    return free.started_at(dict(zip(POSE, [*place, *vector], strict=True)))
 
 
 def _kabsch(predicted: Array, measured: Array, mirror: bool = False) -> tuple[Array, Array]:
@@ -85,12 +89,37 @@ def _kabsch(predicted: Array, measured: Array, mirror: bool = False) -> tuple[Ar
     return rotation, there - rotation @ here
 
 
+def _miss(predicted: Array, measured: Array, mirror: bool = False) -> float:
+    """Distance in the middle of places that are brought together."""
+    rotation, shift = _kabsch(predicted, measured, mirror)
+    return float(np.median(np.linalg.norm(predicted @ rotation.T + shift - measured, axis=1)))
+
+
+def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...]) -> None:
+    """Refuse markers that match far better under each other's names, shapes (n, marker, 3)."""
+    misses: dict[tuple[int, ...], float] = {}
+    for order in permutations(range(min(len(names), _PERMUTED))):
+        others = predicted[:, list(order)], measured[:, : len(order)]
+        known = np.isfinite(others[0] + others[1]).all(axis=2)
+        if known.sum() > 2:
+            misses[order] = _miss(others[0][known], others[1][known])
+    own = tuple(range(min(len(names), _PERMUTED)))
+    best = min(misses, key=misses.__getitem__, default=own)
+    if best != own and own in misses and misses[best] < 0.35 * misses[own]:
+        size = float(np.nanmedian(np.linalg.norm(np.diff(predicted, axis=1), axis=2)))
+        if misses[own] > 0.1 * size:
+            given = ", ".join(names[: len(own)])
+            seem = ", ".join(names[k] for k in best)
+            raise InvalidInput(
+                "markers of the data",
+                given,
+                f"in their order along the arm; they seem to be {seem}",
+            )
+
+
 def _refuse_mirror(predicted: Array, measured: Array) -> None:
     """Refuse places whose mirror image matches far better than they do."""
-    misses = []
-    for mirror in (False, True):
-        rotation, shift = _kabsch(predicted, measured, mirror)
-        misses.append(np.median(np.linalg.norm(predicted @ rotation.T + shift - measured, axis=1)))
+    misses = [_miss(predicted, measured, mirror) for mirror in (False, True)]
     size = np.median(np.linalg.norm(measured - measured.mean(axis=0), axis=1))
     if misses[1] < 0.35 * misses[0] and misses[0] > 0.1 * size:
         raise InvalidInput(
@@ -118,12 +147,11 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
     """
     scaled = slopes * free.scale
     sizes = np.linalg.norm(scaled, axis=0)
-    idle = [
-        name for name, size in zip(free.names, sizes, strict=True) if size <= 1e-9 * sizes.max()
-    ]
-    if idle or not sizes.max() > 0:
+    still = _IDLE * max(sizes.max(), free.arm.length * np.sqrt(len(slopes)))
+    idle = [name for name, size in zip(free.names, sizes, strict=True) if size <= still]
+    if idle:
         allowed = "numbers that move some marker of some sample: leave out what does nothing here"
-        raise InvalidInput("free", ", ".join(idle or free.names), allowed)
+        raise InvalidInput("free", ", ".join(idle), allowed)
     _, values, axes = np.linalg.svd(scaled, full_matrices=False)
     if len(scaled) < len(free):
         allowed = f"at most {len(scaled)} numbers, as many as the data has"
@@ -199,7 +227,7 @@ class _Problem:
         self, model: MarkerModel, places: Array, noise: float | None, progress: Progress
     ) -> None:
         self.model, self.places, self.progress = model, places, progress
-        self.seen = np.isfinite(places).all(axis=2)
+        self.seen = np.asarray(np.isfinite(places).all(axis=2))
         self.noise = noise
         self.width: float | None = None
         self.unit = 1.0  # of priors, in m
@@ -269,7 +297,7 @@ class _Problem:
             jac=self.slopes,  # pyright: ignore[reportArgumentType]
             bounds=self.bounds,
             x_scale=self.model.free.scale,
-            loss=_loss(self.seen, self.width),
+            loss=_loss(int(self.seen.sum()), self.width),  # pyright: ignore[reportArgumentType]
             f_scale=1.0,
             ftol=fine,
             xtol=fine,
@@ -285,11 +313,10 @@ class _Problem:
         return self.seen / np.sqrt(1.0 + (distance / self.width) ** 2)
 
 
-def _loss(seen: Array, width: float | None) -> str | Callable[[Array], Array]:
+def _loss(count: int, width: float | None) -> str | Callable[[Array], Array]:
     """Loss of places, by their distance, so that it does not depend on the axes; pseudo-Huber."""
     if width is None:
         return "linear"
-    count = int(seen.sum())
 
     def loss(squares: Array) -> Array:
         # SciPy takes ρ of each squared residual: that of a place is shared by its three.

@@ -276,8 +276,11 @@ def _moved(base: Base, pose: Mapping[str, float]) -> Base:
 def _prior(number: FreeNumber, given: Any) -> tuple[float, float] | None:
     if given is None:
         return None
-    values = np.ravel(np.asarray(plain(given), float))
-    mean, width = (number.start, values[0]) if len(values) == 1 else values[:2]
+    try:
+        values = np.ravel(np.asarray(plain(given), float))
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    mean, width = values if len(values) == 2 else (number.start, values[0] if len(values) else 0.0)
     if len(values) > 2 or not (0 < width < math.inf and math.isfinite(mean)):
         raise InvalidInput(f"prior of {number.name}", given, "a width above 0, or (mean, width)")
     return float(mean), float(width)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.support.arguments import as_given
-from softreach.support.errors import InvalidInput, counted, did_you_mean, in_short
+from softreach.support.errors import InvalidInput, counted, did_you_mean, in_short, warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,6 +48,8 @@ _RUNS = ("run", "pattern", "group", "trial", "cluster", "sequence")
 _ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")
 _PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNORECASE)
 _MOST_ROWS = 2_000_000
+_WIDEST = 4.0
+"""Distance of a place from the middle of all, in lengths of the arm, that is no pose of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +142,7 @@ def read_measurements(
     if len(table) > _MOST_ROWS:
         raise InvalidInput("data", f"{len(table):,} rows", f"at most {_MOST_ROWS:,}")
     columns = [str(name) for name in table.columns]
+    _refuse_repeated(columns)
     table = table.set_axis(columns, axis=1)
     run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
     triples = _triples(columns, {run, order})
@@ -159,8 +162,13 @@ def read_measurements(
     if not seen.any():
         raise InvalidInput("places of markers", "no number", "seen in at least one sample")
     places[~seen] = np.nan
+    if lost := [name for name, own in zip(chosen, seen.T, strict=True) if not own.any()]:
+        warn(f"markers that were never seen are left out: {', '.join(lost)}")
+        places = places[:, seen.any(axis=0)]
+        chosen = {name: start for name, start in chosen.items() if name not in lost}
+    _refuse_far(arm, places)
     runs, run_names = _runs(table, run)
-    digest = hashlib.sha256(np.ascontiguousarray(np.c_[values, places.reshape(len(values), -1)]))
+    numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
         inputs=values,
         places=places,
@@ -171,7 +179,7 @@ def read_measurements(
         order=_order(table, run, order),
         rows=np.arange(len(values)),
         source=source,
-        digest=digest.hexdigest(),
+        digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
     )
 
 
@@ -181,13 +189,13 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
 
     if isinstance(data, pd.DataFrame):
         return data.reset_index(drop=True), "a DataFrame"
-    if isinstance(data, Mapping) and not hasattr(data, "to_dataframe"):
+    if hasattr(data, "to_dataframe"):
+        return data.to_dataframe().reset_index(), "a dataset"
+    if isinstance(data, Mapping):
         try:
             return pd.DataFrame(dict(data)), "a dictionary"
         except ValueError as error:
             raise InvalidInput("data", str(error), "columns of one length") from None
-    if hasattr(data, "to_dataframe"):
-        return data.to_dataframe().reset_index(), "a dataset"
     if isinstance(data, str | PathLike):
         return _read(Path(data))
     raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
@@ -225,6 +233,24 @@ def _named(columns: list[str], given: str | None, usual: Sequence[str], what: st
         return given
     by_name = {name.lower(): name for name in columns}
     return next((by_name[name] for name in usual if name in by_name), None)
+
+
+def _refuse_repeated(columns: list[str]) -> None:
+    """Refuse columns of one name, the second of which pandas calls `NAME.1`."""
+    for name in columns:
+        first = re.sub(r"\.\d+$", "", name)
+        if columns.count(name) > 1 or (first != name and first in columns):
+            raise InvalidInput("column", first, "there once: the data has two of this name")
+
+
+def _refuse_far(arm: Manipulator, places: Array) -> None:
+    """Refuse places that are farther apart than any pose of the arm could put them."""
+    known = places[np.isfinite(places).all(axis=2)]
+    middle = float(np.median(np.linalg.norm(known - np.median(known, axis=0), axis=1)))
+    offsets = [float(np.linalg.norm(marker.offset)) for marker in arm.markers]
+    if middle > _WIDEST * (arm.length + max(offsets, default=0.0)):
+        allowed = f"near an arm of {1e3 * arm.length:.4g} mm: look at the units of the columns"
+        raise InvalidInput("places of markers", f"apart by {1e3 * middle:.4g} mm", allowed)
 
 
 def _missing(what: str, name: str, columns: list[str]) -> InvalidInput:

@@ -44,6 +44,19 @@ _BLOCK = 1024
 """Samples at once: their shapes at all nodes are kept."""
 _TOL = 1e-6
 _STEPS = 24
+_BODY = (
+    "profile",
+    "section",
+    "actuators",
+    "loads",
+    "rest",
+    "stations",
+    "rigid_pieces",
+    "markers",
+)
+"""Parts of an arm that are more than its drives and the pose of its base."""
+_ENDS = ("start", "end", "stations.")
+"""In names of numbers that move ends of actuators."""
 
 
 class Prediction(NamedTuple):
@@ -95,6 +108,12 @@ class MarkerModel:
     markers: NDArray[np.intp]
     """Those of the arm's markers that were measured."""
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the markers that were measured."""
+        known = [marker.name for marker in self.free.arm.markers] or ["tip"]
+        return tuple(known[k] for k in self.markers)
+
     @classmethod
     def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
         """The model of measured poses."""
@@ -133,11 +152,13 @@ class MarkerModel:
 
     def _grid(self, arm: Manipulator) -> StepGrid:
         stations, _ = marker_stations(arm)
-        return step_grid(body_of(arm), stations[self.markers], _STEPS)
+        moving = any(word in name for name in self.free.names for word in _ENDS)
+        return step_grid(body_of(arm), stations[self.markers], _STEPS, moving_ends=moving)
 
     def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm)
-        body, law = body_of(arm), LengthLaw(body_of(arm))
+        body, driving = body_of(arm), Driving(arm)
+        law = driving.law
         table = node_tables(body, stations[self.markers], grid)
         columns = law.columns
         stiffness = np.zeros((*table.length.shape, 4))
@@ -153,12 +174,20 @@ class MarkerModel:
             arm.base.rotation,
             np.array(arm.base.position),
             offsets[self.markers],
-            Driving(arm).bundles(inputs),
+            driving.bundles(inputs),
             law.taut_from,
             law.compliance,
             measures * stiffness[..., None],
             rest,
         )
+
+    def _beside(
+        self, arm: Manipulator, at: _Explicit, other: Manipulator, grid: StepGrid, inputs: Array
+    ) -> _Explicit:
+        """The same of another arm; tables are not made again where its body is the same."""
+        if any(getattr(arm, part) != getattr(other, part) for part in _BODY):
+            return self._explicit(other, grid, inputs)
+        return at._replace(bundles=Driving(other).bundles(inputs))
 
     def _block(
         self,
@@ -172,7 +201,7 @@ class MarkerModel:
         at = self._explicit(arm, grid, inputs)
         rod = _rod(arm, grid)
         gamma = _activations(arm, rod, at.bundles)
-        lost = ~np.isfinite(gamma).all(axis=1)
+        lost = np.asarray(~np.isfinite(gamma).all(axis=1))
         gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
         state = rod_state(rod, gamma, at.table)
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
@@ -180,7 +209,7 @@ class MarkerModel:
         places[lost] = np.nan
         if not slopes:
             return places, None, state.status
-        known = np.isfinite(places).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
         changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
         result = np.full((*places.shape, len(changes)), np.nan)
         result[known] = _slopes(rod.arm, at, _some(state, known), changes, known)
@@ -197,14 +226,14 @@ class MarkerModel:
         """Derivative of all that is explicit by one number."""
         factors = [factor for factor, _ in neighbors]
         each = [
-            self._explicit(other, grid, inputs)
+            self._beside(arm, at, other, grid, inputs)
             if isinstance(other, Manipulator)
             else _on_base(arm, at, other)
             for _, other in neighbors
         ]
         table = each[0].table.combined([one.table for one in each], factors)
         others = (
-            sum(f * values for f, values in zip(factors, columns, strict=True))
+            np.tensordot(factors, np.stack(columns), axes=1)
             for columns in zip(*(one[1:] for one in each), strict=True)
         )
         return _Explicit(table, *others)

@@ -1,52 +1,159 @@
-"""Text of a calibration."""
+"""Text of a calibration: numbers with their errors, errors of places beside those of rivals."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from softreach.calibration.errors import Misses
+from softreach.calibration.free_numbers import POSE, FreeNumbers
+from softreach.support.errors import counted
+from softreach.support.quantity import quantity
+from softreach.support.units import LengthUnit, as_unit, handy_unit
 
 if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
     from softreach.calibration.calibration import Calibration
 
-__all__ = ["summary_text"]
+__all__ = [
+    "ErrorRow",
+    "columns",
+    "error_cells",
+    "error_head",
+    "error_rows",
+    "number_rows",
+    "remarks",
+    "shown_unit",
+    "sigma_rows",
+    "summary_text",
+]
 
-_SHOWN = {"m": ("mm", 1e3), "rad": ("°", 57.29577951308232), "1": ("", 1.0)}
+_PRESSURES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}
+_MOST_ROWS = 10
 
 
-def summary_text(result: Calibration) -> str:
-    """Numbers with their errors, errors of the fit and of its rivals, and the verdict."""
-    length, held = result.arm.length, result.held.any()
-    count = len(result.data) - int(result.held.sum())
+class ErrorRow(NamedTuple):
+    """Errors of one law on some samples."""
+
+    law: str
+    samples: str
+    """Those of which the errors are."""
+    errors: Misses
+
+
+def shown_unit(arm: Manipulator, unit: LengthUnit | None = None) -> LengthUnit:
+    """The unit asked for, that of the design, or one that is handy."""
+    name = arm.display_unit or handy_unit(arm.length)
+    return as_unit(name, arm.length) if unit is None else unit
+
+
+def summary_text(result: Calibration, unit: LengthUnit | None = None) -> str:
+    """All that a calibration found, in lines.
+
+    Args:
+        result: The calibration.
+        unit: Of lengths; None for that of the design, or one that is handy.
+    """
+    unit = shown_unit(result.arm, unit)
+    fitted = len(result.data) - int(result.held.sum())
+    markers = ", ".join(result.data.marker_names)
     lines = [
-        f"Calibration of {len(result.names)} numbers on {count:,} samples of "
-        f"{', '.join(result.data.marker_names)}, {result.seconds:.1f} s"
+        f"{counted(len(result.names), 'number')} from {counted(fitted, 'sample')} of {markers}, "
+        f"{result.seconds:.1f} s",
+        *columns([("number", "calibrated", "design"), *number_rows(result, unit)]),
+        *columns([error_head(unit), *error_cells(result, unit)]),
+        *remarks(result, unit),
     ]
-    lines += [f"  {line}" for line in _numbers(result)]
-    lines.append(f"  fitted samples: {result.train.text(length)}")
+    return "\n  ".join(lines)
+
+
+def number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
+    """Name, value ± standard deviation and value of the design of each free number."""
+    free = result.fit.free.numbers
+    sigma = result.uncertainty.sigma.tolist()
+    bound = result.fit.at_bound.tolist()
+    for k, (number, value) in enumerate(zip(free, result.fit.values.tolist(), strict=True)):
+        name, size = _scale(number.unit, value, unit)
+        text = quantity(value / size, name, sigma[k] / size, digits=2)
+        text += ", at its bound" if bound[k] else ", with its prior" if number.prior else ""
+        yield number.name, text, f"{_of_design(result, k) / size:.4g}"
+
+
+def sigma_rows(
+    free: FreeNumbers, sigma: Iterable[float], unit: LengthUnit
+) -> Iterator[tuple[str, str, str]]:
+    """Name, value of the design ± a standard deviation, and their ratio, of each number."""
+    for number, width in zip(free.numbers, sigma, strict=True):
+        name, size = _scale(number.unit, number.start, unit)
+        share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
+        yield number.name, quantity(number.start / size, name, width / size, digits=2), share
+
+
+def _of_design(result: Calibration, k: int) -> float:
+    """Value of a number before the fit; the pose starts from the data and not from there."""
+    number = result.fit.free.numbers[k]
+    if number.name in POSE:
+        return (*result.start.base.position, 0.0, 0.0, 0.0)[POSE.index(number.name)]
+    return number.start
+
+
+def _scale(unit: str, value: float, length: LengthUnit) -> tuple[str, float]:
+    """The unit that people read a number in, and its size."""
+    if unit == "m":
+        return length.name, length.size
+    if unit == "rad":
+        return "°", math.pi / 180.0
+    if unit == "Pa":
+        return next((pair for pair in _PRESSURES.items() if abs(value) >= pair[1]), ("Pa", 1.0))
+    return ("" if unit == "1" else unit), 1.0
+
+
+def error_rows(result: Calibration) -> Iterator[ErrorRow]:
+    """Errors of the calibrated arm, of the design, and of rivals on the same samples."""
+    held = int(result.held.sum())
+    fitted = f"{len(result.data) - held} fitted"
+    yield ErrorRow("calibrated", fitted, result.train)
+    on = f"{held} held out" if held else fitted
     if held:
-        lines.append(f"  held out:       {result.held_out.text(length)}")
-    if len(result.data.marker_names) > 1:
-        each = (f"{name} {1e3 * m.rms:.3g}" for name, m in result.by_marker.items())
-        lines.append(f"  each marker, mm rms: {', '.join(each)}")
-    lines.append(f"  as designed, base fitted: {result.before.text(length)}")
+        yield ErrorRow("calibrated", on, result.held_out)
+    yield ErrorRow("design, base fitted", f"{len(result.data)} all", result.before)
     for rival in result.rivals:
-        errors = rival.held_out if held else rival.train
-        lines.append(f"  {rival.name}, {rival.numbers} numbers: {errors.text(length)}")
+        law = f"{rival.name}, {counted(rival.numbers, 'number')}"
+        yield ErrorRow(law, on, rival.held_out if held else rival.train)
+
+
+def error_head(unit: LengthUnit) -> tuple[str, ...]:
+    """Heading of `error_cells`."""
+    return (unit.label("error of places"), "samples", "rms", "median", "95 % below", "rms / L")
+
+
+def error_cells(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, ...]]:
+    """The same in words: law, samples, and errors in a unit and in L."""
+    for law, samples, errors in error_rows(result):
+        values = (errors.rms, errors.median, errors.most)
+        texts = (f"{value / unit.size:.3g}" if math.isfinite(value) else "-" for value in values)
+        share = f"{100.0 * errors.rms / result.arm.length:.2g} %"
+        yield law, samples, *texts, share if math.isfinite(errors.rms) else "-"
+
+
+def remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
+    """What is odd about a calibration, and what limits it."""
+    if len(result.data.marker_names) > 1:
+        each = ((name, errors.rms / unit.size) for name, errors in result.by_marker.items())
+        listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)
+        yield f"{unit.label('rms')} of each marker: {listed}"
     for one, other, share in result.correlated[:3]:
-        lines.append(f"  hardly told apart: {one} and {other} (correlation {share:+.3f})")
+        yield f"hardly told apart: {one} and {other} (correlation {share:+.3f})"
     if len(far := result.outliers):
-        rows = ", ".join(map(str, far[:10])) + (", ..." if len(far) > 10 else "")
-        lines.append(f"  far off: rows {rows}")
-    lines.append(f"  {result.verdict.sentence}")
-    return "\n".join(lines)
+        rows = ", ".join(map(str, far[:_MOST_ROWS])) + (", ..." if len(far) > _MOST_ROWS else "")
+        yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"
+    yield result.verdict.sentence
 
 
-def _numbers(result: Calibration) -> list[str]:
-    sigma, free = result.uncertainty.sigma, result.fit.free.numbers
-    width = max(len(number.name) for number in free)
-    lines = []
-    for k, number in enumerate(free):
-        unit, factor = _SHOWN.get(number.unit, (number.unit, 1.0))
-        value = f"{factor * result.fit.values[k]:.5g} ± {factor * sigma[k]:.2g} {unit}".rstrip()
-        end = ", at its bound" if result.fit.at_bound[k] else ""
-        lines.append(f"{number.name:<{width}}  {value}{end} (was {factor * number.start:.5g})")
-    return lines
+def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Cells below each other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for cells in rows:
+        padded = (f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True))
+        yield "  ".join(padded).rstrip()

@@ -60,7 +60,7 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     """
     slopes = fit.prediction.slopes
     assert slopes is not None
-    open_ = ~fit.at_bound
+    free = ~fit.at_bound
     count = len(fit.values)
     scale = fit.free.scale
     weight = np.sqrt(fit.weights)[..., None]
@@ -69,29 +69,57 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     miss = np.where(seen[..., None], weight * fit.residuals, 0.0)
     by_run = len(data.run_names) >= max(_FEWEST_RUNS, 2 * count)
     keys = data.runs if by_run else np.arange(len(data))
-    rows = rows.reshape(len(data), -1, count)[:, :, open_]
+    rows = rows.reshape(len(data), -1, count)[:, :, free]
     miss = miss.reshape(len(data), -1)
     bread = np.einsum("nrp,nrq->pq", rows, rows)
     width = noise or robust_width(miss.reshape(-1, 3)[seen.ravel()])
-    priors = [number.prior for number in fit.free.numbers]
-    known = np.array(
-        [0.0 if p is None else (width * s / p[1]) ** 2 for p, s in zip(priors, scale, strict=True)]
-    )[open_]
+    widths = [np.inf if number.prior is None else number.prior[1] for number in fit.free.numbers]
+    known = ((width * scale / np.array(widths)) ** 2)[free]
     inverse = np.linalg.pinv(bread + np.diag(known))
-    meat, spread = np.diag(known * width**2), []
-    half = _root(inverse)
-    for key in np.unique(keys):
-        own, left = rows[keys == key].reshape(-1, rows.shape[2]), miss[keys == key].ravel()
+    meat, freedom = _sandwich(rows, miss, keys, inverse)
+    whole = np.zeros((count, count))
+    whole[np.ix_(free, free)] = inverse @ (meat + np.diag(known * width**2)) @ inverse
+    degrees = np.full(count, np.inf)
+    degrees[free] = freedom
+    return Uncertainty(whole * np.outer(scale, scale), degrees, "run" if by_run else "sample")
+
+
+def _sandwich(
+    rows: Array, miss: Array, keys: NDArray[np.intp], inverse: Array
+) -> tuple[Array, Array]:
+    """Sum of the squares of the scores of all clusters, and the degrees of freedom by it.
+
+    The residuals of a cluster are freed of its own leverage, (1 - H)^-1/2; the degrees of freedom
+    are those of the chi square with the same mean and variance (Satterthwaite).
+
+    Args:
+        rows: Derivatives of the residuals of samples, shape (n, residual, number).
+        miss: Residuals, shape (n, residual).
+        keys: Cluster of each sample, shape (n,).
+        inverse: Of the sum of squares of all rows.
+    """
+    count = rows.shape[2]
+    half, meat = _root(inverse), np.zeros((count, count))
+    squares, total, mixed = np.zeros((3, count))
+    spread = np.zeros((count, count, count))
+    order = np.argsort(keys, kind="stable")
+    ends = np.flatnonzero(np.diff(keys[order], append=-1)) + 1
+    for cluster in np.split(order, ends[:-1]):
+        own, left = rows[cluster].reshape(-1, count), miss[cluster].ravel()
         if not own.any():
             continue
-        score = own.T @ _without_leverage(own @ half, left)
-        meat = meat + np.outer(score, score)
-        spread.append(np.einsum("pr,rq->pq", half, own.T @ own @ half).diagonal())
-    whole = np.zeros((count, count))
-    whole[np.ix_(open_, open_)] = inverse @ meat @ inverse
-    freedom = np.full(count, np.inf)
-    freedom[open_] = _freedom(np.array(spread), rows.shape[2])
-    return Uncertainty(whole * np.outer(scale, scale), freedom, "run" if by_run else "sample")
+        score = own.T @ _without_leverage(own @ half, left[:, None])[:, 0]
+        meat += np.outer(score, score)
+        part = _without_leverage(own @ half, own @ inverse)
+        size, moved = (part**2).sum(axis=0), own.T @ part
+        total += size
+        squares += size**2
+        mixed += size * np.einsum("pc,pq,qc->c", moved, inverse, moved)
+        spread += np.einsum("pc,qc->cpq", moved, moved)
+    product = np.einsum("pq,cqr->cpr", inverse, spread)
+    lost = np.einsum("cpp->c", product)
+    variance = squares - 2.0 * mixed + np.einsum("cpq,cqp->c", product, product)
+    return meat, np.maximum((total - lost) ** 2 / np.maximum(variance, 1e-300), 1.0)
 
 
 def _root(matrix: Array) -> Array:
@@ -100,19 +128,7 @@ def _root(matrix: Array) -> Array:
 
 
 def _without_leverage(half: Array, left: Array) -> Array:
-    """(1 - H)^-1/2 of the residuals of a cluster, with H = half halfᵀ."""
+    """(1 - H)^-1/2 of columns of residuals of a cluster, with H = half halfᵀ."""
     axes, values, _ = np.linalg.svd(half, full_matrices=False)
     factor = 1.0 / np.sqrt(np.maximum(1.0 - values**2, 1e-6)) - 1.0
-    return left + axes @ (factor * (axes.T @ left))
-
-
-def _freedom(shares: Array, numbers: int) -> Array:
-    """Degrees of freedom: of clusters that share the information evenly, one less than they are.
-
-    Args:
-        shares: Share of each cluster in the information on each number, shape (cluster, number).
-        numbers: How many there are.
-    """
-    del numbers
-    even = 1.0 / np.maximum((shares**2).sum(axis=0), 1e-12)
-    return np.maximum(even.min() - 1.0, 1.0) * np.ones(shares.shape[1])
+    return left + axes @ (factor[:, None] * (axes.T @ left))

@@ -20,13 +20,18 @@ from softreach.support.plugins import importing
 _MORE = Group("More", sort_key=-1)
 _COMMANDS = (
     (Group("Design", sort_key=-6), ("design", "list", "studio")),
+    (Group("Bench", sort_key=-5.5), ("plan-poses", "calibrate")),
     (Group("Reach", sort_key=-5), ("reach", "cloud", "volume", "payload", "gradient")),
     (Group("Places", sort_key=-4), ("solve", "track", "equilibria")),
     (Group("Output", sort_key=-3), ("show", "export", "import")),
     (Group("Families", sort_key=-2), ("atlas",)),
     (_MORE, ("demo", "paper", "warmup")),
 )
-_OBJECTS = {"import": "import_file", "list": "listing"}  # where Python needs the name itself
+_OBJECTS = {
+    "import": "import_file",
+    "list": "listing",
+    "plan-poses": "plan_poses",
+}  # where Python needs the name itself
 
 
 def _shown_default(value: object) -> Any:

@@ -135,6 +135,10 @@ def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
             f"|κ| R2 {_span(facts.bundle_bending[k])}",
         )
         rows[f"activation {name}"] = (f"{_span(arm.bounds[k])}{unit}: {', '.join(effects)}", "")
+    for drive in arm.drives:
+        unit = "" if drive.unit == "1" else f" {drive.unit}"
+        gains = ", ".join(f"{gain:+g} {name}" for name, gain in drive.gains.items())
+        rows[f"drive {drive.name}"] = (f"{_span(drive.bounds)}{unit}: {gains}", "")
     return rows
 
 
@@ -152,7 +156,10 @@ def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
         facts.bundle_extension.tolist(),
         facts.bundle_bending.tolist(),
     )
+    inputs = arm.input_names, arm.input_units, arm.input_bounds.tolist()
+    drives = [dict(zip(names, row, strict=False)) for row in zip(*inputs, strict=True)]
     return {
+        **({"inputs": (drives, "")} if arm.drives else {}),
         "activations": (
             [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
             "",

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import base64
 import os
 import platform
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from softreach.paper.claims import CLAIMS, Verdict
 from softreach.paper.notebook import Notebook, Settings
-from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
 from softreach.support.files.kinds import FileKind, Formats, text_with
+from softreach.support.files.templates import page_template, png_source
 
 __all__ = ["REPORT", "report_template", "write_report"]
 
@@ -95,7 +93,7 @@ def _figures(notebooks: Mapping[str, Notebook]) -> Iterator[dict[str, Any]]:
                 "wide": int.from_bytes(image[16:20]) > _NARROW,  # its width, in a PNG header
                 "title": f"Figure {picture.label}" if picture.label else "Beyond the paper",
                 "caption": picture.caption,
-                "source": f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}",
+                "source": png_source(image),
                 "order": picture.label or "9",
             }
 
@@ -111,10 +109,4 @@ def report_template() -> Any:
     Raises:
         MissingExtra: Jinja2 is not installed.
     """
-    try:
-        from jinja2 import Environment, StrictUndefined
-    except ModuleNotFoundError as error:
-        raise MissingExtra(("jinja2", "paper")) from error
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    text = files("softreach.paper").joinpath("report.html.jinja").read_text(encoding="utf-8")
-    return environment.from_string(text)
+    return page_template("softreach.paper", "report.html.jinja")

@@ -6,6 +6,7 @@ What draws one panel takes `ax=None` and returns the axes; what draws several re
 from __future__ import annotations
 
 from softreach.plot.arm import DesignPanel, plot_arm, plot_designs
+from softreach.plot.calibration import plot_calibration
 from softreach.plot.clouds import plot_cloud, plot_slab, plot_views
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.curvature import plot_curvature
@@ -25,6 +26,7 @@ __all__ = [
     "box_over_length",
     "plot_3d",
     "plot_arm",
+    "plot_calibration",
     "plot_cloud",
     "plot_cloud_sheet",
     "plot_compliance",

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm import skin
+from softreach.arm.driving import body_of
+from softreach.arm.lines import lengths_of_strains
 from softreach.arm.skin import Centerline
+from softreach.arm.tables import quadrature
 from softreach.geometry.surface import Surface
 from softreach.schema import configuration_dataset
 from softreach.support.errors import InvalidInput
@@ -41,6 +44,9 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
     straight = np.zeros((1, stations, 3))
     straight[..., 2] = z
     directors = np.tile(np.eye(3), (1, stations, 1, 1))
+    nodes = len(quadrature(body_of(arm))[0])
+    straight_lines = lengths_of_strains(arm, np.zeros((1, nodes, 3)), np.ones((1, nodes)))
+    lines: dict[str, Any] = {"line_length": straight_lines} if arm.bundles else {}
     shape = configuration_dataset(
         arm,
         np.zeros((1, arm.inputs)),
@@ -50,6 +56,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
         curvature=np.zeros((1, stations, 3)),
         extension=np.ones((1, stations)),
         radius=arm.profile.radius(z),
+        **lines,
     )
     return shape.isel(sample=0)
 

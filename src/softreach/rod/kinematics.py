@@ -12,9 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import schema
+from softreach.arm.driving import body_of
+from softreach.arm.lines import lengths_of_strains
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import quadrature
+from softreach.rod.driven import DrivenRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frame, Frames, Strains, TipMap
+from softreach.rod.view import View
+from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
@@ -34,6 +40,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+_LINES_TOGETHER = 256  # samples
 _COLUMNS = 64  # numbers at a station of one sample, those that come and go included
 
 
@@ -157,7 +164,9 @@ def configuration(
     Returns:
         Dataset with `position` [m], `directors` (d1, d2, d3), `curvature` u [1/m] in the directors,
         `extension` ζ and `radius` R2 [m], over `station` (coordinate Z [m]); `marker_position` [m]
-        over `marker`, if the arm has markers.
+        over `marker`, if the arm has markers. `line_length` [m] over `line` of the middle line of
+        each bundle where it acts, and `bundle_activation` there, such as tensions [N], if drives or
+        displacements lead to them.
 
     Raises:
         InvalidInput: Activations or stations of another shape or out of range, or activations
@@ -168,14 +177,15 @@ def configuration(
     gamma = rod.check_activations("activation", np.atleast_2d(values))
     z = stations_along(rod, stations, _COLUMNS * max(1, len(gamma)))
     status = np.empty(len(gamma), np.int8)
-    dataset = shape_dataset(rod, gamma, z, rod.frames(gamma, z, status), rod.strains(gamma, z))
+    frames, strains = rod.frames(gamma, z, status), rod.strains(gamma, z)
+    dataset = shape_dataset(rod, gamma, z, frames, strains, **_lines(rod, gamma))
     if rod.supports_unstable:
         dataset = schema.with_status(dataset, status)
     return dataset.isel(sample=0) if values.ndim == 1 else dataset
 
 
 def shape_dataset(
-    rod: TipMap, gamma: Array, z: Array, frames: Frames, strains: Strains
+    rod: TipMap, gamma: Array, z: Array, frames: Frames, strains: Strains, **lines: Array
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
     markers = {"marker_position": _markers(rod, gamma)} if rod.arm.markers else {}
@@ -189,7 +199,26 @@ def shape_dataset(
         **strains._asdict(),
         radius=rod.radius(z),
         **markers,
+        **lines,
     )
+
+
+def _lines(rod: TipMap, gamma: Array) -> dict[str, Array]:
+    """Lengths of the lines of bundles, and what drives and displacements activate there."""
+    arm = rod.arm
+    if not arm.bundles:
+        return {}
+    strains_at = rod.strains_at(quadrature(body_of(arm))[0])
+    length = np.empty((len(gamma), arm.bundles))
+    for block in parallel.blocks(len(gamma), _LINES_TOGETHER):
+        strains = strains_at(gamma[block])
+        turn = strains.curvature * strains.extension[..., None]
+        length[block] = lengths_of_strains(arm, turn, strains.extension)
+    if arm.inner is arm:
+        return {"line_length": length}
+    while isinstance(rod, View | DrivenRod):
+        rod, gamma = rod.base, rod.activations(gamma)
+    return {"line_length": length, "bundle_activation": gamma[:, : arm.bundles]}
 
 
 def stations_along(rod: TipMap, stations: int | ArrayLike, columns: int = 1) -> Array:

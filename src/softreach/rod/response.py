@@ -49,8 +49,8 @@ class StepGrid:
 
     counts: NDArray[np.intp]
     """Steps between neighbors of these places, in their order along the arm."""
-    stations: int
-    """Number of stations that are asked for."""
+    moving_ends: bool
+    """True if what ends at the base or at the tip may come to end before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,21 +101,19 @@ class Response:
     """Work of the measures, shape (n, work, column)."""
 
 
-def _places(arm: Manipulator, stations: Array) -> Array:
-    """All places where something begins or ends [m], unsorted, with repetitions.
-
-    An actuator that ends at the tip has its own place there, so that it may end before.
-    """
+def _places(arm: Manipulator, stations: Array, moving_ends: bool) -> Array:
+    """All places where something begins or ends [m], ascending, with repetitions."""
     profile = arm.profile
     breaks = [z for actuator in arm.actuators for z in actuator.breakpoints(profile)]
     breaks += [arm.length * x for x in arm.section.breaks]
     spans = [*arm.actuators, *arm.rigid_pieces]
     ends = [(a.station_at("start", arm.length), a.station_at("end", arm.length)) for a in spans]
     breaks += [z for piece in arm.rigid_pieces for z in _inside(piece, arm.length)]
-    breaks += [0.0 for start, _ in ends if start <= 0.0]
-    breaks += [arm.length for _, end in ends if end >= arm.length]
+    if moving_ends:
+        breaks += [0.0 for start, _ in ends if start <= 0.0]
+        breaks += [arm.length for _, end in ends if end >= arm.length]
     points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
-    return np.array([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
+    return np.sort([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
 
 
 def _inside(piece: RigidPiece, length: float) -> list[float]:
@@ -124,17 +122,20 @@ def _inside(piece: RigidPiece, length: float) -> list[float]:
     return [z for z in ends if 0.0 < z < length]
 
 
-def step_grid(arm: Manipulator, stations: Array, steps: int) -> StepGrid:
+def step_grid(
+    arm: Manipulator, stations: Array, steps: int, *, moving_ends: bool = False
+) -> StepGrid:
     """Steps of an inner arm, none longer in S than so many even ones.
 
     Args:
         arm: The inner arm.
         stations: Z that are asked for [m], in any order.
         steps: Even steps; a step should not turn the arm by much more than a third of a radian.
+        moving_ends: Whether actuators that end at the base or at the tip may come to end before.
     """
-    s = arm.profile.slender_coordinate(np.sort(_places(arm, stations)))
+    s = arm.profile.slender_coordinate(_places(arm, stations, moving_ends))
     counts = np.ceil(np.diff(s) / arm.profile.slender_length * steps - 1e-9)
-    return StepGrid(np.maximum(counts, 1).astype(np.intp), len(stations))
+    return StepGrid(np.maximum(counts, 1).astype(np.intp), moving_ends)
 
 
 def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables:
@@ -145,7 +146,7 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
             than the grid was made for.
     """
     profile = arm.profile
-    s = profile.slender_coordinate(np.sort(_places(arm, stations)))
+    s = profile.slender_coordinate(_places(arm, stations, grid.moving_ends))
     if len(s) != len(grid.counts) + 1:
         raise InvalidInput("breakpoints of the arm", len(s) - 1, f"{len(grid.counts)} as before")
     width = np.repeat(np.diff(s) / grid.counts, grid.counts)

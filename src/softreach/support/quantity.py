@@ -41,25 +41,26 @@ _UNITS = {
 _ANGLES = ("deg", "°", "rad")
 
 
-def quantity(value: float, unit: str = "", error: float = math.nan) -> str:
+def quantity(value: float, unit: str = "", error: float = math.nan, digits: int = 1) -> str:
     """A value to the first digit of its error, such as "0.69164 ± 0.00002 m³".
 
     Args:
         value: The number.
         unit: What it counts.
         error: How far off it may be, same unit; without one the value has six digits.
+        digits: Number of digits of the error.
     """
     if math.isfinite(value) and 0 < error < math.inf:
-        return f"{_with_error(value, error)} {unit}".rstrip()
+        return f"{_with_error(value, error, digits)} {unit}".rstrip()
     return f"{value:.6g} {unit}".rstrip()
 
 
-def _with_error(value: float, error: float) -> str:
+def _with_error(value: float, error: float, digits: int) -> str:
     error = max(error, _FINEST * abs(value))
     largest = max(abs(value), error)
     power = math.floor(math.log10(largest)) if largest < _SMALLEST else 0
     scale = 10.0**power
-    decimals = max(0, -math.floor(math.log10(error / scale)))
+    decimals = max(0, digits - 1 - math.floor(math.log10(error / scale)))
     text = f"{value / scale:.{decimals}f} ± {error / scale:.{decimals}f}"
     return f"({text})e{power}" if power else text
 

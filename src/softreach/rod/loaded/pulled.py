@@ -17,8 +17,16 @@ from numpy.typing import NDArray
 
 from softreach.arm.tables import quadrature
 from softreach.arm.tensions import LengthLaw, Tensions
-from softreach.rod.tip_map import TipMap
+from softreach.rod.arm_rod import ArmRod
+from softreach.rod.response import (
+    NodeTables,
+    linear_response,
+    node_tables,
+    rod_state,
+    step_grid,
+)
 from softreach.support import parallel
+from softreach.support.errors import InvalidInput
 
 __all__ = ["LoadedLengths"]
 
@@ -29,6 +37,7 @@ _PIECES = 8  # of the arm, on which its strains are smooth
 _MOST_STEPS = 40
 _CONVERGED = 1e-11  # of the length
 _HALVINGS = 6
+_STEPS = 48  # of the linear response
 _DIFFERENCE = 1e-4  # of the widest range, for derivatives
 
 
@@ -49,7 +58,7 @@ class LoadedLengths:
 
     law: LengthLaw
     """That of the arm without loads."""
-    rod: TipMap
+    rod: ArmRod
     """The map of the inner arm under loads, accurate enough for s."""
 
     @cached_property
@@ -159,7 +168,14 @@ class LoadedLengths:
         return after, ~_has_nan(shortening)
 
     def slopes(self, inner: Array) -> Array:
-        """∂s/∂γ at activations with tensions, by central differences, (n, tendon, bundle)."""
+        """∂s/∂γ at activations with tensions, shape (n, tendon, bundle).
+
+        Exact where loads have a linear response, else by central differences.
+        """
+        if self._measures is not None:
+            table, measures = self._measures
+            state = rod_state(self.rod, inner, table)
+            return linear_response(table, state, [], measures).works
         n, count = inner.shape
         slopes = np.zeros((n, len(self.law.columns), count))
         widths = _DIFFERENCE * self.rod.box.widths
@@ -170,6 +186,19 @@ class LoadedLengths:
             s = [self._in_blocks(each) for each in ends]
             slopes[..., k] = (s[1] - s[0]) / (2.0 * widths[k])
         return slopes
+
+    @cached_property
+    def _measures(self) -> tuple[NodeTables, Array] | None:
+        """Tables for the linear response, and N and M of the tendons at their nodes."""
+        arm, nowhere = self.rod.arm, np.empty(0)
+        grid = step_grid(arm, nowhere, max(_STEPS, self.rod.steps))
+        try:
+            table = node_tables(arm, nowhere, grid)
+        except InvalidInput:  # loads that it does not know
+            return None
+        force, moment = self.law.loads_at(table.stations.ravel(), np.ones(table.stations.size))
+        loads = np.concatenate([moment, force[:, None]], axis=1)
+        return table, loads.reshape(*table.stations.shape, *loads.shape[1:])
 
     def _in_blocks(self, inner: Array) -> Array:
         blocks = parallel.blocks(len(inner), _BLOCK)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -13,7 +14,14 @@ from softreach.calibration.calibration import Calibration, calibrate
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import MarkerModel
-from softreach.calibration.report import summary_text
+from softreach.calibration.report import (
+    error_cells,
+    error_head,
+    number_rows,
+    remarks,
+    shown_unit,
+)
+from softreach.studio import markup
 from softreach.studio.jobs.reach import FollowCamera
 from softreach.studio.session import AskedJob, Job
 from softreach.studio.state import StudioState
@@ -37,7 +45,7 @@ class Bench:
     """From the measured to the predicted markers of the sample [m]; None if it is not shown."""
     result: Calibration | None = None
     summary: str = ""
-    """Text of the result."""
+    """Tables and remarks on the result, as HTML."""
 
     def fits(self, arm: Manipulator) -> bool:
         """True of an arm with the inputs and the markers of the one that the data were read for."""
@@ -118,10 +126,28 @@ class FitArm(AskedJob):
                 progress=progress,
             )
             check()
-            text = summary_text(result)
+            summary = _summary(result)
         check()
-        if not result.fit.converged:
-            text += f"\nNot converged in {result.fit.evaluations} evaluations."
-        bench.result, bench.summary, bench.as_calibrated = result, text, True
+        bench.result, bench.summary, bench.as_calibrated = result, summary, True
         session.follow(DrawSample)
         session.show()
+
+
+def _summary(result: Calibration) -> str:
+    unit = shown_unit(result.arm)
+    numbers, errors = number_rows(result, unit), error_cells(result, unit)
+    lines = [*remarks(result, unit)]
+    if not result.fit.converged:
+        lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
+    return "".join(
+        [
+            markup.table(("number", "calibrated", "design"), _lone(numbers)),
+            markup.table(error_head(unit), _lone(errors)),
+            *map(markup.paragraph, lines),
+        ]
+    )
+
+
+def _lone(rows: Iterable[Sequence[str]]) -> list[list[tuple[str]]]:
+    """Cells of one line each."""
+    return [[(cell,) for cell in row] for row in rows]

@@ -12,7 +12,6 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import parameters
 from softreach.calibration.measurements import read_measurements, read_table
-from softreach.studio import markup
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.jobs.calibration import Bench, DrawSample, FitArm
 from softreach.studio.widgets import Line, TextKind, TypedField
@@ -122,7 +121,7 @@ class CalibratePanel:
             self._number.options = (*_POSE, *(name for name, p in known if not p.whole))
         self._residuals.say(_residuals_text(bench, session))
         result = bench.result
-        self._summary.show("".join(map(markup.paragraph, bench.summary.splitlines())))
+        self._summary.show(bench.summary)
         self._shown.visible = result is not None
         if self._shown.value != (shown := _SHOWN[bench.as_calibrated]):
             self._shown.value = shown

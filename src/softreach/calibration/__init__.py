@@ -1,0 +1,23 @@
+"""Calibration: the arm on the bench from measured poses, and which poses to measure."""
+
+from __future__ import annotations
+
+from softreach.calibration.calibration import Calibration, Rival, calibrate
+from softreach.calibration.errors import Misses, Repeatability, Verdict
+from softreach.calibration.measurements import Measurements, read_measurements
+from softreach.calibration.plan import PosePlan, plan_poses
+from softreach.calibration.uncertainty import Uncertainty
+
+__all__ = [
+    "Calibration",
+    "Measurements",
+    "Misses",
+    "PosePlan",
+    "Repeatability",
+    "Rival",
+    "Uncertainty",
+    "Verdict",
+    "calibrate",
+    "plan_poses",
+    "read_measurements",
+]

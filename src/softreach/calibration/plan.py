@@ -1,0 +1,285 @@
+"""Poses worth measuring: those that tell most about the free numbers of an arm."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.calibration.fit import identifiable
+from softreach.calibration.free_numbers import FreeNumbers, free_numbers
+from softreach.calibration.model import MarkerModel
+from softreach.rod.tip_map import TipStatus
+from softreach.sampling import sample_cube
+from softreach.support.arguments import as_flag, as_integer, as_names, as_number, as_path
+from softreach.support.errors import InvalidInput, Range, did_you_mean
+from softreach.support.files.atomic import writing
+from softreach.support.files.kinds import FileKind, Formats
+
+__all__ = ["PLAN", "PosePlan", "plan_poses"]
+
+Array = NDArray[np.float64]
+
+_CORNERS = 10
+"""Free inputs up to which all corners of their box are candidates."""
+_APART = 0.5
+"""Distance of two poses in the box at least, over the mean distance of so many points."""
+_TRUSTED = 2.0
+"""How much a pose may react to the numbers, over the median of all, and count in full."""
+_ROUNDS = 50
+_GAIN = 1e-6
+"""Least gain of the logarithm of the determinant for which a pose is exchanged."""
+_START = 1e-9
+"""Information on each number before the first pose, over that of all candidates."""
+_WRITTEN = {"m": ("mm", 1e3), "Pa": ("kPa", 1e-3), "N": ("N", 1.0)}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PosePlan:
+    """Activations at which to measure an arm, and how well its free numbers then are known."""
+
+    free: FreeNumbers
+    """The numbers, at whose values the plan is made."""
+    markers: tuple[str, ...]
+    """Markers that are going to be seen."""
+    activations: Array
+    """Inputs of the arm, in their units, in an order by chance; shape (n, input)."""
+    information: Array
+    """JᵀJ of all places by the numbers, in m² over the squares of their units."""
+
+    def __len__(self) -> int:
+        return len(self.activations)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free numbers."""
+        return self.free.names
+
+    @property
+    def log_determinant(self) -> float:
+        """ln det JᵀJ in the scales of the numbers, which the plan makes large [-]."""
+        scale = self.free.scale
+        return float(np.linalg.slogdet(self.information * np.outer(scale, scale))[1])
+
+    def sigma(self, noise: float) -> dict[str, float]:
+        """Standard deviations to expect of the numbers, in their units.
+
+        Args:
+            noise: Standard deviation of a coordinate of a marker [m]: of the measurement, and of
+                all that the model does not have.
+        """
+        noise = as_number("noise", noise, Range(0.0, 1.0, "m", True))
+        scale = self.free.scale
+        inverse = np.linalg.inv(self.information * np.outer(scale, scale))
+        widths = noise * scale * np.sqrt(np.diag(inverse))
+        return dict(zip(self.names, widths.tolist(), strict=True))
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write a CSV to fill in: a column for each input, and empty ones for the markers.
+
+        Args:
+            path: The file.
+            overwrite: Whether it may replace any file, and not only a plan without measurements.
+
+        Raises:
+            InvalidInput: Something else is there.
+            NotWritten: It cannot be written.
+        """
+        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+        with writing(path, PLAN[".csv"], overwrite=overwrite) as file:
+            file.write(self._csv().encode())
+
+    def _csv(self) -> str:
+        arm = self.free.arm
+        sizes = [_WRITTEN.get(unit, ("", 1.0)) for unit in arm.input_units]
+        inputs = [
+            "_".join([*name.split(), *([unit] if unit else [])])
+            for name, (unit, _) in zip(arm.input_names, sizes, strict=True)
+        ]
+        places = [f"{'_'.join(name.split())}_{axis}_mm" for name in self.markers for axis in "xyz"]
+        values = self.activations * [size for _, size in sizes]
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(["sample", *inputs, *places])
+        for k, row in enumerate(values):
+            table.writerow([k, *(f"{value:.6g}" for value in row), *("" for _ in places)])
+        return text.getvalue()
+
+    def __repr__(self) -> str:
+        seen = ", ".join(self.markers)
+        return f"PosePlan: {len(self)} poses of {seen} for {', '.join(self.names)}"
+
+
+def plan_poses(
+    arm: Manipulator,
+    free: Sequence[str],
+    n: int = 20,
+    *,
+    markers: Sequence[str] | None = None,
+    candidates: int = 2000,
+    seed: int = 0,
+) -> PosePlan:
+    """The poses from which a calibration learns most about the free numbers.
+
+    Of poses all over the activation box and at its corners those with the largest determinant of
+    JᵀJ, by exchange of one pose after another [Fedorov1972]; J are the derivatives of the places of
+    the markers by the numbers, at the values of the design. As these are not yet known, poses
+    keep a distance in the box, and those that react to the numbers far more than most count less.
+
+    Args:
+        arm: The design; the nearer to the real arm, the better is the choice.
+        free: As in `calibrate`.
+        n: Number of poses.
+        markers: Names of the markers that are going to be seen; None for all.
+        candidates: Number of poses to choose from.
+        seed: Of the candidates, and of the order in which to measure.
+
+    Raises:
+        InvalidInput: Numbers that no pose can tell apart, fewer poses than these need, or no
+            candidate with a stable equilibrium.
+    """
+    arm = a_manipulator("arm", arm)
+    numbers = free_numbers(arm, free)
+    candidates = as_integer("candidates", candidates, 2, 200_000)
+    n, seed = as_integer("n", n, 1, candidates), as_integer("seed", seed)
+    names = _markers(arm, markers)
+    known = [marker.name for marker in arm.markers] or ["tip"]
+    at = np.array([known.index(name) for name in names])
+    inputs = _candidates(arm, candidates, seed)
+    prediction = MarkerModel(numbers, inputs, at).predict(numbers.start, slopes=True)
+    assert prediction.slopes is not None
+    usable = np.isfinite(prediction.slopes).all(axis=(1, 2, 3))
+    usable &= prediction.status == TipStatus.STABLE
+    if not usable.any():
+        allowed = "activations at which the arm has a stable equilibrium"
+        raise InvalidInput("arm", "none in its activation box", allowed)
+    inputs = inputs[usable]
+    slopes = prediction.slopes[usable].reshape(len(inputs), -1, len(numbers))
+    identifiable(numbers, slopes.reshape(-1, len(numbers)))
+    least = -(-len(numbers) // slopes.shape[1])
+    if not least <= n <= len(inputs):
+        allowed = f"from {least} for these {len(numbers)} numbers to {len(inputs):,} candidates"
+        raise InvalidInput("n", n, allowed)
+    chosen = _chosen(_trusted(slopes * numbers.scale), _in_box(arm, inputs), n)
+    np.random.default_rng(seed).shuffle(chosen)
+    own = slopes[chosen].reshape(-1, len(numbers))
+    identifiable(numbers, own)
+    return PosePlan(numbers, names, inputs[chosen], own.T @ own)
+
+
+def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
+    known = tuple(marker.name for marker in arm.markers) or ("tip",)
+    if given is None:
+        return known
+    names = as_names("markers", given)
+    for name in names:
+        if name not in known or names.count(name) > 1:
+            allowed = f"of {', '.join(known)}, each once"
+            raise InvalidInput("markers", name, allowed, did_you_mean(name, known))
+    if not names:
+        raise InvalidInput("markers", "none", f"of {', '.join(known)}")
+    return names
+
+
+def _candidates(arm: Manipulator, count: int, seed: int) -> Array:
+    """Activations all over the box, then corners of it, shape (n, input)."""
+    low, high = arm.input_bounds.T
+    free = np.flatnonzero(low < high)
+    whole = 1 << (count - 1).bit_length()
+    inside = sample_cube("sobol", whole, len(free), seed)[:count]
+    if len(free) <= _CORNERS:
+        corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * len(free), indexing="ij"), axis=-1)
+        corners = corners.reshape(-1, len(free))
+    else:
+        draw = np.random.default_rng(seed).integers(0, 2, (1 << _CORNERS, len(free)))
+        corners = np.unique(draw, axis=0).astype(float)
+    cube = np.concatenate([inside, corners])
+    inputs = np.tile(low, (len(cube), 1))
+    inputs[:, free] = low[free] + cube * (high - low)[free]
+    return inputs
+
+
+def _trusted(slopes: Array) -> Array:
+    """Slopes of poses, those of poses that react far more than most no larger than a limit.
+
+    An arm about to snap reacts to everything, and that at activations which nobody knows yet.
+    """
+    size = np.linalg.norm(slopes, axis=(1, 2))
+    return slopes / np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
+
+
+def _in_box(arm: Manipulator, inputs: Array) -> Array:
+    """Inputs between 0 and 1, (n, free input)."""
+    low, high = arm.input_bounds.T
+    free = low < high
+    return (inputs[:, free] - low[free]) / (high - low)[free]
+
+
+def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
+    """Rows with a large determinant of JᵀJ: one after another, then by exchange.
+
+    Args:
+        slopes: Of each candidate in the scales of the numbers, shape (candidate, 3 marker, number).
+        at: Candidates in the unit cube, no two of those chosen nearer than half of the mean
+            distance of n points; shape (candidate, input).
+        n: How many to choose.
+    """
+    each = np.einsum("crp,crq->cpq", slopes, slopes)
+    start = _START * np.trace(each.sum(axis=0)) / each.shape[1] * np.eye(each.shape[1])
+    room = _APART * n ** (-1.0 / max(at.shape[1], 1))
+    near = np.zeros(len(slopes), int)  # chosen poses that each candidate is too near to
+    chosen: list[int] = []
+    total = start
+    for _ in range(n):
+        best = _best(slopes, total, near)
+        chosen.append(best)
+        near += _within(at, best, room)
+        total = total + each[best]
+    for _ in range(_ROUNDS):
+        before = np.linalg.slogdet(total)[1]
+        for place, old in enumerate(chosen):
+            near -= _within(at, old, room)
+            rest = total - each[old]
+            best = _best(slopes, rest, near)
+            near += _within(at, best, room)
+            chosen[place], total = best, rest + each[best]
+        if np.linalg.slogdet(total)[1] - before < _GAIN:
+            break
+    return np.array(chosen, np.intp)
+
+
+def _within(at: Array, place: int, room: float) -> NDArray[np.bool_]:
+    """Candidates that are too near to one that is chosen, itself among them."""
+    result = np.linalg.norm(at - at[place], axis=1) < room
+    result[place] = True
+    return result
+
+
+def _best(slopes: Array, total: Array, near: NDArray[np.int_]) -> int:
+    """The candidate that adds most to the determinant, of those that are near the fewest others."""
+    return int(np.argmax(np.where(near == near.min(), _gains(slopes, total), -np.inf)))
+
+
+def _gains(slopes: Array, total: Array) -> Array:
+    """By how much each candidate raises ln det of the information."""
+    half = np.linalg.cholesky(np.linalg.inv(0.5 * (total + total.T)))
+    along = slopes @ half
+    return np.linalg.slogdet(np.eye(slopes.shape[1]) + along @ along.transpose(0, 2, 1))[1]
+
+
+def _is_empty_plan(path: Path) -> bool:
+    """True of a plan without a single measurement."""
+    head, *rows = path.read_text(encoding="utf-8", errors="replace").splitlines() or [""]
+    count = head.count("_mm") // 3 * 3
+    return head.startswith("sample,") and all(row.endswith("," * count) for row in rows)
+
+
+PLAN: Formats = {".csv": FileKind("a plan of poses without measurements", _is_empty_plan)}
+"""Formats of plans."""

@@ -1,0 +1,249 @@
+"""`softreach calibrate`: the arm on the bench from measured poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.free_numbers import Free, free_names, priors
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import (
+    OUTPUT,
+    AsJson,
+    Design,
+    Overwrite,
+    Unit,
+    check_output,
+    out_option,
+    refuse,
+)
+from softreach.cli.values import NUMBER, WHOLE, as_read
+from softreach.support.errors import InvalidInput
+from softreach.support.quantity import shortened
+
+if TYPE_CHECKING:
+    from softreach.calibration import Calibration, Misses
+
+_COLUMNS = Group("Columns of the data, where their names do not tell", sort_key=1)
+
+
+def calibrate(
+    design: Design,
+    data: Annotated[
+        Path,
+        Parameter(
+            help="Measured poses (.csv .parquet): a column for each input and x, y, z of each "
+            "marker, with units in their names, such as tension1_N and tip_x_mm."
+        ),
+    ],
+    /,
+    *,
+    free: Free,
+    prior: Annotated[
+        list[str] | None,
+        Parameter(
+            help="What is known of a number beforehand, its width about the value of the design "
+            "or MEAN:WIDTH: taper=1deg, rings[0].material.young_modulus=300kPa:50kPa. May be "
+            "repeated."
+        ),
+    ] = None,
+    hold_out: Annotated[
+        float, NUMBER, Parameter(help="Share of the samples, by chance, that the fit does not see.")
+    ] = 0.0,
+    noise: Annotated[
+        str | None,
+        Parameter(
+            help="Standard deviation of a measured coordinate, against which priors are weighed: "
+            "0.2mm. That of the residuals if left out."
+        ),
+    ] = None,
+    robust: Annotated[
+        bool, Parameter(negative="--no-robust", help="Let samples far off count less.")
+    ] = True,
+    rivals: Annotated[
+        bool,
+        Parameter(
+            negative="--no-rivals", help="Fit constant curvature and a quadratic law beside it."
+        ),
+    ] = True,
+    seed: Annotated[int, WHOLE, Parameter(help="Seed of the samples held out.")] = 0,
+    inputs: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--input",
+            group=_COLUMNS,
+            help='Column of an input: "tendon 1=tension1_N". May be repeated.',
+        ),
+    ] = None,
+    markers: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--marker",
+            group=_COLUMNS,
+            help="Start of the columns of a marker: tip=disk3. Only those that are named are used. "
+            "May be repeated.",
+        ),
+    ] = None,
+    run: Annotated[
+        str | None,
+        Parameter(
+            group=_COLUMNS, help="Column that says which samples belong together, as run does."
+        ),
+    ] = None,
+    order: Annotated[
+        str | None,
+        Parameter(group=_COLUMNS, help="Column in whose order samples were taken, as time_s does."),
+    ] = None,
+    changes: Changes = UNCHANGED,
+    out: Annotated[
+        Path | None, out_option("Write the calibrated design to this TOML file.")
+    ] = None,
+    report: Annotated[
+        Path | None,
+        Parameter(group=OUTPUT, help="Write a report with pictures to this .html file."),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        Parameter(group=OUTPUT, help="Write what was predicted and missed to this .csv file."),
+    ] = None,
+    overwrite: Overwrite = False,
+    unit: Unit = None,
+    json: AsJson = False,
+) -> None:
+    """Fit numbers of a design to measured poses, with honest errors.
+
+    Prints the numbers with their standard deviations, the error of predicted
+    places beside that of simpler laws, and what limits the fit.
+
+    Example: softreach calibrate arm.toml poses.csv --free pose --free "rings*modulus" -o bench.toml
+    """
+    from softreach import calibration
+    from softreach.arm.design_file import DESIGN_FILE
+    from softreach.calibration.html_report import REPORT
+    from softreach.calibration.report import summary_text
+    from softreach.calibration.residual_table import TABLE
+    from softreach.support import progress
+
+    arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
+    if out is None and report is None and table is None:
+        refuse("left out where no file is written: give --out too", overwrite=overwrite)
+    for path, formats in ((out, DESIGN_FILE), (report, REPORT), (table, TABLE)):
+        if path is not None:
+            check_output(path, formats, overwrite)
+    with progress.bar("fitting", None) as step:
+        result = calibration.calibrate(
+            arm,
+            data,
+            free=free_names(arm, free),
+            prior=priors(arm, prior or ()),
+            hold_out=hold_out,
+            noise=None if noise is None else read_noise(noise),
+            robust=robust,
+            rivals=rivals,
+            inputs=_pairs("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"'),
+            markers=_pairs("marker", markers, "NAME=START, such as tip=disk3"),
+            run=run,
+            order=order,
+            seed=seed,
+            progress=step,
+        )
+    if json:
+        console.json(_record(result))
+    else:
+        console.line(f"calibration of {design}: {summary_text(result, lengths.unit)}")
+    if out is not None:
+        result.save(out, overwrite=overwrite)
+    if table is not None:
+        result.save_table(table, unit=lengths.written.name, overwrite=overwrite)
+        console.written(table, lengths)
+    if report is not None:
+        result.save_report(report, unit=lengths.unit.name, overwrite=overwrite)
+
+
+def read_noise(text: str) -> float:
+    """A standard deviation [m] with its unit, or in m."""
+    from softreach.support.units import TYPED, read_length
+
+    try:
+        noise = read_length(text)
+    except ValueError:
+        noise = 0.0
+    if not noise > 0:
+        raise InvalidInput("noise", shortened(text), f"a length > 0 such as 0.2mm ({TYPED})")
+    return noise
+
+
+def _pairs(name: str, texts: list[str] | None, allowed: str) -> dict[str, str] | None:
+    """Names and columns of NAME=COLUMN; names of inputs may hold another =."""
+    if texts is None:
+        return None
+    pairs: dict[str, str] = {}
+    for text in texts:
+        key, sign, value = (part.strip() for part in text.rpartition("="))
+        if not sign or not key or not value:
+            raise InvalidInput(name, shortened(text), allowed)
+        if key in pairs:
+            raise InvalidInput(name, shortened(text), f"given once for {key}")
+        pairs[key] = value
+    return pairs
+
+
+def _record(result: Calibration) -> dict[str, Any]:
+    """All of it for machines: lengths in m, angles in degrees."""
+    from softreach.calibration.report import error_rows
+
+    repeated = result.repeatability
+    return {
+        "samples": len(result.data),
+        "held_out": int(result.held.sum()),
+        "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
+        "numbers": _numbers(result),
+        "errors": [
+            {"law": row.law, "samples": row.samples, **_errors(row.errors)}
+            for row in error_rows(result)
+        ],
+        "correlated": [list(pair) for pair in result.correlated],
+        "outlier_rows": result.outliers.tolist(),
+        "repeatability_rms_m": repeated.rms,
+        "repeated_samples": repeated.pairs,
+        "limit": result.verdict.limit,
+        "verdict": result.verdict.sentence,
+        "converged": result.fit.converged,
+        "seconds": result.seconds,
+        "data": result.data.source,
+        "data_sha256": result.data.digest,
+    }
+
+
+def _numbers(result: Calibration) -> list[Mapping[str, Any]]:
+    sigma, bound = result.uncertainty.sigma.tolist(), result.fit.at_bound.tolist()
+    records = []
+    for k, number in enumerate(result.fit.free.numbers):
+        value, unit = as_read(float(result.fit.values[k]), number.unit)
+        records.append(
+            {
+                "number": number.name,
+                "value": value,
+                "sigma": as_read(sigma[k], number.unit)[0],
+                "start": as_read(number.start, number.unit)[0],
+                "unit": unit,
+                "at_bound": bound[k],
+            }
+        )
+    return records
+
+
+def _errors(errors: Misses) -> dict[str, float]:
+    return {
+        "rms_m": errors.rms,
+        "median_m": errors.median,
+        "mean_m": errors.mean,
+        "below_95_percent_m": errors.most,
+        "places": errors.count,
+    }

@@ -1,0 +1,86 @@
+"""`softreach plan-poses`: the poses to measure before a calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from softreach.cli.calibrate import read_noise
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.free_numbers import Free, free_names
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option
+from softreach.cli.values import WHOLE, as_read
+
+
+def plan_poses(
+    design: Design,
+    /,
+    *,
+    free: Free,
+    n: Annotated[int, WHOLE, Parameter(name=("--n", "-n"), help="Number of poses.")] = 20,
+    noise: Annotated[
+        str,
+        Parameter(help="Standard deviation of a measured coordinate and of what the model lacks."),
+    ] = "1mm",
+    markers: Annotated[
+        str | None,
+        Parameter(help="Markers that are going to be seen, comma-separated: all if left out."),
+    ] = None,
+    candidates: Annotated[int, WHOLE, Parameter(help="Number of poses to choose from.")] = 2000,
+    seed: Annotated[int, WHOLE, Parameter(help="Seed of candidates and of their order.")] = 0,
+    changes: Changes = UNCHANGED,
+    out: Annotated[Path | None, out_option("Write the poses as a CSV file to fill in.")] = None,
+    overwrite: Overwrite = False,
+    unit: Unit = None,
+    json: AsJson = False,
+) -> None:
+    """Choose the poses to measure for a calibration.
+
+    Prints how well the free numbers will be known. The CSV file has a row for
+    each pose, in the order in which to take them, with empty columns for the
+    places of the markers; softreach calibrate reads it once it is filled in.
+
+    Example: softreach plan-poses arm.toml --free pose --free "rings*modulus" -o poses.csv
+    """
+    from softreach import calibration
+    from softreach.calibration.plan import PLAN
+    from softreach.calibration.report import columns, sigma_rows
+
+    arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
+    width = read_noise(noise)
+    check_output(out, PLAN, overwrite)
+    plan = calibration.plan_poses(
+        arm,
+        free_names(arm, free),
+        n,
+        markers=None if markers is None else [name.strip() for name in markers.split(",")],
+        candidates=candidates,
+        seed=seed,
+    )
+    sigma = plan.sigma(width)
+    if json:
+        numbers = [
+            {
+                "number": number.name,
+                "start": as_read(number.start, number.unit)[0],
+                "sigma": as_read(sigma[number.name], number.unit)[0],
+                "unit": as_read(0.0, number.unit)[1],
+            }
+            for number in plan.free.numbers
+        ]
+        poses = plan.activations.tolist()
+        names = list(arm.input_names)
+        console.json({"noise_m": width, "inputs": names, "poses": poses, "numbers": numbers})
+    else:
+        seen = ", ".join(plan.markers)
+        console.line(f"{n} poses of {design} with {seen}, noise {lengths.text(width)}")
+        rows = sigma_rows(plan.free, sigma.values(), lengths.unit)
+        for line in columns([("number", "to be known", "share"), *rows]):
+            console.line(f"  {line}")
+    if out is not None:
+        plan.save(out, overwrite=overwrite)

@@ -1,0 +1,203 @@
+"""Data and numbers that a calibration cannot use: one clear line, or a result that says so."""
+
+import re
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import softreach as sr
+from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section
+from softreach.support.errors import InvalidInput, SoftreachWarning
+from tests.calibration.arms import MODULUS, hanging_tentacle, measured, on_the_bench
+
+ARM = hanging_tentacle()
+FREE = [MODULUS, "pose"]
+
+
+@pytest.fixture(scope="module")
+def good():
+    """A table of which all is right."""
+    return pd.DataFrame(measured(on_the_bench(ARM)))
+
+
+def refusal(data, free=FREE, arm=ARM, **options):
+    """The line by which a calibration refuses."""
+    with pytest.raises(InvalidInput) as caught, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        sr.calibrate(arm, data, free=free, rivals=False, **options)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert len(text) < 600
+    return text
+
+
+TABLES = {
+    "tensions in mm": (lambda d: d.rename(columns={"t 1_N": "t 1_mm"}), "column t 1_mm = in m"),
+    "no unit": (lambda d: d.rename(columns={"t 1_N": "t 1"}), "such as t 1_N"),
+    "no such input": (lambda d: d.drop(columns="t 2_N"), "1 column in N for t 2"),
+    "no z": (lambda d: d.drop(columns="tool_z_mm"), "z is missing"),
+    "no place": (lambda d: d[["t 1_N", "t 2_N", "t 3_N"]], "places of markers = none"),
+    "NaN input": (lambda d: d.assign(**{"t 1_N": np.nan}), "t 1_N in row 0 = nan"),
+    "nothing seen": (
+        lambda d: d.assign(**{c: np.nan for c in d if "mm" in c}),
+        "seen in at least one",
+    ),
+    "text": (lambda d: d.assign(tool_x_mm="far"), "column tool_x_mm = could not convert"),
+    "one name twice": (lambda d: pd.concat([d, d[["t 1_N"]]], axis=1), "two of this name"),
+    "no rows": (lambda d: d[:0], "at least one row"),
+    "nothing": (lambda d: pd.DataFrame(), "at least one row"),
+    "mm called m": (lambda d: d.rename(columns=lambda c: c.replace("mm", "m")), "look at the unit"),
+    "one sample": (lambda d: d[:1], "at most 6 numbers, as many as the data has"),
+    "mirrored": (lambda d: d.assign(half_x_mm=-d.half_x_mm, tool_x_mm=-d.tool_x_mm), "right-hand"),
+    "number": (lambda d: 3, "a path, a DataFrame"),
+    "ragged": (lambda d: {"a": [1], "b": [1, 2]}, "columns of one length"),
+}
+
+
+@pytest.mark.parametrize(("damaged", "said"), TABLES.values(), ids=TABLES)
+def test_a_table_that_cannot_be_used_is_refused_in_one_line(damaged, said, good):
+    assert said in refusal(damaged(good))
+
+
+FILES = {
+    "empty": (b"", "No columns"),
+    "a header": (b"t 1_N,t 2_N\n", "at least one row"),
+    "bytes": (bytes(range(256)), "places of markers"),
+    "a picture": (b"\x89PNG\r\n\x1a\n\xff\xfe", "a table in CSV or Parquet"),
+    "ragged": (b"a,b\n1,2\n1,2,3\n", "a table in CSV or Parquet"),
+}
+
+
+@pytest.mark.parametrize(("content", "said"), FILES.values(), ids=FILES)
+def test_a_file_that_is_no_table_is_refused_in_one_line(content, said, tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_bytes(content)
+    assert said in refusal(path)
+
+
+def test_a_header_that_names_a_column_twice_is_refused(good, tmp_path):
+    path = tmp_path / "poses.csv"
+    text = good.to_csv(index=False)
+    path.write_text(text.replace("tool_x_mm", "half_x_mm", 1))
+    assert "two of this name" in refusal(path)
+
+
+OPTIONS = {
+    "no such file": (dict(data="missing.csv"), "a file that exists"),
+    "no such run": (dict(run="runn"), "run = runn: must be a column"),
+    "no such order": (dict(order="time"), "order = time: must be a column"),
+    "no such column": (dict(inputs={"t 1": "t 1_n"}), 'did you mean "t 1_N"'),
+    "no such input": (dict(inputs={"u 1": "t 1_N"}), "one of t 1, t 2, t 3"),
+    "no such place": (dict(markers={"tool": "disk3"}), "columns of marker tool = disk3"),
+    "no such marker": (dict(markers={"disk3": "tool"}), "one of half, tool"),
+    "all held out": (dict(hold_out=1.0), "hold_out = 1"),
+    "no noise": (dict(noise=0.0), "noise = 0"),
+    "prior of 0": (dict(prior={MODULUS: 0.0}), "a width above 0"),
+    "prior in words": (dict(prior={MODULUS: "wide"}), "a width above 0"),
+    "prior of no number": (dict(prior={"taper": 1.0}), "of a free number"),
+    "misspelled": (dict(free=["rings[0].material.yong_modulus"]), 'did you mean "rings[0].mat'),
+    "no such pose": (dict(free=["pose.w"]), "one of pose, pose.position"),
+    "twice": (dict(free=[MODULUS, "rings*modulus"]), "given once"),
+    "none": (dict(free=[]), "the name of one or more"),
+    "a count": (dict(free=["t.bundles"]), "this one counts"),
+    "does nothing": (dict(free=[MODULUS, "rings[0].material.density"]), "leave out what does noth"),
+    "two units": (dict(free=["t.distance = t.offset"]), "of the same unit"),
+}
+
+
+@pytest.mark.parametrize(("options", "said"), OPTIONS.values(), ids=OPTIONS)
+def test_options_that_mean_nothing_are_refused_in_one_line(options, said, good):
+    assert said in refusal(**{"data": good, "free": FREE, **options})
+
+
+def test_poses_without_any_motion_tell_neither_stiffness_nor_pose():
+    still = measured(on_the_bench(ARM), inputs=np.zeros((9, 3)))
+    assert "move some marker" in refusal(still, [MODULUS])
+    assert "tell apart" in refusal(measured(on_the_bench(ARM), inputs=np.ones((9, 3))))
+
+
+def test_only_the_ratio_of_stiffness_and_weight_shows_where_no_force_is_known():
+    """Muscles contract by what they are told, however stiff the arm is."""
+    fiber = sr.FiberArchitecture(name="f", extent=np.radians(40), bundles=3, revolution=0.0)
+    silicone = Material(young_modulus=3e5, density=1100.0)
+    arm = Manipulator(
+        profile=LinearTaper(length=0.3, outer_radius=0.015),
+        section=Section(rings=(Ring(inner_ratio=0.6, material=silicone),)),
+        actuators=(fiber,),
+        loads=sr.Loads(),
+        markers=ARM.markers,
+    ).with_bounds((-0.5, 0.0))
+    data = {name.removesuffix("_N"): values for name, values in measured(arm).items()}
+    both = [MODULUS, "rings[0].material.density"]
+    assert "leave out one, such as" in refusal(data, both, arm)
+    result = sr.calibrate(arm, data, free=both, prior={both[1]: 20.0}, rivals=False)
+    assert result.sigma[both[1]] == pytest.approx(20.0, rel=0.05)
+
+
+def test_exchanged_markers_are_told_by_name(good):
+    names = {c: c.replace("half", "tool") for c in good} | {
+        c: c.replace("tool", "half") for c in good if c.startswith("tool")
+    }
+    assert "they seem to be tool, half" in refusal(good.rename(columns=names))
+
+
+def test_an_outlier_of_a_meter_is_named_and_hardly_moves_the_numbers(good):
+    data = good.astype(float).copy()
+    data.loc[5, "tool_x_mm"] += 1000.0
+    result = sr.calibrate(ARM, data, free=FREE, rivals=False)
+    assert result.outliers.tolist() == [5]
+    assert "rows below the header from 0: 5" in str(result)
+    assert result.values[MODULUS] == pytest.approx(3.3e5, rel=0.03)
+
+
+def test_fewer_samples_than_would_tell_are_said_to_be_few(good):
+    result = sr.calibrate(ARM, good[:2], free=FREE)
+    assert result.verdict.limit == "data"
+    assert "too few samples" in str(result)
+
+
+def test_a_number_that_wants_to_leave_its_range_ends_there_with_a_warning():
+    long = sr.Tendon(name="t", distance=0.009, bundles=3, activation_bounds=(0.0, 3.0))
+    arm = ARM.replace(actuators=(long.replace(end_over_length=0.95),))
+    data = measured(ARM.replace(actuators=(long,)), noise=1e-3, seed=3)
+    stiffer = {"t.end_over_length": (1.2, 1e-3)}
+    with pytest.warns(SoftreachWarning, match=r"end at a bound of their range: t\.end_over_length"):
+        result = sr.calibrate(
+            arm, data, free=["t.end_over_length", "pose"], prior=stiffer, rivals=False
+        )
+    assert result.values["t.end_over_length"] == pytest.approx(1.0)
+    assert "at its bound" in str(result)
+
+
+def test_copied_samples_are_warned_of(good):
+    with pytest.warns(SoftreachWarning, match="20 samples are copies"):
+        sr.calibrate(ARM, pd.concat([good, good]), free=FREE, rivals=False)
+
+
+def test_a_marker_that_was_never_seen_is_left_out(good):
+    data = good.assign(tool_y_mm=np.nan)
+    with pytest.warns(SoftreachWarning, match="never seen are left out: tool"):
+        result = sr.calibrate(ARM, data, free=FREE, rivals=False)
+    assert result.data.marker_names == ("half",)
+
+
+def test_a_place_that_is_missing_leaves_the_rest_of_its_sample(good):
+    data = good.astype(float).copy()
+    data.loc[3, "tool_y_mm"] = np.nan
+    result = sr.calibrate(ARM, data, free=FREE, rivals=False)
+    assert result.train.count == 2 * len(good) - 1
+
+
+def test_an_interruption_passes_through(good):
+    def stop(done):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sr.calibrate(ARM, good, free=FREE, progress=stop)
+
+
+def test_errors_of_the_fit_are_not_called_held_out(good):
+    result = sr.calibrate(ARM, good, free=FREE, rivals=False)
+    assert re.search("fitted error .* mm rms", result.verdict.sentence)

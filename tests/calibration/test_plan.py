@@ -1,0 +1,102 @@
+"""Planned poses tell more than others, and as much as they promise."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import softreach as sr
+from softreach.calibration import plan_poses, read_measurements
+from softreach.calibration.free_numbers import free_numbers
+from softreach.calibration.model import MarkerModel
+from softreach.support.errors import InvalidInput
+from tests.calibration.arms import (
+    MODULUS,
+    hanging_tentacle,
+    measured,
+    on_the_bench,
+    random_inputs,
+)
+
+ARM = hanging_tentacle()
+FREE = [MODULUS, "t.distance", "pose"]
+
+
+def log_determinant(inputs):
+    """Of JᵀJ in the scales of the numbers."""
+    free = free_numbers(ARM, FREE)
+    slopes = MarkerModel(free, inputs, np.arange(2)).predict(free.start, slopes=True).slopes
+    rows = slopes.reshape(-1, len(free)) * free.scale
+    return np.linalg.slogdet(rows.T @ rows)[1]
+
+
+def test_planned_poses_tell_more_than_any_of_many_random_choices():
+    plan = plan_poses(ARM, FREE, 8, candidates=256)
+    others = [log_determinant(random_inputs(ARM, 8, seed)) for seed in range(30)]
+    assert plan.log_determinant == pytest.approx(log_determinant(plan.activations), abs=1e-6)
+    assert plan.log_determinant > max(others)
+
+
+def test_the_errors_promised_are_those_of_fits():
+    plan = plan_poses(ARM, FREE, 60, candidates=256)
+    promised, noise = plan.sigma(3e-4), 3e-4
+    values = []
+    for seed in range(12):
+        data = measured(ARM, noise=noise, seed=seed, inputs=plan.activations)
+        result = sr.calibrate(ARM, data, free=FREE, robust=False, rivals=False)
+        values.append([result.values[name] for name in plan.names])
+    spread = np.std(values, axis=0, ddof=1)
+    np.testing.assert_allclose(result.uncertainty.sigma, list(promised.values()), rtol=0.25)
+    ratios = spread / np.array(list(promised.values()))
+    assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, rel=0.25)
+
+
+def test_poses_keep_apart_and_inside_of_the_box():
+    plan = plan_poses(ARM, FREE, 12, candidates=256)
+    low, high = ARM.input_bounds.T
+    cube = (plan.activations - low) / (high - low)
+    apart = np.linalg.norm(cube[:, None] - cube, axis=2)[np.triu_indices(12, 1)]
+    assert apart.min() > 0.5 * 12 ** (-1 / 3)
+    assert cube.min() >= 0.0
+    assert cube.max() <= 1.0
+
+
+def test_the_file_of_a_plan_is_read_once_it_is_filled_in(tmp_path):
+    path = tmp_path / "poses.csv"
+    plan = plan_poses(ARM, FREE, 9, candidates=64)
+    plan.save(path)
+    table = pd.read_csv(path)
+    filled = measured(on_the_bench(ARM), inputs=table.filter(like="_N").to_numpy())
+    places = {name: values for name, values in filled.items() if name.endswith("_mm")}
+    assert set(places) <= set(table)
+    assert table[list(places)].isna().all(axis=None)
+    table.assign(**places).to_csv(path, index=False)
+    data = read_measurements(ARM, path)
+    np.testing.assert_allclose(data.inputs, plan.activations, rtol=1e-5)
+    assert data.marker_names == ("half", "tool")
+    assert sr.calibrate(ARM, data, free=FREE).held_out.count == 0
+
+
+def test_a_plan_replaces_an_empty_plan_and_no_measurements(tmp_path):
+    path = tmp_path / "poses.csv"
+    plan = plan_poses(ARM, [MODULUS], 3, candidates=16)
+    plan.save(path)
+    plan.save(path)
+    path.write_text(path.read_text().replace(",,,,,,", ",1,2,3,4,5,6", 1))
+    with pytest.raises(InvalidInput, match="already there|overwrite"):
+        plan.save(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (dict(n=1), "from 2 for these 8 numbers"),
+        (dict(n=10**6), "n = 1000000"),
+        (dict(markers=["disk"]), "of half, tool, each once"),
+        (dict(markers=[]), "markers = none"),
+        (dict(free=["rings[0].material.density"]), "leave out what does nothing"),
+        (dict(candidates=1), "candidates = 1"),
+    ],
+)
+def test_plans_that_cannot_be_are_refused(options, said):
+    with pytest.raises(InvalidInput, match=said):
+        plan_poses(ARM, **{"free": FREE, "n": 9, "candidates": 32, **options})
