@@ -23,7 +23,7 @@ from softreach.cli.console import console
 pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 
 COMMANDS = [name for name in app if not name.startswith("-")]
-MODULES = {"import": "import_file", "list": "listing"}
+MODULES = {"import": "import_file", "list": "listing", "plan-poses": "plan_poses"}
 HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}
 
 
@@ -73,7 +73,7 @@ def test_help_lists_every_command_with_what_it_does(words):
 def test_help_has_its_groups_in_order(capsys):
     assert run(["--help"]) == 0
     titles = re.findall(r"╭─ (\w+) ─", capsys.readouterr().out)
-    assert titles == ["Design", "Reach", "Places", "Output", "Families", "More"]
+    assert titles == ["Design", "Bench", "Reach", "Places", "Output", "Families", "More"]
 
 
 def test_the_version_is_that_of_the_package(capsys):

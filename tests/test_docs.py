@@ -2,7 +2,8 @@
 
 A fence in `README.md` or `docs/` is one of these, or the test fails:
 
-- `python`: executed, in order, in one namespace per page and an empty folder. One that cannot be
+- `python`: executed, in order, in one namespace per page and a folder that is empty but for the
+  files `tentacle.*` of `examples/`. One that cannot be
   says why in its first line: `# not executed: REASON`. One that begins with a name, `# magnets.py`,
   is written to a file of this name, from which others can import.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
@@ -24,6 +25,7 @@ import json
 import math
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -41,6 +43,7 @@ from softreach.cli.app import run
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+EXAMPLES = sorted((ROOT / "examples").glob("tentacle.*"))
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
 FEW = 5_000  # samples
@@ -59,6 +62,8 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     plt = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
+    for file in EXAMPLES:
+        shutil.copy(file, tmp_path)
     known = {*sys.modules}
     parsers = [
         CodeBlockParser("python", run_python),

@@ -21,6 +21,7 @@ MODULES = [
         "arm.designs",
         "arm.parameters",
         "atlas",
+        "calibration",
         "cloud",
         "cloud.curvature",
         "cloud.dexterity",

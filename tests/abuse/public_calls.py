@@ -12,6 +12,7 @@ import numpy as np
 
 import softreach as sr
 from softreach.atlas import DesignSpace
+from tests.calibration.arms import hanging_tentacle, measured
 from tests.test_names import FUNCTIONS, parameters
 
 __all__ = ["CALLS", "UNTRIED", "Call"]
@@ -107,6 +108,26 @@ def statistics():
     return sr.curvature.curvature_statistics(cloud())
 
 
+BENCH = hanging_tentacle()
+
+
+@cache
+def poses():
+    """Measured poses of a tentacle."""
+    return measured(BENCH, 6)
+
+
+@cache
+def calibration():
+    """A calibration by them."""
+    return sr.calibrate(BENCH, poses(), free=["pose.x"], rivals=False)
+
+
+OF_COLUMNS = dict(inputs="mapping", markers="mapping", run="text", order="text")
+OF_POSES = OF_COLUMNS | dict(
+    free="words", prior="mapping", hold_out="number", robust="flag", noise="number", rivals="flag"
+)
+
 NAMES = {
     "arm": "arm base material rod space",
     "dataset": "ax cloud configuration distance equilibria figure grid hull mesh_or_hull",
@@ -200,6 +221,20 @@ CALLS: dict[str, Call] = {
     "arm.Profile.radius": Call(
         lambda: dict(z=[0.0]), function=ARM.profile.radius, fine={"z": MANY | {"NaN", "infinity"}}
     ),
+    "calibration.calibrate": Call(
+        lambda: dict(arm=BENCH, data=poses(), free=["pose.x"], rivals=False),
+        kinds=dict(data="dataset", **OF_POSES),
+        fine=dict(seed={"a number of 400 digits", "a number of 5000 digits"}),
+        said="parameter",
+    ),
+    "calibration.read_measurements": Call(
+        lambda: dict(arm=BENCH, data=poses()), kinds=dict(data="dataset", **OF_COLUMNS), said="data"
+    ),
+    "calibration.plan_poses": Call(
+        lambda: dict(arm=BENCH, free=["pose.x"], n=2, candidates=8),
+        kinds=dict(free="words", markers="words", candidates="whole number"),
+        said="parameter",
+    ),
     "cloud.compute_cloud": Call(
         lambda: dict(arm=ARM, n=4), fine={"seed": {"a number of 400 digits"}}
     ),
@@ -244,6 +279,9 @@ CALLS: dict[str, Call] = {
         fine=dict(caption={"none"}),
     ),
     "plot.plot_arm": Call(lambda: dict(arm=ARM)),
+    "plot.plot_calibration": Call(
+        lambda: dict(calibration=calibration()), kinds=dict(calibration="dataset")
+    ),
     "plot.plot_cloud": Call(lambda: dict(cloud=cloud())),
     "plot.plot_compliance": Call(
         lambda: dict(arm=ARM, configuration=shape(), compliance=np.eye(3))

@@ -1,7 +1,6 @@
 """Data and numbers that a calibration cannot use: one clear line, or a result that says so."""
 
 import re
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -9,7 +8,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section
-from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.support.errors import InvalidInput, SoftreachWarning, no_warnings
 from tests.calibration.arms import MODULUS, hanging_tentacle, measured, on_the_bench
 
 ARM = hanging_tentacle()
@@ -24,8 +23,7 @@ def good():
 
 def refusal(data, free=FREE, arm=ARM, **options):
     """The line by which a calibration refuses."""
-    with pytest.raises(InvalidInput) as caught, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with no_warnings(), pytest.raises(InvalidInput) as caught:
         sr.calibrate(arm, data, free=free, rivals=False, **options)
     text = str(caught.value)
     assert "\n" not in text

@@ -17,7 +17,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, find_parameters, parameters
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.rest_shape import RestShape
-from softreach.support.arguments import as_names, plain
+from softreach.support.arguments import as_mapping, as_names, plain
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = ["FreeNumber", "FreeNumbers", "free_numbers"]
@@ -182,7 +182,7 @@ def free_numbers(
     if arm.rest.is_straight and any("rest." in name for name in as_names("free", free)):
         # All arms on the way have a rest shape, were it of the size of rounding.
         arm = arm.replace(rest=RestShape(curvature_x=_UNSEEN / arm.length))
-    priors = dict(prior or {})
+    priors = {} if prior is None else as_mapping("prior", prior, lambda _, value: value)
     numbers = tuple(
         replace(number, prior=_prior(number, priors.pop(number.name, None)))
         for number in _each(arm, as_names("free", free))

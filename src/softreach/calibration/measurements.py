@@ -13,8 +13,8 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.support.arguments import as_given
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.support.arguments import as_given, as_mapping, as_text
 from softreach.support.errors import InvalidInput, counted, did_you_mean, in_short, warn
 
 if TYPE_CHECKING:
@@ -136,6 +136,10 @@ def read_measurements(
         InvalidInput: No such file, columns that are missing, in no unit that is known or in one
             that an input does not have, text or NaN among inputs, or no rows.
     """
+    arm = a_manipulator("arm", arm)
+    columns_of = {} if inputs is None else as_mapping("inputs", inputs, as_text)
+    starts_of = {} if markers is None else as_mapping("markers", markers, as_text)
+    run, order = (None if x is None else as_text(n, x) for n, x in (("run", run), ("order", order)))
     table, source = _table(data)
     if not len(table):
         raise InvalidInput("data", source, "a table with at least one row")
@@ -146,10 +150,10 @@ def read_measurements(
     table = table.set_axis(columns, axis=1)
     run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
     triples = _triples(columns, {run, order})
-    chosen = _chosen_markers(arm, triples, markers or {})
+    chosen = _chosen_markers(arm, triples, starts_of)
     taken = {run, order, *(name for triple in triples.values() for name in triple)}
     plain = [name for name in columns if name not in taken]
-    sources = _input_columns(arm, plain, inputs or {})
+    sources = _input_columns(arm, plain, columns_of)
     values = np.zeros((len(table), arm.inputs))
     for k, (name, unit) in enumerate(zip(sources, arm.input_units, strict=True)):
         if name:
@@ -158,7 +162,7 @@ def read_measurements(
         row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
         raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
     places = np.stack([_place(table, triples[start]) for start in chosen.values()], axis=1)
-    seen = np.isfinite(places).all(axis=2)
+    seen = np.asarray(np.isfinite(places).all(axis=2))
     if not seen.any():
         raise InvalidInput("places of markers", "no number", "seen in at least one sample")
     places[~seen] = np.nan

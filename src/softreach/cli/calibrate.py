@@ -85,8 +85,7 @@ def calibrate(
         Parameter(
             name="--marker",
             group=_COLUMNS,
-            help="Start of the columns of a marker: tip=disk3. Only those that are named are used. "
-            "May be repeated.",
+            help="Start of the columns of a marker: tip=disk3. May be repeated.",
         ),
     ] = None,
     run: Annotated[
@@ -245,5 +244,5 @@ def _errors(errors: Misses) -> dict[str, float]:
         "median_m": errors.median,
         "mean_m": errors.mean,
         "below_95_percent_m": errors.most,
-        "places": errors.count,
+        "places": errors.number,
     }

@@ -4,6 +4,7 @@ from softreach.rod.activation_box import ActivationBox
 from softreach.rod.kinematics import configuration, marker_positions, tip_jacobian, tip_positions
 from softreach.rod.loaded.all_equilibria import AllEquilibria, equilibria
 from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.shapes import Shapes
 from softreach.rod.loaded.shooting import Equilibria, Rung
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frames, StrainRange, Strains, TipMap, TipMotions, TipStatus
@@ -16,6 +17,7 @@ __all__ = [
     "Frames",
     "LoadedRod",
     "Rung",
+    "Shapes",
     "StrainRange",
     "Strains",
     "TipMap",
