@@ -121,3 +121,15 @@ def test_a_simplified_ball_stays_closed_and_keeps_its_volume():
     assert (np.unique(sides, axis=0, return_counts=True)[1] % 2 == 0).all()
     volume = enclosed_volume(vertices, faces)
     assert enclosed_volume(coarse, fewer) == pytest.approx(volume, rel=0.02)
+
+
+def test_markers_are_dots_where_they_are_and_seen_through_the_arm(trunk):
+    markers = (sr.arm.Marker(name="half", station=0.5), sr.arm.Marker(name="tool"))
+    arm = trunk.replace(markers=markers)
+    shape = sr.configuration(arm, (-1.0, -0.2, -0.5))
+    page = content(plot_3d(shape))
+    dots = next(part for part in page["parts"] if "faces" not in part)
+    assert dots["through"]
+    side = np.ptp(page["box"], axis=0).max()
+    expected = shape.marker_position.values / arm.length
+    np.testing.assert_allclose(places(dots, page["box"]), expected, atol=1e-3 + side / 65535)

@@ -8,6 +8,7 @@ from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
 from softreach.studio.app import JOBS
 from softreach.studio.jobs.beside import DrawFree, DrawReference
+from softreach.studio.jobs.calibration import DrawSample
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
 from softreach.studio.jobs.plots import PLOT_JOBS
@@ -38,7 +39,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     state = StudioState(design=trunk)
     other = changed(trunk, {"taper": 0.01})
     changes = {
-        state.replace(activation=(-1.0, 0.0, 0.0)): {DrawArm},
+        state.replace(activation=(-1.0, 0.0, 0.0)): {DrawArm, DrawSample},
         state.showing(color="multiplicity"): {DrawCloud},
         state.showing(slice=Slice(axis="x")): {DrawCloud},
         state.showing(map=MapView(metric="volume")): {DrawMap},
@@ -48,7 +49,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
         state.showing(orthographic=True): {FollowCamera},
         state.showing(dark=True): {SetTheme},
         state.replace(reference=trunk): {DrawReference},
-        state.replace(design=other): {ComputeReach, DrawArm, DrawMap},
+        state.replace(design=other): {ComputeReach, DrawArm, DrawMap, DrawSample},
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
     }
     for new, jobs in changes.items():
@@ -65,6 +66,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
             ComputeReach,
             DrawArm,
             DrawMap,
+            DrawSample,
             SolveInverse,
             ALONG_ARM,
         },

@@ -25,6 +25,7 @@ from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.tabs.loads import (
     GRAVITIES,
     TypedLoads,
+    base_field,
     gravity_name,
     other_loads,
     typed_loads,
@@ -65,6 +66,19 @@ def test_directions_are_known_by_name(lce):
         assert gravity_name(gravity) == name
         assert typed_loads(with_loads(lce, TypedLoads(gravity=gravity))).gravity == gravity
     assert gravity_name((0.0, 0.0, -1.62)) == ""
+
+
+def test_place_and_turn_of_the_base_are_typed_in_mm_and_degrees_and_the_rest_of_it_stays(lce):
+    state = StudioState(design=lce.replace(base=sr.Base(points="down", position=(1 / 3, 0, 0))))
+    place, turn = base_field("position"), base_field("turn")
+    assert place.write(state, place.read(state)).design.base.position == (1 / 3, 0, 0)
+    moved = turn.write(place.write(state, (10.0, 0.0, 250.0)), -30.0)
+    assert (place.read(moved), turn.read(moved)) == ((10.0, 0.0, 250.0), -30.0)
+    base = sr.Base(points="down", position=(0.01, 0.0, 0.25), turn=math.radians(-30))
+    assert moved.design.base == base
+    assert moved.design.replace(base=state.design.base) == state.design
+    with pytest.raises(InvalidDesign, match="position"):
+        place.write(state, (0.0, 1e12, 0.0))
 
 
 def test_loads_without_a_field_stay(lce):

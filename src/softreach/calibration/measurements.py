@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from softreach.support.errors import InvalidInput, counted, did_you_mean, in_sho
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Measurements", "read_measurements"]
+__all__ = ["Measurements", "read_measurements", "read_table"]
 
 Array = NDArray[np.float64]
 
@@ -207,17 +207,26 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
 
 def _read(path: Path) -> tuple[pd.DataFrame, str]:
     """The table of a file, and its name."""
-    import pandas as pd
-
     if not path.is_file():
         raise InvalidInput("data", str(path), "a file that exists")
+    return read_table(path, str(path)), path.name
+
+
+def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
+    """The table of a file, which its name calls CSV or Parquet.
+
+    Raises:
+        InvalidInput: It is no table.
+    """
+    import pandas as pd
+
     try:
-        if path.suffix.lower() in (".parquet", ".pq"):
-            return pd.read_parquet(path), path.name
-        return pd.read_csv(path, skipinitialspace=True, comment="#"), path.name
+        if name.lower().endswith((".parquet", ".pq")):
+            return pd.read_parquet(file)
+        return pd.read_csv(file, skipinitialspace=True, comment="#")
     except (ValueError, UnicodeDecodeError, OSError, ImportError) as error:
         text = str(error).splitlines()[0]
-        raise InvalidInput("data", str(path), f"a table in CSV or Parquet: {text}") from None
+        raise InvalidInput("data", name, f"a table in CSV or Parquet: {text}") from None
 
 
 def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:

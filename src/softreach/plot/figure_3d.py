@@ -22,7 +22,12 @@ from softreach.plot.clouds import drawn_tips, point_size
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey, color_map, color_samples
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import a_surface
-from softreach.rod.arm_shape import arm_surface, bundle_skins, rest_configuration
+from softreach.rod.arm_shape import (
+    arm_surface,
+    bundle_skins,
+    marker_points,
+    rest_configuration,
+)
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_cloud, a_configuration
 from softreach.support.arguments import as_given, as_text
@@ -43,6 +48,7 @@ _PALE = 0.62  # how far the colors of the arm at rest go toward white
 _CLEAR = 0.4  # opacity of surfaces beside others or around a cloud
 _BODY_CLEAR = 0.45  # of a body that has something inside
 _LINE = 1 / 300  # radius of the centerline of an unstable arm, in L
+_MARKER = 1 / 60  # diameter of the dot of a marker, in L
 _UNSTABLE: Color = (0.45, 0.45, 0.45)
 _SIZES = "", "curve_length", "area", "volume"  # of a reachable set, by its dimension
 _SURFACES: tuple[Color, ...] = (STEEL, (0.88, 0.66, 0.42), (0.62, 0.76, 0.55))
@@ -214,6 +220,10 @@ class _Scene:
         for index, skin in enumerate(bundle_skins(arm, shape, lift=0.01)):
             tint = _faded(bundle_color(index), fade)
             self._add_skin(name, skin.vertices, skin.faces, tint)
+        if arm.markers:
+            dots = Dots(self.unit.of(marker_points(arm, shape)))
+            size = _MARKER * float(self.unit.of(arm.length))
+            self.parts.append(PagePart(name, dots, size=size, through=True))
 
     def _add_skin(
         self, name: str, vertices: Array, faces: Any, tint: Color, opacity: float = 1.0

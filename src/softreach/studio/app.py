@@ -12,6 +12,7 @@ import numpy as np
 from softreach.picture.axes_box import round_box
 from softreach.studio.fields import attempt
 from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
+from softreach.studio.jobs.calibration import DrawSample, FitArm
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
 from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
@@ -45,6 +46,7 @@ JOBS: tuple[type[Job], ...] = (
     DrawFree, DrawReference, DrawReferenceArm,
     SolveInverse, DragTip,
     FollowPath, PlayPath, WriteMovie,
+    DrawSample, FitArm,
     *PLOT_JOBS,
     DrawMap, SetTheme, KeepState,
 )  # fmt: skip
@@ -228,6 +230,7 @@ def _furnish(session: Session, url: str) -> None:
     """Add the panels, and let clicks in the scene reach those that wait for them."""
     from softreach.studio.tabs.activation import ActivationPanel
     from softreach.studio.tabs.atlas import AtlasPanel
+    from softreach.studio.tabs.calibrate import CalibratePanel
     from softreach.studio.tabs.compare import ComparePanel
     from softreach.studio.tabs.design import DesignPanel
     from softreach.studio.tabs.export import ExportPanel
@@ -253,6 +256,7 @@ def _furnish(session: Session, url: str) -> None:
         "View": (ViewPanel,),
         "Plots": (PlotsPanel,),
         "Compare": (ComparePanel,),
+        "Calibrate": (CalibratePanel,),
     }
     for name, together in kinds.items():
         tab = tabs.add_tab(name)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
     from softreach.plot.coloring import BundleKey, ScalarKey
+    from softreach.studio.jobs.calibration import Bench
     from softreach.studio.scene.drag import TipDrag
 
 __all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
@@ -186,6 +187,8 @@ class Session:
         """Of the tip; None when nobody drags."""
         self.is_dragged = False
         """True while a drag of the tip is under way."""
+        self.bench: Bench | None = None
+        """Measured poses, and what was fitted to them."""
         self.figures = Figures()
         """Results of the plots beside the scene."""
         self.atlas: xr.Dataset | None = start.atlas
@@ -359,6 +362,11 @@ class Session:
     def _follow_change(self, old: StudioState | None) -> None:
         self.follow(*what_follows(self._jobs, old, self.state))
 
+    @property
+    def shows_sample(self) -> bool:
+        """True while the arm is at a measured pose."""
+        return self.bench is not None and self.bench.distances is not None
+
     def job(self, kind: type[_Kind]) -> _Kind:
         """The job of a kind."""
         job = self._jobs[kind]
@@ -378,7 +386,7 @@ class Session:
             worker.close()
         # viser may hold on to what belongs to a page for a while; clouds are large.
         self.reach = self.free = self.reference = self.answer = self.atlas = None
-        self.panels, self.trail, self.figures = [], [], Figures()
+        self.panels, self.trail, self.figures, self.bench = [], [], Figures(), None
         self._shown.clear()
 
     def _rested(self) -> None:

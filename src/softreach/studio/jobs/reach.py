@@ -230,7 +230,8 @@ class FollowCamera(Job):
             most = _DRAGGED if session.is_dragged else None
             session.scene.clouds.look(viewpoint, session.state.appearance.cut, most)
             session.scene.axes.turn(viewpoint.position, session.camera.focal)
-            session.scene.see_through_arm(self._hides_handle(viewpoint.position))
+            hides = session.shows_sample or self._hides_handle(viewpoint.position)
+            session.scene.see_through_arm(hides)
 
     def _hides_handle(self, camera: Array) -> bool:
         """True if the arm is between the camera [L] and the handle on its own tip."""

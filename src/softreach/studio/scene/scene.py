@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import inside
 from softreach.picture.axes_box import axes_box, round_box, seen_from
 from softreach.plot.coloring import UNSTABLE
-from softreach.rod.arm_shape import arm_surface, bundle_skins
+from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.clouds import (
@@ -108,6 +108,8 @@ _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
+_MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
+_MEASURED_SIZE = 0.03
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
 
@@ -152,25 +154,34 @@ class Scene:
         gray = np.array(FAINT, np.uint8)
         self._points("/free", points[kept], gray, _FREE_SIZE * look.point_size)
 
-    def draw_arm(self, arm: Manipulator, activation: Sequence[float], path: str = "/arm") -> Array:
-        """The body and its fibers; returns the tip [L]. Redrawn by moving what there is.
+    def draw_arm(
+        self,
+        arm: Manipulator,
+        activation: Sequence[float],
+        path: str = "/arm",
+        length: float | None = None,
+    ) -> Array:
+        """The body, its fibers and markers; returns the tip. Redrawn by moving what there is.
 
-        Nothing is drawn of an arm without equilibrium, and the tip is NaN.
+        Nothing is drawn of an arm without equilibrium, and the tip is NaN. Lengths are over
+        `length` [m], by default that of the arm.
         """
+        length = length or arm.length
         shape = configuration(solvable_rod(arm), np.asarray(activation), _STATIONS)
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)
         if path == "/arm":
             self.spine = _spine(arm, shape)
-        meshes = _arm_meshes(arm, shape)
+        self.draw_dots(f"{path}/markers", marker_points(arm, shape) / length, _MARKER)
+        meshes = _arm_meshes(arm, shape, length)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:
             for handle, (vertices, _, _) in zip(handles, meshes, strict=True):
                 handle.vertices = vertices
         else:
             self.remove(path)
-            ghost = path.startswith("/ghosts")
+            ghost = path.startswith(("/ghosts", "/sample"))
             opacity = [_GHOST] * len(meshes) if ghost else _opacities(arm, len(meshes))
             self._arms[path] = (
                 arm,
@@ -179,7 +190,7 @@ class Scene:
                     for k, (mesh, how) in enumerate(zip(meshes, opacity, strict=True))
                 ],
             )
-        return shape["position"].values[-1] / arm.length
+        return shape["position"].values[-1] / length
 
     def see_through_arm(self, clear: bool) -> None:
         """Let what is behind the arm be seen through it, or not."""
@@ -242,6 +253,31 @@ class Scene:
             gap = np.stack([target, nearest])[None].astype(np.float32)
             self._api.add_line_segments("/gap", gap, _MARK, thickness=0.004)
             self._api.add_icosphere("/gap/nearest", 0.008, (40, 40, 40), position=nearest)
+
+    def draw_sample(self, measured: Array, predicted: Array) -> None:
+        """Measured and predicted markers [L], shapes (marker, 3), and lines between them."""
+        self.draw_dots("/sample/measured", measured, _MARK, _MEASURED_SIZE)
+        self.draw_dots("/sample/predicted", predicted, _MARKER)
+        pairs = np.stack([measured, predicted], axis=1)
+        pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))].astype(np.float32)
+        self.remove("/sample/residuals")
+        if len(pairs):
+            self._api.add_line_segments("/sample/residuals", pairs, _MARK, thickness=0.005)
+
+    def draw_dots(self, path: str, points: Array, color: Color, size: float = _MARKER_SIZE) -> None:
+        """Small dots at the places that are known [L]."""
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            self.remove(path)
+            return
+        self._api.add_point_cloud(
+            path,
+            points.astype(np.float32),
+            color,
+            point_size=size,
+            point_shape="circle",
+            precision="float32",
+        )
 
     def draw_picture(
         self, path: str, image: NDArray[np.uint8], size: float, center: Array, turn: Any
@@ -355,20 +391,23 @@ def _spine(arm: Manipulator, shape: Any) -> tuple[Array, Array]:
     return shape["position"].values / arm.length, shape["radius"].values / arm.length
 
 
-def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:
-    """Vertices [L], faces and color of the body and of every bundle."""
+def _arm_meshes(
+    arm: Manipulator, shape: Any, length: float
+) -> list[tuple[Array, NDArray[Any], Color]]:
+    """Vertices over `length`, faces and color of the body and of every bundle."""
     body = arm_surface(arm, shape, _SIDES)
-    meshes = [(body.vertices / arm.length, body.faces, _rgb(BODY))]
+    meshes = [(body.vertices / length, body.faces, _rgb(BODY))]
     if arm.bundles > MOST_BUNDLES:
         return meshes
     for k, skin in enumerate(bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)):
-        meshes.append((skin.vertices / arm.length, skin.faces, _rgb(bundle_color(k))))
+        meshes.append((skin.vertices / length, skin.faces, _rgb(bundle_color(k))))
     return meshes
 
 
 def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
     """Of the body and of every bundle."""
-    return [_CLEAR if any(inside(arm)) else None, *[None] * (meshes - 1)]
+    hidden = any(inside(arm)) or arm.markers
+    return [_CLEAR if hidden else None, *[None] * (meshes - 1)]
 
 
 def _rgb(color: Sequence[float]) -> Color:

@@ -44,6 +44,7 @@ class DragPanel:
         state, drag, arm = session.state, session.drag, session.state.design
         look = state.appearance
         grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
+        grasped = grasped and not session.shows_sample  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
         self._ball.move(session.tip if grasped else None, radius, dark=look.dark)
         if drag is None:

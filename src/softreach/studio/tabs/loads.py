@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -109,6 +110,14 @@ class LoadsPanel:
                 Attribute(lambda state: base_name(state.design), _based),
                 "Which way the straight arm points from its base, in the world",
             )
+            fields.vector(
+                "base at [mm]",
+                base_field("position"),
+                "r(0): where the arm is clamped, as x, y, z in the world",
+            )
+            fields.number(
+                "turn [deg]", base_field("turn"), "ψ: turn of the base about the way the arm points"
+            )
             fields.dropdown(
                 "gravity",
                 {name: name for name in GRAVITIES} | {"": "as typed"},
@@ -195,6 +204,23 @@ def _based(state: StudioState, name: str) -> StudioState:
         return state
     design = state.design
     return state.replace(design=design.replace(base=design.base.replace(points=name)))
+
+
+def base_field(name: str) -> Attribute:
+    """Position in mm, or turn in degrees."""
+    scale = math.radians(1.0) if name == "turn" else 1e-3
+
+    def read(state: StudioState) -> Any:
+        return _in_unit(getattr(state.design.base, name), scale)
+
+    def write(state: StudioState, value: Any) -> StudioState:
+        if value == read(state):  # what the field only shows rounded is left as it is
+            return state
+        there = vector(scale * v for v in value) if isinstance(value, tuple) else scale * value
+        base = state.design.base.replace(**{name: there})
+        return state.replace(design=state.design.replace(base=base))
+
+    return Attribute(read, write)
 
 
 def other_loads(arm: Manipulator) -> list[str]:
