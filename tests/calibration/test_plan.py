@@ -73,7 +73,7 @@ def test_the_file_of_a_plan_is_read_once_it_is_filled_in(tmp_path):
     data = read_measurements(ARM, path)
     np.testing.assert_allclose(data.inputs, plan.activations, rtol=1e-5)
     assert data.marker_names == ("half", "tool")
-    assert sr.calibrate(ARM, data, free=FREE).held_out.count == 0
+    assert sr.calibrate(ARM, data, free=FREE).held_out.number == 0
 
 
 def test_a_plan_replaces_an_empty_plan_and_no_measurements(tmp_path):
