@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,6 +30,8 @@ COMMANDS = {
     "equilibria": "equilibria lce_arm --payload 30g --gravity up --out equilibria.png",
     "payload": "payload lce_arm --gravity up --out payload.png",
     "gradient": "gradient lce_arm taper upper --accuracy 3e-4",
+    "calibrate": "calibrate tentacle.toml tentacle.csv --free pose --free rings*modulus "
+    "--report report.html --table missed.csv --out bench.toml",
     "atlas": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000",
     "atlas, 2 workers": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000 --workers 2",
     "paper": "paper --out paper --quick",
@@ -88,6 +91,8 @@ def prepare(folder: Path) -> None:
     (folder / "targets.csv").write_text("\n".join(50 * targets))
     path = [f"0.2,{0.1 + 2e-5 * k},0.6" for k in range(5_000)]
     (folder / "path.csv").write_text("\n".join(path))
+    for file in (Path(__file__).parent.parent / "examples").glob("tentacle.*"):
+        shutil.copy(file, folder)
 
 
 def started(name: str, folder: Path) -> subprocess.Popen[bytes]:

@@ -203,3 +203,19 @@ def test_planned_poses_become_a_calibration(folder, capsys):
     table.assign(**places).to_csv("plan.csv", index=False)
     assert run(["calibrate", "arm.toml", "plan.csv", *FREE, "--no-rivals"]) == 0
     assert "9 samples of half, tool" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("view", ["front", "back", "top", "oblique"])
+def test_places_stand_under_their_coordinates_in_every_view(view, result):
+    pytest.importorskip("matplotlib")
+    space = sr.plot.plot_calibration(result, view=view).axes[0]
+    dots = next(c for c in space.collections if c.get_label() == "measured").get_offsets()
+    left, right = space.get_xlim()
+    low, high = space.get_ylim()
+    assert dots[:, 0].min() > min(left, right)
+    assert dots[:, 0].max() < max(left, right)
+    assert (left > right) == (view == "back")
+    assert low < dots[:, 1].min() < dots[:, 1].max() < high
+    if view in ("front", "back"):
+        places = 1e3 * result.data.places.reshape(-1, 3)
+        np.testing.assert_allclose(dots, places[:, [0, 2]])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.picture.projection import View, is_mirrored, project, view_angles
+from softreach.picture.projection import View, is_mirrored, plane_of, project, view_angles
 from softreach.plot.axes import bounding_box, draw_box, view_extent
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import figure_style, pyplot, write_note
@@ -147,8 +147,11 @@ def _draw_places(ax: Axes, shown: _Shown, view: View) -> None:
     ax.scatter(*there.T, s=size, facecolors="none", edgecolors=colors, linewidths=0.7, zorder=4)
     ax.scatter([], [], s=10, facecolors="none", edgecolors="0.2", linewidths=0.7, label="predicted")
     left, right, low, high = view_extent(box, view)
-    ax.set(xlim=sorted((mirror[0] * left, mirror[0] * right)), ylim=(low, high), aspect="equal")
-    draw_box(ax, box, view, shown.unit)
+    ax.set(xlim=(mirror[0] * left, mirror[0] * right), ylim=(low, high), aspect="equal")
+    if plane := plane_of(view):
+        ax.set(xlabel=shown.unit.label(plane[0]), ylabel=shown.unit.label(plane[1]))
+    else:
+        draw_box(ax, box, view, shown.unit)
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, handletextpad=0.2)
 
 
