@@ -12,6 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import marker_stations
+from softreach.support.progress import Progress, silent
 
 __all__ = ["constant_curvature", "quadratic", "ridge"]
 
@@ -76,7 +77,7 @@ def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
 
 
 def constant_curvature(
-    arm: Manipulator, train: Measurements, test: Measurements
+    arm: Manipulator, train: Measurements, test: Measurements, progress: Progress = silent
 ) -> tuple[Array, int]:
     """Places of the test samples by arcs of circles, one between each two ends of actuators.
 
@@ -91,6 +92,7 @@ def constant_curvature(
     seen = np.isfinite(train.places)
 
     def residuals(values: Array) -> Array:
+        progress(0)  # which may end the fit
         return (arcs.places(values, train.inputs) - train.places)[seen]
 
     tries = [

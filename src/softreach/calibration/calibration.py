@@ -139,7 +139,7 @@ def calibrate(
         seconds=perf_counter() - begin,
         date=dt.datetime.now(dt.UTC).date().isoformat(),
     )
-    return replace(result, rivals=_rivals(arm, table, held)) if rivals else result
+    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
 
 
 def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
@@ -157,10 +157,12 @@ def _warn_of_copies(data: Measurements) -> None:
         warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
 
 
-def _rivals(arm: Manipulator, data: Measurements, held: NDArray[np.bool_]) -> tuple[Rival, ...]:
+def _rivals(
+    arm: Manipulator, data: Measurements, held: NDArray[np.bool_], progress: Progress
+) -> tuple[Rival, ...]:
     train = data.of(~held)
     laws = {
-        "constant curvature": lambda test: constant_curvature(arm, train, test),
+        "constant curvature": lambda test: constant_curvature(arm, train, test, progress),
         "quadratic ridge": lambda test: quadratic(train, test),
     }
     result = []
