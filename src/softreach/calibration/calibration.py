@@ -231,11 +231,15 @@ class Calibration:
 
     @cached_property
     def before(self) -> Misses:
-        """Errors of the design before, with the pose of its base alone fitted, on all samples."""
-        numbers = free_numbers(self.start, ["pose"])
-        model = MarkerModel.of(numbers, self.data)
-        free = started(model, self.data.places)
-        return misses(model.of_arm(free.made(free.start)).places - self.data.places)
+        """Errors of the design before, moved onto the fitted samples as it is.
+
+        Of samples held out, or of all if none is.
+        """
+        train = self.data.of(~self.held)
+        free = started(MarkerModel.of(free_numbers(self.start, ["pose"]), train), train.places)
+        judged = self.data.of(self.held) if self.held.any() else train
+        model = MarkerModel.of(free, judged)
+        return misses(model.of_arm(free.made(free.start)).places - judged.places)
 
     @cached_property
     def repeatability(self) -> Repeatability:
@@ -244,10 +248,12 @@ class Calibration:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """What limits the fit."""
+        """What limits the fit; samples far off are left out."""
         held = bool(self.held.any())
-        known, name = (self.held_out, "held-out") if held else (self.train, "fitted")
-        return judged(self.data, self.residuals, known.rms, self.repeatability, f"{name} error")
+        rows, name = (self.held, "held-out") if held else (~self.held, "fitted")
+        near = rows & ~np.isin(self.data.rows, self.outliers)
+        error = misses(self.residuals[near if near.any() else rows]).rms
+        return judged(self.data, self.residuals, error, self.repeatability, f"{name} error")
 
     @property
     def outliers(self) -> NDArray[np.intp]:

@@ -117,7 +117,7 @@ def error_rows(result: Calibration) -> Iterator[ErrorRow]:
     on = f"{held} held out" if held else fitted
     if held:
         yield ErrorRow("calibrated", on, result.held_out)
-    yield ErrorRow("design, base fitted", f"{len(result.data)} all", result.before)
+    yield ErrorRow("design, base fitted", on, result.before)
     for rival in result.rivals:
         law = f"{rival.name}, {counted(rival.numbers, 'number')}"
         yield ErrorRow(law, on, rival.held_out if held else rival.train)
