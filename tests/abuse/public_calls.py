@@ -118,6 +118,11 @@ def poses():
 
 
 @cache
+def runs():
+    """The same in two runs."""
+    return poses() | {"run": [k % 2 for k in range(len(next(iter(poses().values()))))]}
+
+
 def calibration():
     """A calibration by them."""
     return sr.calibrate(BENCH, poses(), free=["pose.x"], rivals=False)
@@ -229,6 +234,22 @@ CALLS: dict[str, Call] = {
     ),
     "calibration.read_measurements": Call(
         lambda: dict(arm=BENCH, data=poses()), kinds=dict(data="dataset", **OF_COLUMNS), said="data"
+    ),
+    "calibration.ladder": Call(
+        lambda: dict(arm=BENCH, data=poses(), free=[["pose.x"]]),
+        kinds=dict(data="dataset", free="words", hold_out=OF_POSES["hold_out"]),
+        fine=dict(seed={"a number of 400 digits", "a number of 5000 digits"}),
+        said="parameter",
+    ),
+    "calibration.leave_one_run_out": Call(
+        lambda: dict(arm=BENCH, data=runs(), free=["pose.x"]),
+        kinds=dict(data="dataset", free="words"),
+        said="parameter",
+    ),
+    "calibration.profile": Call(
+        lambda: dict(result=calibration(), name="pose.x", values=[0.0]),
+        kinds=dict(result="dataset"),
+        fine=dict(values={"a list", "a number"}),
     ),
     "calibration.plan_poses": Call(
         lambda: dict(arm=BENCH, free=["pose.x"], n=2, candidates=8),

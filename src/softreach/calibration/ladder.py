@@ -15,7 +15,7 @@ from softreach.calibration.errors import Misses, misses
 from softreach.calibration.fit import fitted
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
-from softreach.support.arguments import as_instance, as_number
+from softreach.support.arguments import as_instance, as_number, as_text
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.progress import silent
@@ -130,7 +130,7 @@ def profile(result: Calibration, name: str, values: ArrayLike) -> Array:
     """
     as_instance("result", result, Calibration, "a Calibration")
     free = result.fit.free
-    if name not in free.names:
+    if as_text("name", name) not in free.names:
         raise InvalidInput("name", name, f"one of {', '.join(free.names)}")
     k = free.names.index(name)
     held = np.atleast_1d(as_floats("values", values))
