@@ -15,7 +15,7 @@ from softreach.calibration.errors import Misses, misses
 from softreach.calibration.fit import fitted
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
-from softreach.support.arguments import as_instance, as_number, as_text
+from softreach.support.arguments import as_given, as_instance, as_number, as_text
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.progress import silent
@@ -75,8 +75,9 @@ def ladder(
     Raises:
         InvalidInput: No set, or no samples to judge by; else as `calibrate`.
     """
-    if isinstance(free, str) or not len(free) or any(isinstance(each, str) for each in free):
-        raise InvalidInput("free", free, 'sets of names, such as [["pose"], ["pose", "length"]]')
+    sets = list(free) if isinstance(free, list | tuple) else []
+    if not sets or not all(isinstance(each, list | tuple) for each in sets):
+        raise InvalidInput("free", as_given(free), 'sets of names, such as [["pose"], ["pose", "length"]]')
     hold_out = as_number("hold_out", hold_out, Range(0.0, 0.9, open_low=True))
     options = {"rivals": False, **options, "hold_out": hold_out, "seed": seed}
     return Ladder(tuple(calibrate(arm, data, free=each, **options) for each in free))
