@@ -77,7 +77,9 @@ def ladder(
     """
     sets = list(free) if isinstance(free, list | tuple) else []
     if not sets or not all(isinstance(each, list | tuple) for each in sets):
-        raise InvalidInput("free", as_given(free), 'sets of names, such as [["pose"], ["pose", "length"]]')
+        raise InvalidInput(
+            "free", as_given(free), 'sets of names, such as [["pose"], ["pose", "length"]]'
+        )
     hold_out = as_number("hold_out", hold_out, Range(0.0, 0.9, open_low=True))
     options = {"rivals": False, **options, "hold_out": hold_out, "seed": seed}
     return Ladder(tuple(calibrate(arm, data, free=each, **options) for each in free))
