@@ -84,7 +84,7 @@ WIRE = [
     ids=["tentacle", "heavy tentacle", "wire", "heavy wire"],
 )
 def test_derivatives_are_those_of_differences(arm, free, share):
-    model = model_of(arm, free, share * random_inputs(arm, 4, seed=3))
+    model = model_of(arm, free, share * random_inputs(arm, 2, seed=3))
     values = model.free.start
     slopes = model.predict(values, slopes=True).slopes
     assert slopes is not None

@@ -53,6 +53,7 @@ def _free() -> list[Callable[[], object]]:
     path = (target, (0.2, 0.1, 0.61))
     return [
         _hulls,
+        _calibration,
         partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
         partial(tip_jacobian, hanging, [[-1.0, 0.0, -0.4]]),
         partial(configuration, arm, [-1.0, 0.0, -0.4]),
@@ -76,6 +77,25 @@ def _set() -> None:
     assert isinstance(reached, ReachableSolid)
     reached.contains((0.2, 0.1, 0.6))
     reached.distance((2.0, 0.0, 0.0))
+
+
+def _calibration() -> None:
+    """Small fit of an arm whose tendons are driven by length."""
+    import numpy as np
+
+    from softreach.arm.actuators import LengthTendon
+    from softreach.arm.manipulator import Manipulator
+    from softreach.calibration import calibrate
+
+    tendon = LengthTendon(distance=0.01, bundles=3, activation_bounds=(0.0, 0.01))
+    arm = Manipulator.tapered(
+        length=0.2, outer_radius=0.01, inner_radius=0.005, young_modulus=1e6, actuators=[tendon]
+    )
+    inputs = 0.01 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 1.0]])
+    data = {f"{name}_m": values for name, values in zip(arm.input_names, inputs.T, strict=True)}
+    places = np.array([[0.0, 0.0, 0.2], [0.01, 0.0, 0.2], [0.0, 0.01, 0.2]])
+    data |= {f"{axis}_m": values for axis, values in zip("xyz", places.T, strict=True)}
+    calibrate(arm, data, free=["pose.x"], rivals=False)
 
 
 def _hulls() -> None:
