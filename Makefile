@@ -32,9 +32,8 @@ $(READY): requirements.lock pyproject.toml
 demo: setup
 	$(BIN)/softreach demo --out out
 
-# Tests side by side, one more than there are cores, as some wait now and then; up to four.
-WORKERS := $(shell $(PYTHON) -c "import os; print(min(4, 1 + len(os.sched_getaffinity(0))))")
-TESTS := $(BIN)/python -m pytest -q --numprocesses $(WORKERS) --dist worksteal --max-worker-restart 0
+# Tests side by side, up to four on as many cores.
+TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
 
 # The checks run beside the compiler of the kernels, which has one core.
 test: ready

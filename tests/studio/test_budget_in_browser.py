@@ -79,6 +79,7 @@ def test_a_tab_that_closes_in_mid_computation_ends_it_and_frees_its_memory(brows
         pass
 
 
+@pytest.mark.large
 def test_what_is_shown_of_the_design_before_is_marked(tab, monkeypatch):
     go, made = threading.Event(), stages.compute_cloud
 
@@ -122,6 +123,7 @@ def test_an_upload_of_5_mb_is_refused_in_one_line(tab, tmp_path):
     tab.page.get_by_text("state.json = 5 MB: must be at most 2 MB").wait_for()
 
 
+@pytest.mark.large
 def test_an_export_says_that_it_works_and_what_it_wrote(tab, tmp_path):
     tab.open("Export")
     tab.save("Save cloud", tmp_path)

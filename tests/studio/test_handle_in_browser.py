@@ -196,6 +196,7 @@ def test_a_click_on_the_cloud_sets_a_target_only_where_the_tab_says_so(inverse_t
     tab.page.get_by_label("clicks set the target").uncheck()
 
 
+@pytest.mark.large
 def test_the_handle_can_be_taken_away(inverse_tab):
     tab = inverse_tab
     tab.page.get_by_label("handle on the tip").uncheck()
@@ -205,6 +206,7 @@ def test_the_handle_can_be_taken_away(inverse_tab):
     tab.wait(lambda: tab.drawn("/grip").visible, "the ball is back")
 
 
+@pytest.mark.large
 def test_a_state_without_a_handle_is_saved_as_such():
     state = StudioState(design=sr.designs.minimal_trunk()).showing(handle=False)
     assert StudioState.from_json(state.to_json()) == state

@@ -87,6 +87,7 @@ def test_a_file_that_is_no_path_is_refused_in_one_line(tab, tmp_path):
     assert tab.session.state.path is None
 
 
+@pytest.mark.large
 def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
     tab.page.get_by_label("clicks add points").check()
     panel = next(panel for panel in tab.session.panels if isinstance(panel, PathPanel))

@@ -51,6 +51,7 @@ def test_the_volume_against_alpha_is_that_of_the_cloud(tab):
     assert (found.volume <= found.convex * (1 + 1e-9)).all()
 
 
+@pytest.mark.large
 def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
     tab.open("Plots")
     tab.page.get_by_label("V against parameter").check()

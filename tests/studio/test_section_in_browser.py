@@ -94,6 +94,7 @@ def test_the_numbers_in_the_plane_are_those_of_the_inverse():
     assert within(curves, targets / arm.length, 0).all()
 
 
+@pytest.mark.large
 def test_the_areas_of_sections_sum_up_to_the_volume(tab):
     reach = tab.session.reach
     surface, length = reach.exact.surface(), reach.arm.length

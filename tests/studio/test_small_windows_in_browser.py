@@ -98,6 +98,7 @@ def see_all(tab):
     tab.settle()
 
 
+@pytest.mark.large
 def test_numbers_at_the_axes_of_a_phone_have_room(opened):
     tab = opened("phone")
     see_all(tab)
@@ -135,6 +136,7 @@ def _right(drawn) -> float:
     return place["x"] + place["width"]
 
 
+@pytest.mark.large
 def test_a_wide_table_of_designs_moves_within_the_sheet_of_a_phone(opened):
     tab = opened("phone")
     tab.open("Compare")

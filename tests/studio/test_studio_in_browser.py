@@ -108,6 +108,7 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     tab.page.get_by_text("L away").wait_for()
 
 
+@pytest.mark.large
 def test_a_reference_stays_while_the_design_changes(tab):
     tab.open("Design")
     kept, known = tab.session.state.design, tab.session.reach

@@ -64,6 +64,7 @@ def test_nothing_happens_before_enter_and_the_field_says_so(tab):
     tab.page.get_by_text("Enter applies it").wait_for(state="hidden")
 
 
+@pytest.mark.large
 def test_refused_numbers_say_why_under_their_field_in_its_own_unit(tab):
     for label, text, said in (
         ("taper φ [deg]", "30", "taper φ [deg] = 30"),

@@ -131,6 +131,7 @@ def test_parallels_stay_parallel_for_the_orthographic_camera(tab):
     assert not tab.session.state.appearance.orthographic
 
 
+@pytest.mark.large
 def test_buttons_look_from_the_front_the_side_and_the_top(tab):
     tab.open("View")
     for view, axis in (("front", 1), ("side", 0), ("top", 2)):
@@ -154,6 +155,7 @@ def along(tab, axis: int) -> float:
     return abs(way[axis]) / np.linalg.norm(way)
 
 
+@pytest.mark.large
 def test_numbers_stand_outside_of_what_they_number_from_every_side(tab):
     low, high = tab.session.scene.axes.corners
     middle = (low + high) / 2
