@@ -71,17 +71,35 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     keys = data.runs if by_run else np.arange(len(data))
     rows = rows.reshape(len(data), -1, count)[:, :, free]
     miss = miss.reshape(len(data), -1)
-    bread = np.einsum("nrp,nrq->pq", rows, rows)
+    squares = np.einsum("nrp,nrq->pq", rows, rows)
+    bread = squares - _bent(fit, seen, scale)[np.ix_(free, free)]
     width = noise or robust_width(miss.reshape(-1, 3)[seen.ravel()])
     widths = [np.inf if number.prior is None else number.prior[1] for number in fit.free.numbers]
     known = ((width * scale / np.array(widths)) ** 2)[free]
     inverse = np.linalg.pinv(bread + np.diag(known))
-    meat, freedom = _sandwich(rows, miss, keys, inverse)
+    meat, freedom = _sandwich(rows, miss, keys, np.linalg.pinv(squares + np.diag(known)))
     whole = np.zeros((count, count))
     whole[np.ix_(free, free)] = inverse @ (meat + np.diag(known * width**2)) @ inverse
     degrees = np.full(count, np.inf)
     degrees[free] = freedom
     return Uncertainty(whole * np.outer(scale, scale), degrees, "run" if by_run else "sample")
+
+
+def _bent(fit: Fit, seen: NDArray[np.bool_], scale: Array) -> Array:
+    """What the second derivative of a robust loss lacks of that of weighted squares.
+
+    Of 2W²(√(1 + d²/W²) - 1) in the distance d of a place it is w - w (1 - w²) along the residual,
+    with w = 1/√(1 + d²/W²).
+    """
+    slopes, weight = fit.prediction.slopes, fit.weights
+    assert slopes is not None
+    square = np.where(seen, (fit.residuals**2).sum(axis=2), 0.0)
+    share = np.divide(
+        weight * (1.0 - weight**2), square, out=np.zeros_like(square), where=square > 0
+    )
+    along = np.einsum("nma,nmap->nmp", np.where(seen[..., None], fit.residuals, 0.0), slopes)
+    along = np.where(seen[..., None], along * scale, 0.0)
+    return np.einsum("nm,nmp,nmq->pq", share, along, along)
 
 
 def _sandwich(
