@@ -24,7 +24,7 @@ from softreach.calibration.errors import (
     misses,
     repeatability,
 )
-from softreach.calibration.fit import Fit, fitted, started
+from softreach.calibration.fit import Fit, fitted, robust_width, started
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
@@ -110,11 +110,7 @@ def calibrate(
     hold_out = as_number("hold_out", hold_out, Range(0.0, 0.9))
     robust, rivals = as_flag("robust", robust), as_flag("rivals", rivals)
     noise = None if noise is None else as_number("noise", noise, Range(0.0, 1.0, "m", True))
-    table = (
-        data
-        if isinstance(data, Measurements)
-        else read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
-    )
+    table = read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
     _warn_of_copies(table)
     held = _held_out(table, hold_out, as_integer("seed", seed))
     train = table.of(~held)
@@ -259,8 +255,8 @@ class Calibration:
     def outliers(self) -> NDArray[np.intp]:
         """Rows of the data whose markers are more than five robust widths off."""
         distance = np.linalg.norm(self.residuals, axis=2)
-        middle = np.nanmedian(distance, axis=0)
-        far = np.nanmax(distance / (middle / 1.5382), axis=1, initial=0.0) > _OUTLIER * 1.7
+        widths = [robust_width(self.residuals[:, k]) for k in range(self.data.markers)]
+        far = np.nanmax(distance / widths, axis=1, initial=0.0) > _OUTLIER * 1.7
         return self.data.rows[far]
 
     @property
@@ -279,11 +275,7 @@ class Calibration:
 
     def residuals_on(self, data: Any, **columns: Any) -> Array:
         """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
-        table = (
-            data
-            if isinstance(data, Measurements)
-            else read_measurements(self.start, data, **columns)
-        )
+        table = read_measurements(self.start, data, **columns)
         return self._model(table).of_arm(self.arm).places - table.places
 
     def predict(self, inputs: ArrayLike) -> tuple[Array, Array]:

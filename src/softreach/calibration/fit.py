@@ -204,7 +204,7 @@ def fitted(
         result = problem.solved(values, _FINE if width == rounds[-1] else _COARSE)
         values, converged = result.x, bool(result.status > 0)
         count += int(result.nfev)
-    prediction = model.predict(values, slopes=True)
+    prediction = problem.at(values)
     residuals = prediction.places - places
     low, high = problem.bounds
     hair = 1e-6 * model.free.scale
@@ -232,7 +232,6 @@ class _Problem:
         self.width: float | None = None
         self.unit = 1.0  # of priors, in m
         self.kept: tuple[bytes, Prediction] | None = None
-        self.good: Array | None = None
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -242,18 +241,23 @@ class _Problem:
         """Refuse numbers that the data cannot tell."""
         identifiable(self.model.free, self.slopes(values))
 
-    def _at(self, values: Array) -> Prediction:
+    def at(self, values: Array) -> Prediction:
+        """Places and their derivatives; the last ones are kept."""
         key = values.tobytes()
         if self.kept is None or self.kept[0] != key:
             self.kept = (key, self.model.predict(values, slopes=True))
             self.progress(1)
         return self.kept[1]
 
+    def _miss(self, values: Array) -> Array:
+        """Predicted minus measured places that were seen [m]."""
+        return (self.at(values).places - self.places)[self.seen]
+
     def residuals(self, values: Array) -> Array:
         """Of all that was seen [m], then of the priors."""
         free = self.model.free
         try:
-            miss = (self._at(values).places - self.places)[self.seen]
+            miss = self._miss(values)
         except InvalidDesign:
             return np.full(3 * int(self.seen.sum()) + self._priors(values)[0].size, _FAR)
         miss = np.where(np.isfinite(miss), miss, _FAR * 0.1 * free.arm.length)
@@ -261,7 +265,7 @@ class _Problem:
 
     def slopes(self, values: Array) -> Array:
         """Derivatives of the residuals."""
-        prediction = self._at(values)
+        prediction = self.at(values)
         assert prediction.slopes is not None
         slopes = prediction.slopes[self.seen].reshape(-1, len(self.model.free))
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
@@ -279,12 +283,12 @@ class _Problem:
 
     def robust_at(self, values: Array, widths: float) -> None:
         """From here on residuals beyond so many widths count less."""
-        miss = (self._at(values).places - self.places)[self.seen]
+        miss = self._miss(values)
         self.width = widths * robust_width(miss)
 
     def weigh_priors(self, values: Array) -> None:
         """Priors count as much as a coordinate of one width."""
-        miss = (self._at(values).places - self.places)[self.seen]
+        miss = self._miss(values)
         self.unit = self.noise or robust_width(miss)
 
     def solved(self, values: Array, fine: float) -> Any:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.manipulator import Manipulator
 from softreach.calibration.calibration import Calibration, calibrate
 from softreach.calibration.errors import Misses, misses
 from softreach.calibration.fit import fitted
-from softreach.calibration.measurements import Measurements, read_measurements
+from softreach.calibration.measurements import read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.support.arguments import as_given, as_instance, as_number, as_text
 from softreach.support.arrays import as_floats
@@ -101,9 +101,7 @@ def leave_one_run_out(
     """
     names = ("inputs", "markers", "run", "order")
     columns = {name: options.pop(name) for name in names if name in options}
-    table = data
-    if not isinstance(data, Measurements):
-        table = read_measurements(a_manipulator("arm", arm), data, **columns)
+    table = read_measurements(arm, data, **columns)
     if not table.has_runs:
         raise InvalidInput("runs", len(table.run_names), "2 or more: name their column by `run`")
     errors = {}

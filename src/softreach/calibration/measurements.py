@@ -124,7 +124,7 @@ def read_measurements(
     Args:
         arm: The design, whose inputs and markers the columns are.
         data: Path of a CSV or Parquet file, a DataFrame, a dataset of xarray, or a dictionary of
-            columns.
+            columns; what was read before stays as it is.
         inputs: Column of each input by the name of the input, where names do not tell.
         markers: Start of the columns of each marker by its name, such as {"tip": "disk3"}.
         run: Column that says which samples belong together; by default `run`, `pattern`, `group`,
@@ -137,6 +137,8 @@ def read_measurements(
             that an input does not have, text or NaN among inputs, or no rows.
     """
     arm = a_manipulator("arm", arm)
+    if isinstance(data, Measurements):
+        return data
     columns_of = {} if inputs is None else as_mapping("inputs", inputs, as_text)
     starts_of = {} if markers is None else as_mapping("markers", markers, as_text)
     run, order = (None if x is None else as_text(n, x) for n, x in (("run", run), ("order", order)))
@@ -154,13 +156,7 @@ def read_measurements(
     taken = {run, order, *(name for triple in triples.values() for name in triple)}
     plain = [name for name in columns if name not in taken]
     sources = _input_columns(arm, plain, columns_of)
-    values = np.zeros((len(table), arm.inputs))
-    for k, (name, unit) in enumerate(zip(sources, arm.input_units, strict=True)):
-        if name:
-            values[:, k] = _numbers(table, name) * _size(name, unit)
-    if not np.isfinite(values).all():
-        row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
-        raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
+    values = _inputs(table, sources, arm.input_units)
     places = np.stack([_place(table, triples[start]) for start in chosen.values()], axis=1)
     seen = np.asarray(np.isfinite(places).all(axis=2))
     if not seen.any():
@@ -185,6 +181,18 @@ def read_measurements(
         source=source,
         digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
     )
+
+
+def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
+    """Inputs in their units from their columns, 0 without one, shape (n, input)."""
+    values = np.zeros((len(table), len(sources)))
+    for k, (name, unit) in enumerate(zip(sources, units, strict=True)):
+        if name:
+            values[:, k] = _numbers(table, name) * _size(name, unit)
+    if not np.isfinite(values).all():
+        row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
+        raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
+    return values
 
 
 def _table(data: Any) -> tuple[pd.DataFrame, str]:

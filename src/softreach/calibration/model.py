@@ -18,6 +18,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
 from softreach.calibration.free_numbers import FreeNumbers
 from softreach.calibration.measurements import Measurements
+from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.pulled import LoadedLengths
@@ -337,16 +338,10 @@ def _with_tensions(
         + change.taut_from
         for change in changes
     ]
-    wanted = driven[:, columns] - np.stack(own, axis=-1) - works[..., bundles:]
-    others = driven.copy()
-    others[:, columns] = 0.0
-    wanted -= np.einsum("ntj,njk->ntk", works[..., :bundles], others)
-    matrix = works[..., columns] + np.diag(at.compliance)
-    taut = tension > 0
-    both = taut[:, :, None] & taut[:, None, :]
-    matrix = np.where(both, matrix, np.eye(len(columns)))
-    others[:, columns] = np.linalg.solve(matrix, wanted * taut[..., None])
-    return others
+    # The other changes act as if so much less were pulled in.
+    pulled = driven.copy()
+    pulled[:, columns] -= np.stack(own, axis=-1) + works[..., bundles:]
+    return law.slopes(state.gamma, tension > 0, works[..., :bundles]) @ pulled
 
 
 def _strains(at: _Explicit, state: RodState) -> tuple[Array, Array]:
@@ -362,8 +357,6 @@ def _strains(at: _Explicit, state: RodState) -> tuple[Array, Array]:
 
 def _explicit_shortening(at: _Explicit, change: _Explicit, bend: Array, rise: Array) -> Array:
     """Change of s at the same strains, (n, tendon): theory of `LengthLaw`."""
-    from softreach.kernels.rod.linear_response import WEIGHTS
-
     weights, turn, force = WEIGHTS, at.measures[:, :, :3], at.measures[:, :, 3]
     new_turn, new_force = change.measures[:, :, :3], change.measures[:, :, 3]
     length, grown = at.table.length[..., None], change.table.length

@@ -371,7 +371,8 @@ class _Job:
         moment, length = self.state.moment[row], table.length
         whole = np.append(gamma, 1.0)
         axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
-        squeeze = axial * np.einsum("kic,kic->ki", d[..., 2, :], table.force)  # n3/K0
+        thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
+        squeeze = axial * thrust  # n3/K0
         growth = length * (1.0 + table.growth @ gamma)
         stretch = length * (1.0 + table.extension @ gamma) + growth * squeeze
         bend = table.curvature @ gamma + bending * moment
@@ -386,13 +387,12 @@ class _Job:
             ],
             axis=-1,
         )
-        thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)[..., None]
         pushing = np.concatenate(
             [
                 each * (table.extension + table.growth * squeeze[..., None]),
                 stretched
                 + grown * squeeze[..., None]
-                + growth[..., None] * change.compliance[..., 0, :] * thrust,
+                + growth[..., None] * change.compliance[..., 0, :] * thrust[..., None],
             ],
             axis=-1,
         )
