@@ -1,0 +1,1 @@
+"""From requirements to designs: free parameters, objectives, search, tolerance."""
