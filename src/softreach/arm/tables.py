@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -123,6 +124,7 @@ def compliance(arm: Manipulator, stations: ArrayLike) -> Compliance:
     return Compliance(*(1.0 / value for value in stiffness))
 
 
+@lru_cache(maxsize=64)
 def check_extension(arm: Manipulator) -> None:
     """The theory ends where an activation would shorten the arm to nothing.
 

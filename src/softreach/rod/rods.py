@@ -16,7 +16,7 @@ from softreach.support.arguments import as_flag, as_given, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 
-__all__ = ["refined", "tip_map"]
+__all__ = ["in_steps", "refined", "tip_map"]
 
 
 def tip_map(
@@ -66,6 +66,32 @@ def refined(rod: TipMap, tol: float) -> TipMap:
         return replace(rod, base=refined(rod.base, tol))
     frame: Frame = "base" if isinstance(rod, ArmRod) else "world"
     return _of_arm(rod.arm, tol, frame) if isinstance(rod, ArmRod | PlacedRod) else rod
+
+
+def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
+    """The tip map of an arm in so many steps, which are not checked against its tolerance.
+
+    Maps of neighboring designs in as many steps err by what is a smooth function of the design, so
+    that differences between them do not see it; and none of them needs a search for its steps.
+
+    Args:
+        arm: The design.
+        steps: Along the arm, if nothing breaks it.
+        like: A tip map whose tolerance and frame it has.
+    """
+    if arm.inner is not arm:
+        inner = in_steps(arm.inner, steps, like)
+        assert isinstance(inner, ArmRod | PlacedRod)
+        return DrivenRod(inner, arm)
+    if like.frame == "world" and not arm.base.is_identity:
+        rod = in_steps(arm, steps, _from_base(like))
+        assert isinstance(rod, ArmRod)
+        return PlacedRod(rod)
+    if arm.loads is None:
+        return FreeRod(arm, like.tol).in_steps(steps)
+    from softreach.rod.loaded.rod import LoadedRod
+
+    return LoadedRod(arm, like.tol).in_steps(steps)
 
 
 @lru_cache(maxsize=64)
