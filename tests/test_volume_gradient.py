@@ -245,7 +245,6 @@ def test_units_and_route_are_told(narrow):
         (NARROW, "tapper", 'did you mean "taper"'),
         (NARROW, "left.bundles", "continuously"),
         (NARROW, "rings[0].material.young_modulus", "one number"),
-        (designs.redundant_trunk(), "taper", "4 free bundles"),
         (NARROW.with_bounds([(-0.5, -0.5), (-1, 0), (-1, 0)]), "taper", "2 free bundles"),
     ],
 )

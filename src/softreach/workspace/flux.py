@@ -21,7 +21,7 @@ _NODES = (8, 12, 16, 24, 32)
 _CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
 
 
-def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
+def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0) -> Flux:
     """The signed volume of the image of three free bundles.
 
     By Gauss and Legendre's rule on the faces, as the map is smooth: its error falls faster than any
@@ -31,17 +31,20 @@ def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
         rod: The tip map.
         nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
             tips are then less exact.
+        enough: Relative change of the volume that ends the adding of nodes; those of free arms are
+            then as exact as `rod` says.
 
     Returns:
         Value and error are NaN if a node has no stable equilibrium.
     """
-    rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
+    if not enough or rod.supports_unstable:
+        rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
     counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
     flux, change = _flux(rod, counts[0]), np.inf
     for count in counts[1:]:
         rough, flux = flux, _flux(rod, count)
         change = abs(flux.value - rough.value)
-        if nodes is None and not change > flux.error:  # NaN too
+        if nodes is None and not change > max(flux.error, enough * abs(flux.value)):  # NaN too
             break
     return flux._replace(error=change + flux.error)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,29 +11,34 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.geometry.hull import convex_hull
-from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
+from softreach.rod.rods import refined, tip_map
 from softreach.schema import provenance
 from softreach.support.arguments import as_names, as_number
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
+from softreach.workspace.boundary_samples import (
+    BoundarySamples,
+    boundary_samples,
+    overlap_samples,
+)
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
-from softreach.workspace.grid import cube_grid
-from softreach.workspace.measure import Estimate
+from softreach.workspace.image import Image
+from softreach.workspace.measure import Estimate, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
+from softreach.workspace.redundant import cloud_on_faces, not_among
 from softreach.workspace.shifts import Shifts, shifts_along
 from softreach.workspace.solid import ReachableSolid
+from softreach.workspace.tip_derivatives import TipDerivatives
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_MOST_CELLS = 48  # of a grid of which all vertices are looked at
-_MOST_FACE_CELLS = 84  # of one of which those on the faces are
-_STEP = 3e-3  # of a parameter, for what is smooth to the tolerance of tips
-_RASTER_STEP = 2e-2  # for what is rasterized, which is rough
+_FLUX_PART = 0.01  # of the accuracy: relative error of what flows through the faces
+_LINES = 2  # times as many lines of sight along each direction as for the volume itself
+_HULL_GRID = 2  # times as many cells along each edge of the box as for the convex volume itself
+_RASTER_STEP = 2e-2  # of a parameter, where neighbors are rasterized, which is rough
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
 _MEANINGS = {
     "volume": ("m3 per unit", "derivative of the reachable volume"),
@@ -87,20 +92,20 @@ def volume_gradient(
         raise InvalidInput("parameters", twice[0], "given once")
     parameter_of = find_parameters(arm, names)
     solid = _solid(arm, accuracy)
-    base = _Base(solid, accuracy)
-    rows = []
-    for name in names:
-        rows.append(base.derivatives(parameter_of[name]))
-        progress(1)
-    volume, convex = zip(*rows, strict=True)
+    wanted = [parameter_of[name] for name in names]
+    if solid.lost_share > 0.0:
+        volume, convex = _by_differences(solid, wanted, accuracy, progress)
+    else:
+        volume, convex = _swept(solid, wanted, accuracy)
+        progress(len(names))
     return VolumeGradient(
         solid=solid,
         parameters=names,
-        units=tuple(parameter_of[name].unit for name in names),
-        volume=np.array([each.value for each in volume]),
-        volume_error=np.array([each.error for each in volume]),
-        convex_volume=np.array([each.value for each in convex]),
-        convex_volume_error=np.array([each.error for each in convex]),
+        units=tuple(each.unit for each in wanted),
+        volume=volume.value,
+        volume_error=volume.error,
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
     )
 
 
@@ -161,153 +166,107 @@ class VolumeGradient:
         return "\n  ".join([f"VolumeGradient: route {self.route}", *lines])
 
 
-def hull_corners(solid: ReachableSolid) -> dict[int, HullCorners]:
-    """Corners of the hulls of images of some grids, by their number of cells along each axis.
-
-    Where the image folds, vertices inside the box may be corners as well as those on its faces.
-    """
-    folds = solid.route != "flux"
-    most = _MOST_CELLS if folds else _MOST_FACE_CELLS
-    grids = (most // 2, 3 * most // 4, most)
-    return {n: _corners(solid.tip_map, cube_grid(n) if folds else grid_faces(n)) for n in grids}
-
-
-class HullCorners(NamedTuple):
-    """Activations whose tips are the corners of a convex hull."""
-
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, 3)."""
-    area: Array
-    """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
-
-
-def _corners(rod: TipMap, cube: Array) -> HullCorners:
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
-    hull = convex_hull(tips)
-    area = np.zeros_like(hull.vertices)
-    corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]
-    for k in range(3):
-        # The volume is a sum of triple products over 6: linear in each corner.
-        share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
-        np.add.at(area, hull.faces[:, k], share)
-    return HullCorners(cube[_rows_of(hull.vertices, tips)], area)
-
-
-def _rows_of(some: Array, every: Array) -> Index:
-    """Places of some points in a list of all; one place for those that come twice."""
-    from scipy.spatial import KDTree  # lazily
-
-    return np.asarray(KDTree(every).query(some)[1], np.int64)
-
-
 def _solid(arm: Manipulator, accuracy: float) -> ReachableSolid:
     free = tip_map(arm).box.dimension
-    if free != 3:
-        raise InvalidInput("arm", f"{free} free bundles", "three of them")
+    if free < 3:
+        raise InvalidInput("arm", f"{free} free bundles", "three of them or more")
     solid = reachable_set(arm, accuracy=accuracy)
     assert isinstance(solid, ReachableSolid)
     return solid
 
 
-class _Base:
-    """The design whose volume is differentiated, with all that its neighbors are compared to."""
+class _Swept(NamedTuple):
+    """Derivatives by all parameters, shape (parameters,) each."""
 
-    def __init__(self, solid: ReachableSolid, accuracy: float) -> None:
-        self._solid, self._accuracy = solid, accuracy
-        self._flux = None if solid.lost_share > 0.0 else signed_volume(solid.tip_map)
-        self._corners = None if self._flux is None else hull_corners(solid)
-
-    def derivatives(self, parameter: Parameter) -> tuple[Estimate, Estimate]:
-        """Of volume and convex volume."""
-        arm = self._solid.arm
-        if self._flux is None or self._corners is None:
-            return self._by_raster(parameter)
-        shifts = shifts_along(arm, parameter, 3, _STEP)
-        rods = [tip_map(each, flux_tol(self._solid.tip_map)) for each in shifts.arms]
-        volume = _swept(self._flux, shifts, rods)
-        convex = _limit({n: _dragged(each, shifts, rods) for n, each in self._corners.items()})
-        if self._solid.route == "raster":
-            beyond, _ = self._by_raster(parameter)
-            volume = Estimate(volume.value + beyond.value, volume.error + beyond.error)
-        return volume, convex
-
-    def _by_raster(self, parameter: Parameter) -> tuple[Estimate, Estimate]:
-        """Derivatives of what is rasterized: the volume beyond the flux, and the convex volume."""
-        shifts = shifts_along(self._solid.arm, parameter, 2, _RASTER_STEP)
-        solids = [self._like_this(each) for each in shifts.arms]
-        rests = [self._beyond_flux(each) for each in solids]
-        convex = [each.convex_volume for each in solids]
-        return _rough_derivative(shifts, rests), _rough_derivative(shifts, convex)
-
-    def _like_this(self, arm: Manipulator) -> ReachableSolid:
-        """A neighbor, with the same grid and cells."""
-        if arm is self._solid.arm:
-            return self._solid
-        cell = self._solid.image.lattice.cell
-        return rasterized_set(tip_map(arm), self._solid.cells, cell, self._accuracy)
-
-    def _beyond_flux(self, solid: ReachableSolid) -> float:
-        """Volume less what the flux says of it, if it is used."""
-        if self._flux is None:
-            return solid.volume
-        return solid.volume - abs(signed_volume(solid.tip_map).value)
+    value: Array
+    error: Array
 
 
-def _swept(flux: Flux, shifts: Shifts, rods: Sequence[TipMap]) -> Estimate:
-    """Derivative of |signed volume|: what the moving faces sweep."""
-
-    def along(tips: Array) -> float:
-        return float(np.sign(flux.value) * (tips * flux.area).sum())
-
-    noise = rods[0].tol * rods[0].length * float(np.linalg.norm(flux.area, axis=1).sum())
-    return _derivative(shifts, rods, flux.faces.cube, along, noise)
-
-
-def _dragged(corners: HullCorners, shifts: Shifts, rods: Sequence[TipMap]) -> Estimate:
-    """Derivative of the volume of a convex hull: what its moving corners drag along."""
-
-    def along(tips: Array) -> float:
-        return float((tips * corners.area).sum())
-
-    noise = rods[0].tol * rods[0].length * float(np.linalg.norm(corners.area, axis=1).sum())
-    return _derivative(shifts, rods, corners.cube, along, noise)
+def _swept(
+    solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float
+) -> tuple[_Swept, _Swept]:
+    """Derivatives of volume and convex volume by what boundary and corners of the hull sweep."""
+    rod = solid.tip_map
+    flux = _flux(solid, accuracy)
+    if solid.route == "flux" or rod.supports_unstable:
+        rod = refined(rod, flux_tol(rod))
+    tips = TipDerivatives(rod, parameters)
+    volume = _volume(solid, flux, tips)
+    return volume, _limit(*(_sum(each, tips) for each in hull_corners(solid)))
 
 
-def _limit(of_grids: Mapping[int, Estimate]) -> Estimate:
+def _flux(solid: ReachableSolid, accuracy: float) -> Flux | None:
+    """What flows through the faces of three bundles' box, as exactly as the route asks for."""
+    if solid.route == "search":
+        return None
+    enough = 0.0 if solid.route == "flux" else _FLUX_PART * accuracy
+    return signed_volume(solid.tip_map, enough=enough)
+
+
+def _volume(solid: ReachableSolid, flux: Flux | None, tips: TipDerivatives) -> _Swept:
+    """Derivatives of the volume: what is told by the flux, and what lines of sight add to it."""
+    if flux is None:
+        swept = _sum(boundary_samples(solid.image), tips)
+        missing = solid.volume_error / solid.volume if solid.volume else np.inf
+        return swept._replace(error=swept.error + missing * np.abs(swept.value))
+    sense = 1 if flux.value >= 0 else -1
+    slopes = tips.at(flux.faces.cube)
+    through = sense * np.einsum("ni,nip->np", flux.area, slopes)
+    value = through.sum(axis=0)
+    error = flux.error / abs(flux.value) * np.abs(through).sum(axis=0)
+    error += tips.error * float(np.linalg.norm(flux.area, axis=1).sum())
+    if solid.route == "flux":
+        return _Swept(value, error)
+    assert isinstance(solid.image, Image)
+    assert solid.coarse_image is not None
+    fine = _sum(overlap_samples(solid.image.with_more_lines(_LINES), sense), tips)
+    coarse = _sum(overlap_samples(solid.coarse_image, sense), tips)
+    removed = (fine.value - coarse.value) / 3.0
+    return _Swept(value + fine.value + removed, error + fine.error + np.abs(removed))
+
+
+def _sum(nodes: BoundarySamples | HullCorners, tips: TipDerivatives) -> _Swept:
+    """What nodes sweep, with the errors of ∂r/∂p and of where lines of sight lie."""
+    slopes = tips.at(nodes.cube)
+    error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())
+    if isinstance(nodes, BoundarySamples):
+        return _Swept(nodes.derivative(slopes), error + nodes.noise(slopes))
+    return _Swept(np.einsum("ni,nip->p", nodes.area, slopes), error)
+
+
+def _limit(fine: _Swept, coarse: _Swept) -> _Swept:
     """For infinitely fine grids, whose error falls as 1/n² or a little slower.
 
-    Corners jump from vertex to vertex: twice what is removed is part of the error, and so is how
-    far the grids are from the rule.
+    Corners jump from vertex to vertex: twice what is removed is the error.
     """
-    cells = np.array(list(of_grids), float)
-    values = np.array([each.value for each in of_grids.values()])
-    rule = np.stack([np.ones_like(cells), cells**-2.0], axis=1)
-    coefficients = np.linalg.lstsq(rule, values, rcond=None)[0]
-    off = float(np.abs(rule @ coefficients - values).max())
-    smooth = max(each.error for each in of_grids.values())
-    limit = float(coefficients[0])
-    return Estimate(limit, smooth + 2.0 * off + 2.0 * abs(limit - values[-1]))
+    removed = (fine.value - coarse.value) / 3.0
+    return _Swept(fine.value + removed, fine.error + 2.0 * np.abs(removed))
 
 
-def _derivative(
-    shifts: Shifts,
-    rods: Sequence[TipMap],
-    cube: Array,
-    along: Callable[[Array], float],
-    noise: float,
-) -> Estimate:
-    """Derivative of a linear function of the tips at places in the box that moves with the design.
+def _by_differences(
+    solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float, progress: Progress
+) -> tuple[_Swept, _Swept]:
+    """Derivatives of volume and convex volume of a torn set, from neighbors as finely computed."""
+    cell, estimates = solid.image.lattice.cell, list[tuple[Estimate, Estimate]]()
 
-    Args:
-        shifts: The neighbors.
-        rods: Their tip maps.
-        cube: Places in the unit cube of the free bundles, shape (n, 3).
-        along: The function.
-        noise: Largest error of a value.
-    """
-    values = np.array([along(rod.tips(rod.box.from_free_cube(cube))) for rod in rods])
-    value, rough = float(shifts.weights @ values), float(shifts.rough_weights @ values)
-    return Estimate(value, abs(value - rough) + noise * float(np.linalg.norm(shifts.weights)))
+    def like_this(arm: Manipulator) -> ReachableSolid:
+        if arm is solid.arm:
+            return solid
+        if solid.route != "search":
+            return rasterized_set(tip_map(arm), solid.cells, cell, accuracy)
+        neighbor = reachable_set(arm, accuracy=accuracy, cell=cell)
+        assert isinstance(neighbor, ReachableSolid)
+        return neighbor
+
+    for parameter in parameters:
+        shifts = shifts_along(solid.arm, parameter, 2, _RASTER_STEP)
+        solids = [like_this(arm) for arm in shifts.arms]
+        volume = _rough_derivative(shifts, [each.volume for each in solids])
+        convex = _rough_derivative(shifts, [each.convex_volume for each in solids])
+        estimates.append((volume, convex))
+        progress(1)
+    volumes, convexes = np.moveaxis(np.array(estimates), 0, 2)
+    return _Swept(*volumes), _Swept(*convexes)
 
 
 def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
@@ -316,3 +275,57 @@ def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
     noise = abs(float(_ROUGHNESS @ values)) / float(np.linalg.norm(_ROUGHNESS))
     error = abs(value - smooth) + 2.0 * noise * float(np.linalg.norm(shifts.weights))
     return Estimate(value, float(error))
+
+
+@dataclass(frozen=True, eq=False)
+class HullCorners:
+    """Activations whose tips are the corners of a convex hull."""
+
+    cube: Array
+    """In the unit cube of the free bundles, shape (n, dimension)."""
+    area: Array
+    """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
+
+    @classmethod
+    def of(cls, tips: Array, cube: Array) -> HullCorners:
+        """Corners of the hull of some tips at places of the cube."""
+        hull = convex_hull(tips)
+        area = np.zeros_like(hull.vertices)
+        corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]
+        for k in range(3):
+            # The volume is a sum of triple products over 6: linear in each corner.
+            share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
+            np.add.at(area, hull.faces[:, k], share)
+        return cls(cube[_rows_of(hull.vertices, tips)], area)
+
+
+def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
+    """Corners of the hull of a solid, and of that of half as fine a grid or half as many lines."""
+    rod = solid.tip_map
+    if solid.route == "flux":
+        cube = grid_faces(_HULL_GRID * solid.cells)
+        tips = rod.tips(rod.box.from_free_cube(cube))
+        even = (np.rint(_HULL_GRID * solid.cells * cube) % 2 == 0).all(axis=1)
+        return HullCorners.of(tips, cube), HullCorners.of(tips[even], cube[even])
+    if isinstance(solid.image, Image):
+        assert solid.coarse_image is not None
+        return _corners_of(solid.image), _corners_of(solid.coarse_image)
+    cells, box = solid.image, rod.box
+    gamma, tips = cloud_on_faces(rod, 0)
+    gamma = gamma[not_among(cells.reached, cells.lattice, tips)]
+    gamma = np.concatenate([cells.crossings.beyond, gamma])
+    tips, cube = rod.tips(gamma), box.to_cube(gamma)[:, box.free]
+    return HullCorners.of(tips, cube), HullCorners.of(tips[::4], cube[::4])
+
+
+def _corners_of(image: Image) -> HullCorners:
+    which = outer_vertices(image)
+    tips = image.lattice.origin + image.lattice.cell / image.unit * image.vertices[which]
+    return HullCorners.of(tips, image.cube_vertices(which))
+
+
+def _rows_of(some: Array, every: Array) -> Index:
+    """Places of some points in a list of all; one place for those that come twice."""
+    from scipy.spatial import KDTree  # lazily
+
+    return np.asarray(KDTree(every).query(some)[1], np.int64)

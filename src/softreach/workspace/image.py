@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -77,6 +77,8 @@ class Spans(NamedTuple):
     """Number of activations that reach it."""
     degree: Index
     """Those of which the map keeps the orientation minus those that it turns over."""
+    triangle: Index
+    """Number of the critical triangle where it begins."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,7 +106,37 @@ class Image:
         length = np.where(same, np.diff(height, append=0.0), 0.0)
         # Crossings at one height come in any order, folds are rough: sums may fall below zero.
         cover = np.maximum(np.cumsum(crossing.cover[order]), 0)
-        return Spans(column, height, length, cover, np.cumsum(crossing.degree[order]))
+        degree = np.cumsum(crossing.degree[order])
+        return Spans(column, height, length, cover, degree, crossing.triangle[order])
+
+    def with_more_lines(self, times: int) -> Image:
+        """The same image under lines of sight as many times as close, a power of two."""
+        lattice = self.lattice
+        i, j, k = (times * size for size in lattice.shape)
+        finer = lattice._replace(cell=lattice.cell / times, shape=(i, j, k))
+        return replace(self, lattice=finer, unit=self.unit / times)
+
+    def cube_places(self, spans: Spans, axis: int, which: Index) -> Array:
+        """Places of the unit cube of a grid of n³ boxes that go to where spans begin, (n, 3).
+
+        Args:
+            spans: Those along an axis.
+            axis: The axis.
+            which: Numbers of the spans.
+        """
+        corners = self.triangles[spans.triangle[which], :3]
+        at = np.stack(np.divmod(spans.column[which], self.lattice.shape[(axis + 2) % 3]), axis=1)
+        plane = [(axis + 1) % 3, (axis + 2) % 3]
+        flat = self.vertices[corners][:, :, plane] - at[:, None] * self.unit
+        a, b, c = flat[:, 0], flat[:, 1], flat[:, 2]
+        shares = np.stack([_twice_area(b, c), _twice_area(c, a), _twice_area(a, b)], axis=1)
+        shares /= shares.sum(axis=1, keepdims=True)
+        return np.einsum("tk,tki->ti", shares, self.cube_vertices(corners))
+
+    def cube_vertices(self, which: Index) -> Array:
+        """Vertices of the grid of n³ boxes in the unit cube by number, shape (*which.shape, 3)."""
+        n = round(len(self.vertices) ** (1 / 3)) - 1
+        return np.stack(np.unravel_index(which, (n + 1,) * 3), axis=-1) / n
 
     @cached_property
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -178,10 +210,16 @@ class Image:
             out = raster.empty_crossings(size)
             width = self.lattice.shape[q]
             used = raster.crossings(self.vertices, rows, self.unit, axis, width, out)
+            out.triangle[:used] += blocks[number].start
             parts[number] = raster.first_crossings(out, used)
 
         parallel.run(partial(task, number) for number in range(len(blocks)))
         return raster.joined_crossings(parts)
+
+
+def _twice_area(a: Array, b: Array) -> Array:
+    """Of triangles of the origin, a and b in the plane, shape (n,)."""
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _starts(*keys: Index) -> Mask:

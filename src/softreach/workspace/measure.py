@@ -159,20 +159,20 @@ def _hull_volume(points: Array) -> float:
 def _corners(image: Image) -> Array:
     """Points of the image that may be corners of its convex hull [m], shape (n, 3)."""
     lattice = image.lattice
-    return lattice.origin + lattice.cell * _outer_vertices(image)
+    return lattice.origin + lattice.cell / image.unit * image.vertices[outer_vertices(image)]
 
 
-def _outer_vertices(image: Image) -> Array:
-    """Vertices of critical triangles that may be corners of the convex hull, in cells.
+def outer_vertices(image: Image) -> Index:
+    """Numbers of the vertices of critical triangles that may be corners of the convex hull.
 
     A plane through such a corner leaves the image on one side, and with it at least one of the
     eight cell centers around the corner.
     """
     used = np.zeros(len(image.vertices), bool)
     used[image.triangles[:, :3]] = True
-    vertices = image.vertices[used] / image.unit
+    vertices = np.flatnonzero(used)
     covered = covered_cubes(image.counts[0] > 0)
-    i, j, k = np.floor(vertices).astype(int).T
+    i, j, k = np.floor(image.vertices[vertices] / image.unit).astype(int).T
     return vertices[~covered[i, j, k]]
 
 

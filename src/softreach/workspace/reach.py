@@ -154,6 +154,7 @@ def rasterized_set(
         lost_share=float(left_out.mean()),
         route="raster",
         rasterize=partial(_known, fine),
+        coarse_image=coarse,
         **overlaps._asdict(),
     )
 

@@ -27,7 +27,14 @@ from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
 
-__all__ = ["Searched", "lost_share", "searched_set", "smallest_memory"]
+__all__ = [
+    "Searched",
+    "cloud_on_faces",
+    "lost_share",
+    "not_among",
+    "searched_set",
+    "smallest_memory",
+]
 
 
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
@@ -67,7 +74,7 @@ def searched_set(
     Raises:
         InvalidInput: No activation has a stable equilibrium, or cells are too small for the memory.
     """
-    gamma, tips = _cloud(rod, 0)
+    gamma, tips = cloud_on_faces(rod, 0)
     sides = np.ptp(tips, axis=0)
     smallest = _smallest_cell(rod, sides, memory)
     if cell is not None:
@@ -134,7 +141,7 @@ def _search(
     edge = flood.lattice.cell
     area = len(crossings.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
     slack = area * (ENOUGH * edge + rod.tol * rod.length)
-    convex = _hull(crossings, tips[_not_among(flood, tips)])
+    convex = _hull(crossings, tips[not_among(flood.reached, flood.lattice, tips)])
     noise = volume.error if np.isfinite(volume.error) else convex.value + convex.error
     error = noise + missed + slack
     return Searched(cells, Estimate(volume.value, error), convex)
@@ -147,7 +154,7 @@ def _flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
         while not flood.is_bounded:
             flood = _wider(flood)
         before = np.count_nonzero(flood.gap == 0.0)
-        flood.add(*_cloud(flood.rod, number))
+        flood.add(*cloud_on_faces(flood.rod, number))
         if flood.is_bounded and np.count_nonzero(flood.gap == 0.0) == before:
             break
     return flood
@@ -211,10 +218,10 @@ def _hull(crossings: Crossings, tips: Array) -> Estimate:
     )
 
 
-def _not_among(flood: Flood, tips: Array) -> Mask:
+def not_among(reached: Mask, lattice: Lattice, tips: Array) -> Mask:
     """Mask of tips not between eight centers that are reached, where no hull has a corner."""
-    cubes = covered_cubes(flood.reached)
-    index = np.floor(flood.lattice.coordinates(tips)).astype(np.int64)
+    cubes = covered_cubes(reached)
+    index = np.floor(lattice.coordinates(tips)).astype(np.int64)
     inside = np.all((index >= 0) & (index < cubes.shape), axis=1)
     x, y, z = (index * inside[:, None]).T
     return ~(inside & cubes[x, y, z])
@@ -228,7 +235,7 @@ def _convex_volume(points: Array, fewer: Array) -> Estimate:
     return Estimate(value + 0.5 * missing, missing)
 
 
-def _cloud(rod: TipMap, seed: int) -> tuple[Array, Array]:
+def cloud_on_faces(rod: TipMap, seed: int) -> tuple[Array, Array]:
     """Activations on faces of all dimensions of the box, and their tips."""
     box, rng = rod.box, np.random.default_rng(seed)
     m = box.dimension

@@ -77,6 +77,8 @@ class ReachableSolid(ReachableSet):
     elsewhere. "search": more than three free bundles."""
     rasterize: Callable[[], Image | ReachedCells] = field(repr=False)
     """Makes `image`."""
+    coarse_image: Image | None = field(default=None, repr=False)
+    """The image of half as fine a grid, for the route "raster"."""
 
     @cached_property
     def image(self) -> Image | ReachedCells:

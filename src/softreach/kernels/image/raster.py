@@ -46,12 +46,14 @@ class Crossings(NamedTuple):
     """By how much the number of covering tetrahedra grows there."""
     degree: Ints
     """By how much the sum of their orientations grows there."""
+    triangle: Ints
+    """Number of the triangle."""
 
 
 def empty_crossings(size: int) -> Crossings:
     """Room for as many crossings."""
-    integers = np.empty((4, size), np.int64)
-    return Crossings(integers[0], integers[1], np.empty(size), integers[2], integers[3])
+    column, center, cover, degree, triangle = np.empty((5, size), np.int64)
+    return Crossings(column, center, np.empty(size), cover, degree, triangle)
 
 
 def first_crossings(crossing: Crossings, size: int) -> Crossings:
@@ -117,6 +119,7 @@ def crossings(points, triangles, unit, axis, width, out):
                     out.center[count] = center_behind(points[a, axis], rise, area, unit)
                     out.cover[count] = side * triangles[t, 3]
                     out.degree[count] = side * triangles[t, 4]
+                    out.triangle[count] = t
                     count += 1
     return count
 

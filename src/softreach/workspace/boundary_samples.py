@@ -1,0 +1,141 @@
+"""Places on the boundary of a solid reachable set, as nodes of a rule of integration.
+
+Lines of sight through cell centers along an axis cut the boundary at places that each stand for a
+square of a cell, seen along the axis. Together those along all three axes are nodes for what flows
+through the boundary, theory (98), and need no normals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from softreach.support.arrays import Array, Index
+from softreach.workspace.boundary import ReachedCells
+from softreach.workspace.image import Image, Spans
+
+__all__ = ["BoundarySamples", "boundary_samples", "joined_samples", "overlap_samples"]
+
+_CLASSES = 4  # every other line along both directions
+
+
+@dataclass(frozen=True, eq=False)
+class BoundarySamples:
+    """Nodes on the boundary, with the activations that lead there."""
+
+    cube: Array
+    """In the unit cube of the free bundles, shape (n, dimension)."""
+    places: Array
+    """Where they are [m], shape (n, 3)."""
+    area: Array
+    """Outward area vectors [m²], shape (n, 3)."""
+    group: Index
+    """Number of the set of lines that each is on: an axis, and every other line, shape (n,)."""
+
+    def derivative(self, slopes: Array, weights: Array | None = None) -> Array:
+        """What the boundary sweeps: derivatives of the volume, theory (98), shape (parameters,).
+
+        Args:
+            slopes: ∂r/∂p at the nodes, shape (n, 3, parameters).
+            weights: Of each node, shape (n,): 1 where it is in a region and 0 elsewhere give the
+                derivative of the volume of the part of the set in that region.
+        """
+        return self._swept(slopes, weights).sum(axis=0)
+
+    def noise(self, slopes: Array, weights: Array | None = None) -> Array:
+        """Two standard deviations of `derivative` from where the lines lie, shape (parameters,).
+
+        Every other line along both directions tells how much.
+        """
+        swept = self._swept(slopes, weights)
+        groups = np.zeros((3 * _CLASSES, swept.shape[1]))
+        np.add.at(groups, self.group, swept)
+        of_axes = groups.reshape(3, _CLASSES, -1)
+        off = _CLASSES * of_axes - of_axes.sum(axis=1, keepdims=True)
+        return np.sqrt((off**2).mean(axis=1).sum(axis=0))
+
+    def _swept(self, slopes: Array, weights: Array | None) -> Array:
+        area = self.area if weights is None else self.area * weights[:, None]
+        return np.einsum("ni,nip->np", area, slopes)
+
+
+def joined_samples(parts: Sequence[BoundarySamples]) -> BoundarySamples:
+    """All nodes of several rules."""
+    return BoundarySamples(
+        np.concatenate([part.cube for part in parts]),
+        np.concatenate([part.places for part in parts]),
+        np.concatenate([part.area for part in parts]),
+        np.concatenate([part.group for part in parts]),
+    )
+
+
+def boundary_samples(image: Image | ReachedCells) -> BoundarySamples:
+    """Nodes on all of the boundary of an image."""
+    if isinstance(image, ReachedCells):
+        return _of_cells(image)
+    return _of_image(image, lambda reached, _: reached)
+
+
+def overlap_samples(image: Image, sense: int) -> BoundarySamples:
+    """Nodes where the image is not one to one: the boundary less what of it the degree tells.
+
+    They are nodes for the derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
+
+    Args:
+        image: Of three free bundles.
+        sense: Orientation that the larger part of the map keeps, 1 or -1.
+    """
+    return _of_image(image, lambda reached, degree: reached - sense * degree)
+
+
+def _of_image(image: Image, jump: Callable[[Index, Index], Index]) -> BoundarySamples:
+    """Nodes where something jumps along lines of sight.
+
+    Args:
+        image: Of three free bundles.
+        jump: Of what changes by as much when the set is entered (1), left (-1), or neither, and
+            when the degree changes.
+    """
+    return joined_samples([_along(image, image.spans[axis], axis, jump) for axis in range(3)])
+
+
+def _along(
+    image: Image, spans: Spans, axis: int, jump: Callable[[Index, Index], Index]
+) -> BoundarySamples:
+    reached = (spans.cover > 0).astype(np.int64)
+    jumps = jump(np.diff(reached, prepend=0), np.diff(spans.degree, prepend=0))
+    which = np.flatnonzero(jumps)
+    lattice = image.lattice
+    i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
+    at = np.empty((len(which), 3))
+    at[:, axis], at[:, (axis + 1) % 3], at[:, (axis + 2) % 3] = spans.start[which], i, j
+    area = np.zeros((len(which), 3))
+    area[:, axis] = -(lattice.cell**2) * jumps[which]
+    return BoundarySamples(
+        image.cube_places(spans, axis, which),
+        lattice.origin + lattice.cell * at,
+        area,
+        _group(axis, i, j),
+    )
+
+
+def _of_cells(cells: ReachedCells) -> BoundarySamples:
+    crossings, rod = cells.crossings, cells.rod
+    edges, lattice = crossings.edges, cells.lattice
+    every = np.arange(len(edges.cell))
+    index = np.stack(np.unravel_index(edges.cell, lattice.shape), axis=-1)
+    i, j = index[every, (edges.axis + 1) % 3], index[every, (edges.axis + 2) % 3]
+    area = np.zeros((len(every), 3))
+    area[every, edges.axis] = lattice.cell**2 * edges.sense
+    return BoundarySamples(
+        rod.box.to_cube(crossings.beyond)[:, rod.box.free],
+        crossings.points(every, crossings.place),
+        area,
+        _group(edges.axis, i, j),
+    )
+
+
+def _group(axis: int | Index, i: Index, j: Index) -> Index:
+    return _CLASSES * axis + 2 * (i % 2) + j % 2
