@@ -7,6 +7,7 @@ from . import export as export
 from . import forces as forces
 from . import inverse as inverse
 from . import plot as plot
+from . import requirements as requirements
 from . import rest as rest
 from . import rod as rod
 from . import stiffness as stiffness
@@ -43,6 +44,8 @@ from .export import cloud_table as cloud_table
 from .inverse import path as path
 from .inverse import solve_inverse as solve_inverse
 from .inverse.path import track_path as track_path
+from .requirements import Requirements as Requirements
+from .requirements import check as check
 from .rod import configuration as configuration
 from .rod import equilibria as equilibria
 from .rod import tip_jacobian as tip_jacobian

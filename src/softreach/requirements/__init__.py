@@ -1,1 +1,23 @@
 """What a user asks of an arm: places, regions, bounds; met or missed, and by how much."""
+
+from softreach.requirements.checks import Check, Coverage, check
+from softreach.requirements.findings import Finding, quick_excess
+from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
+from softreach.requirements.requirements import Keep, Limits, Requirements, Target
+
+__all__ = [
+    "Box",
+    "Check",
+    "Coverage",
+    "Finding",
+    "HalfSpace",
+    "Keep",
+    "Limits",
+    "Mesh",
+    "Region",
+    "Requirements",
+    "Sphere",
+    "Target",
+    "check",
+    "quick_excess",
+]

@@ -1,0 +1,196 @@
+"""What a design misses, by how much: what can be proved at once, and the numbers of a design."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from softreach.arm.loads import Loads
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.summary import load_number, mass
+from softreach.arm.tables import ends_over, quadrature, tables
+from softreach.atlas.design_task import Intermediates
+from softreach.atlas.metrics import known_metric
+from softreach.requirements.requirements import Requirements
+from softreach.sampling import sample_cube
+from softreach.support.arguments import as_instance
+from softreach.support.errors import counted, no_warnings
+from softreach.support.units import LengthUnit, as_unit, handy_unit
+
+__all__ = ["Finding", "quick_excess"]
+
+_SAMPLES = 2**15
+_STATIONS = (0.5, 1.0)
+_PIECES = 8
+_ROUNDING = 1e-9
+_UNITS = {
+    "actuators": "",
+    "shortening": "",
+    "force": "N",
+    "pressure": "Pa",
+    "stroke": "m",
+    "mass": "kg",
+    "load_number": "",
+    "bending": "",
+}
+_WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": "actuators"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One requirement: met or missed, and by how much."""
+
+    name: str
+    """The target, region, limit or measure."""
+    kind: str
+    """"reach", "cover", "stay_inside", "avoid", "limit" or "measure"."""
+    met: bool
+    excess: float
+    """0 where it is met; else gaps and distances over L, and limits by their share [-]."""
+    text: str
+    """In words, with units."""
+
+    def __str__(self) -> str:
+        return f"{'met' if self.met else 'missed'}  {self.name}: {self.text}"
+
+
+def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding, ...]:
+    """What a design is proved to miss, by no more than `check` finds, in a few milliseconds.
+
+    Places farther from the base than the longest arm that its bounds allow, ∫ max ζ dZ, as long as
+    nothing loads it; limits that follow from the design alone. Nothing in it says that a
+    requirement is met.
+
+    Args:
+        arm: The design.
+        requirements: The requirements.
+
+    Returns:
+        What is missed, with lower bounds of the excess; empty where nothing is proved.
+    """
+    arm = a_manipulator("arm", arm)
+    needs = as_instance("requirements", requirements, Requirements, "Requirements")
+    return (*_too_far(arm, needs), *(f for f in design_limits(arm, needs) if not f.met))
+
+
+def shown_unit(arm: Manipulator) -> LengthUnit:
+    """The unit of lengths that a design is shown in."""
+    return as_unit(arm.display_unit or handy_unit(arm.length), arm.length)
+
+
+def longest_reach(arm: Manipulator) -> float:
+    """No tip of the arm without loads is farther from its base than this [m]."""
+    inner = arm.inner
+    z, weights, _ = quadrature(inner, _PIECES)
+    most = ends_over(tables(inner, z).extension, inner.bounds)[:, 1]
+    return float(weights @ (1.0 + most)) * (1.0 + 1e-6)  # more than the error of the quadrature
+
+
+def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
+    unloaded = arm.loads is None and not any(needs.payloads)
+    if not (unloaded and needs.targets):
+        return
+    longest, unit = longest_reach(arm), shown_unit(arm)
+    for target in needs.targets:
+        room = longest + target.within
+        if target.places is not None:
+            away = np.linalg.norm(target.places - arm.base.position, axis=1)
+            gap = float(away.max()) - room
+            text = f"{unit.text(gap)} farther from the base than the arm is ever long"
+        elif target.region is not None:
+            gap = float(target.region.distance([arm.base.position])[0]) - room
+            text = "farther from the base than the arm is ever long"
+        else:
+            continue
+        if gap > 1e-6 * arm.length:
+            if target.region is None:
+                yield Finding(target.name, "reach", False, gap / arm.length, text)
+            else:
+                yield Finding(target.name, "cover", False, target.share, text)
+
+
+def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
+    """The arm with a mass at its tip [kg]; as it is for None, and for 0 without loads.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus or density.
+    """
+    if payload is None or (payload == 0.0 and arm.loads is None):
+        return arm
+    return arm.replace(loads=(arm.loads or Loads()).replace(payload=payload))
+
+
+def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:
+    """A limit against its value."""
+    unit, symbol = shown_unit(arm), _UNITS[name]
+    excess = max(value - most, 0.0) / (most or 1.0)
+    excess = excess if excess > _ROUNDING else 0.0
+    if name == "actuators":
+        texts = [f"{value:g}", f"{most:g}"]
+    elif name == "shortening":
+        texts = [f"{100 * value:.3g} %", f"{100 * most:.3g} %"]
+    elif symbol == "m":
+        texts = [unit.text(x) for x in (value, most)]
+    else:
+        texts = [f"{x:.4g} {symbol}".strip() for x in (value, most)]
+    text = f"{texts[0]} of at most {texts[1]}{where}"
+    return Finding(_WORDS.get(name, name), "limit", excess == 0.0, excess, text)
+
+
+def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
+    """Limits that follow from the design alone."""
+    limits = needs.limits
+    if limits.actuators is not None:
+        low, high = arm.input_bounds.T
+        moving = int((low < high).sum())
+        yield limit_finding("actuators", moving, limits.actuators, arm, "")
+    if limits.mass is not None:
+        yield limit_finding("mass", mass(arm), limits.mass, arm, "")
+    if limits.load_number is not None:
+        heaviest = with_payload(arm, max(needs.payloads, default=None))
+        value = load_number(heaviest)
+        yield limit_finding("load_number", value, limits.load_number, arm, "")
+
+
+def measure_findings(arm: Manipulator, needs: Requirements, accuracy: float) -> Iterator[Finding]:
+    """Measures against their least and largest values, of the design with its own loads."""
+    if not needs.measures:
+        return
+    metrics = [metric for name in needs.measures if (metric := known_metric(name))]
+    command: Any = SimpleNamespace(
+        tol=1e-6,
+        accuracy=accuracy,
+        alpha_over_length=0.05,
+        stations=_STATIONS,
+        quantiles=(0.5,),
+    )
+    cube = sample_cube("sobol", _SAMPLES, max(arm.inputs, 1))
+    with no_warnings():
+        source = Intermediates(arm, cube, command, metrics)
+        for metric in metrics:
+            low, high = needs.measures[metric.name]
+            value = float(metric.value(source, {}))
+            yield _measure(metric.name, metric.unit, value, low, high)
+
+
+def _measure(name: str, unit: str, value: float, low: float | None, high: float | None) -> Finding:
+    unit = "" if unit == "1" else f" {unit}"
+    ends = [("at least", low, 1.0), ("at most", high, -1.0)]
+    texts, excess = [], 0.0
+    for words, end, sign in ends:
+        if end is not None:
+            texts.append(f"{words} {end:.6g}{unit}")
+            short = sign * (end - value) / (abs(end) or 1.0)
+            excess = max(excess, 1.0 if np.isnan(short) else short)
+    excess = excess if excess > _ROUNDING else 0.0
+    text = f"{value:.6g}{unit}, {' and '.join(texts) or 'anything allowed'}"
+    return Finding(name, "measure", excess == 0.0, excess, text)
+
+
+def places_text(count: int, of: int) -> str:
+    """The words "4 of 5 places"."""
+    return counted(of, "place") if count == of else f"{count:,} of {counted(of, 'place')}"

@@ -1,0 +1,226 @@
+"""Poses of an arm judged by regions to keep to and by limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.arm.bending import sharpest_bending
+from softreach.arm.driving import Driving
+from softreach.arm.lines import line_lengths
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import strain_stations
+from softreach.requirements.requirements import POSE_LIMITS, Keep, Limits
+from softreach.rod.kinematics import configuration
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
+from softreach.sampling import sample_cube
+from softreach.support import parallel
+from softreach.support.arrays import Array
+
+__all__ = ["PoseRules", "Worst", "worst_pose"]
+
+_LEVELS = (32, 128, 512, 2048)
+"""Parts of the arm between which it is seen where a body is, finer where that does not decide."""
+_BLOCK = 256  # poses at once
+_SAFETY = 1.05  # of the speed along the arm between stations
+_MOST_CORNERS = 10  # bundles of which all corners are tried
+_SAMPLES = 2048
+_STARTS, _AROUND, _ROUNDS, _SHRINK = 4, 32, 12, 0.6
+_SIZES = {"N": "force", "Pa": "pressure", "m": "stroke"}
+
+
+class Judged(NamedTuple):
+    """Poses by the rules, one column for each."""
+
+    value: Array
+    """How far a region is missed [m], negative where it is kept to; values of limits."""
+    excess: Array
+    """What is missed: over L, or over the limit; 0 where nothing is, shape (n, rule)."""
+    error: Array
+    """How much worse it may be between the stations that were looked at, shape (n, rule)."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRules:
+    """Regions and limits that poses of an arm must keep to."""
+
+    arm: Manipulator
+    keeps: tuple[Keep, ...]
+    limits: dict[str, float]
+    tolerance: float
+    """Error that is allowed in how far a region is missed [m]."""
+
+    @classmethod
+    def of(
+        cls, arm: Manipulator, keeps: Sequence[Keep], limits: Limits, tolerance: float
+    ) -> PoseRules:
+        """The rules for single poses among regions and limits."""
+        poses = {name: x for name, x in limits.given.items() if name in POSE_LIMITS}
+        return cls(arm, tuple(keeps), poses, tolerance)
+
+    def __len__(self) -> int:
+        return len(self.keeps) + len(self.limits)
+
+    @property
+    def rod(self) -> TipMap:
+        """The tip map of the arm, whose activations are its inputs."""
+        return tip_map(self.arm)
+
+    def judged(self, gamma: Array) -> Judged:
+        """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""
+        value, error = np.zeros((len(gamma), len(self))), np.zeros((len(gamma), len(self)))
+        if not len(self) or not len(gamma):
+            return Judged(value, value, error)
+        for block in parallel.blocks(len(gamma), _BLOCK):
+            k = len(self.keeps)
+            value[block, :k], error[block, :k] = self._kept(gamma[block])
+            for column, name in enumerate(self.limits, k):
+                value[block, column] = self._limited(name, gamma[block])
+        value = np.nan_to_num(value, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+        scale = [self.arm.length] * len(self.keeps) + [x or 1.0 for x in self.limits.values()]
+        most = [0.0] * len(self.keeps) + list(self.limits.values())
+        excess = np.maximum((value - most) / scale, 0.0)
+        # What rounding alone makes of a bound that is met to the last bit is no excess.
+        return Judged(value, np.where(excess > 1e-9, excess, 0.0), np.nan_to_num(error))
+
+    def _kept(self, gamma: Array) -> tuple[Array, Array]:
+        value = np.empty((len(gamma), len(self.keeps)))
+        error = np.zeros_like(value)
+        for column, keep in enumerate(self.keeps):
+            if keep.of == "tip":
+                tips = self.rod.tips(gamma)
+                lost = np.isnan(tips).any(axis=1)
+                value[:, column] = keep.missed(np.where(np.isnan(tips), 0.0, tips))
+                value[lost, column] = np.nan
+                continue
+            left = np.arange(len(gamma))
+            for parts in _LEVELS:
+                seen, bound = self._body(keep, gamma[left], parts)
+                value[left, column], error[left, column] = seen, bound - seen
+                left = left[(bound > 0.0) & (bound - seen > self.tolerance)]
+                if not len(left):
+                    break
+        return value, error
+
+    def _body(self, keep: Keep, gamma: Array, parts: int) -> tuple[Array, Array]:
+        """How far the body misses a region at stations [m], and at most between them, (n,)."""
+        rod, z = self.rod, np.linspace(0.0, self.arm.length, parts + 1)
+        frames, strains, radius = rod.frames(gamma, z), rod.strains(gamma, z), rod.radius(z)
+        lost = np.isnan(frames.position).any(axis=(1, 2))
+        position = np.where(np.isnan(frames.position), 0.0, frames.position)
+        normal = np.nan_to_num(frames.directors[:, :, 2])
+        radii = np.broadcast_to(radius, position.shape[:2])
+        least, most = keep.region.section_distances(position, normal, radii)
+        missed = (most if keep.inside else -least) + keep.clearance
+        turn = np.linalg.norm(strains.curvature, axis=2) * np.maximum(strains.extension, 1.0)
+        step = self.arm.length / parts
+        speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z))
+        between = np.maximum(speed[:, 1:], speed[:, :-1]) * step * _SAFETY
+        bound = 0.5 * (missed[:, 1:] + missed[:, :-1] + between)
+        seen = missed.max(axis=1)
+        bound = np.maximum(bound.max(axis=1), seen)
+        seen[lost] = bound[lost] = np.nan
+        return seen, bound
+
+    def _limited(self, name: str, gamma: Array) -> Array:
+        """Value of a limit in poses, shape (n,)."""
+        if name == "bending":
+            z = strain_stations(self.arm.inner)
+            u = self.rod.strains(gamma, z).curvature
+            return (np.hypot(u[..., 0], u[..., 1]) * self.rod.radius(z)).max(axis=1)
+        if not self.arm.bundles:
+            return np.zeros(len(gamma))
+        if name == "shortening":
+            return (1.0 - self._line_lengths(gamma) / self._straight).max(axis=1)
+        own = Driving(self.arm).bundles(gamma)[:, : self.arm.bundles]
+        driven = [_SIZES.get(unit) == name for unit in self.arm.bundle_units]
+        sizes = np.abs(own[:, driven])
+        if name == "force" and "m" in self.arm.bundle_units:
+            tension = configuration(self.rod, gamma, 2)["bundle_activation"].values
+            by_length = [unit == "m" for unit in self.arm.bundle_units]
+            sizes = np.concatenate([sizes, np.abs(tension[:, by_length])], axis=1)
+        return sizes.max(axis=1, initial=0.0)
+
+    def _line_lengths(self, gamma: Array) -> Array:
+        if self.arm.loads is None:
+            return line_lengths(self.arm, gamma)
+        return configuration(self.rod, gamma, 2)["line_length"].values
+
+    @property
+    def _straight(self) -> Array:
+        return line_lengths(self.arm.replace(loads=None), np.zeros((1, self.arm.inputs)))
+
+    def of_bounds(self, name: str) -> float:
+        """Value of a limit over all of the bounds; see `Limits`."""
+        if name == "bending":
+            return sharpest_bending(self.arm).value
+        corners = some_corners(self.rod)
+        return float(np.nan_to_num(self._limited(name, corners)).max())
+
+
+class Worst(NamedTuple):
+    """The pose that misses a region by most, as far as a search found it."""
+
+    gamma: Array
+    """Its inputs, shape (inputs,)."""
+    judged: Judged
+    """Of it alone."""
+
+
+def worst_pose(rules: PoseRules) -> Worst:
+    """The pose within the bounds that misses the one region of some rules by most.
+
+    A search: samples, corners and faces of the activation box, then the neighborhood of the worst,
+    ever closer. It proves nothing.
+    """
+    box = rules.rod.box
+    rng = np.random.default_rng(0)
+    inside = box.from_cube(sample_cube("sobol", _SAMPLES, box.bundles))
+    faces = box.from_cube(rng.random((_SAMPLES // 2, box.bundles)).round(0))
+    mixed = np.where(rng.random(faces.shape) < 0.5, faces, inside[: len(faces)])
+    gamma = np.concatenate([inside, some_corners(rules.rod), mixed])
+    value = _coarse(rules, gamma)
+    worst = np.argsort(-value, kind="stable")[:_STARTS]
+    gamma, value = gamma[worst], value[worst]
+    width = 0.25
+    for _ in range(_ROUNDS):
+        around = rng.normal(size=(_AROUND, len(gamma), box.bundles)) * width * box.widths
+        tried = box.clip(gamma + around)
+        values = _coarse(rules, tried.reshape(-1, box.bundles)).reshape(_AROUND, -1)
+        best = values.argmax(axis=0)
+        better = values[best, range(len(gamma))] > value
+        gamma = np.where(better[:, None], tried[best, range(len(gamma))], gamma)
+        value = np.where(better, values[best, range(len(gamma))], value)
+        width *= _SHRINK
+    worst = gamma[[int(value.argmax())]]
+    return Worst(worst[0], rules.judged(worst))
+
+
+def _coarse(rules: PoseRules, gamma: Array) -> Array:
+    """How far poses miss the one region, at few stations [m], shape (n,)."""
+    (keep,) = rules.keeps
+    if keep.of == "tip":
+        tips = np.nan_to_num(rules.rod.tips(gamma), nan=np.inf)
+        known = np.isfinite(tips).all(axis=1)
+        out = np.full(len(gamma), -np.inf)
+        out[known] = keep.missed(tips[known])
+        return out
+    blocks = parallel.blocks(len(gamma), _BLOCK)
+    values = [rules._body(keep, gamma[block], _LEVELS[0])[0] for block in blocks]
+    return np.nan_to_num(np.concatenate(values), nan=-np.inf)
+
+
+def some_corners(rod: TipMap) -> Array:
+    """Corners of the activation box, and each input at its bounds alone, shape (n, inputs)."""
+    box = rod.box
+    alone = np.tile(box.clip(np.zeros(box.bundles)), (2 * box.bundles, 1))
+    each = np.arange(box.bundles)
+    alone[each, each], alone[box.bundles + each, each] = box.low, box.high
+    if box.bundles <= _MOST_CORNERS:
+        return np.unique(np.concatenate([box.corners(), alone]), axis=0)
+    pushed = np.random.default_rng(0).random((2**_MOST_CORNERS, box.bundles)).round()
+    return np.concatenate([np.stack([box.low, box.high]), box.from_cube(pushed), alone])

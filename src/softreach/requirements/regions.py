@@ -1,0 +1,460 @@
+"""Regions of space, in the world: boxes, spheres, half-spaces and closed meshes."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property, partial
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.export.formats import load_library
+from softreach.geometry.surface import enclosed_volume
+from softreach.kernels.points.nearest_faces import nearest_faces
+from softreach.support import parallel
+from softreach.support.arguments import POSITIVE, as_integer, as_number, as_path
+from softreach.support.arrays import (
+    Array,
+    Index,
+    as_directions,
+    as_faces,
+    as_floats,
+    as_points,
+    check_finite,
+    read_only,
+)
+from softreach.support.errors import InvalidInput, counted
+from softreach.support.units import as_unit
+
+__all__ = ["Box", "HalfSpace", "Mesh", "Region", "Sphere"]
+
+Triple = tuple[float, float, float]
+
+_STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
+"""1/g, 1/g² and 1/g³ with g⁴ = g + 1: steps of a sequence that fills the cube evenly."""
+_BLOCK = 65_536  # points at once
+_MOST_PLACES = 1_000_000
+_EMPTIEST = 1e-4  # share of its bounding box that a region fills at least, to draw places from it
+_CIRCLE = np.linspace(0.0, 2.0 * np.pi, 49)
+_CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
+
+
+class Region(ABC):
+    """A part of space; lengths in m, in the world."""
+
+    @abstractmethod
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points (n, 3) to its boundary [m], negative inside, shape (n,)."""
+
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """Volume [m³]; infinite for a half-space."""
+
+    @property
+    @abstractmethod
+    def bounds(self) -> Array:
+        """Lower and upper corner of the box around it [m], shape (2, 3)."""
+
+    @abstractmethod
+    def wireframe(self, around: Array) -> list[Array]:
+        """Lines to draw it by [m], each of shape (k, 3).
+
+        Args:
+            around: Lower and upper corner of what else is drawn [m], shape (2, 3).
+        """
+
+    def places(self, n: int) -> Array:
+        """The first n places inside of a sequence that fills space evenly [m], shape (n, 3).
+
+        Args:
+            n: Number of places; the same n gives the same places.
+
+        Raises:
+            InvalidInput: The region has no end, or fills next to nothing of the box around it.
+        """
+        n = as_integer("n", n, 1, _MOST_PLACES)
+        low, high = self.bounds
+        if not np.isfinite(self.volume):
+            raise InvalidInput("region", self, "bounded: a half-space has no end")
+        kept: list[Array] = []
+        count, drawn = 0, 0
+        while count < n:
+            numbers = np.arange(drawn + 1, drawn + max(n, 256) + 1)[:, None]
+            points = low + (0.5 + numbers * _STEPS) % 1.0 * (high - low)
+            kept.append(points[self.distance(points) <= 0.0])
+            count, drawn = count + len(kept[-1]), drawn + len(points)
+            if count < _EMPTIEST * drawn and drawn > 1.0 / _EMPTIEST:
+                raise InvalidInput("region", self, "thick enough for places inside it")
+        return np.concatenate(kept)[:n]
+
+    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+        """Least and largest distance of the points of circular sections, negative inside.
+
+        Exact for half-spaces and for spheres; of boxes the largest is exact by faces. Otherwise a
+        ball takes the place of the section, so that the range is never too narrow.
+
+        Args:
+            center: Centers [m], shape (..., 3).
+            normal: Normals [-], shape (..., 3).
+            radius: Radii [m], shape (...).
+        """
+        del normal
+        distance = self._distances(center)
+        return distance - radius, distance + radius
+
+    def _distances(self, points: Array) -> Array:
+        """Distances of points of any shape (..., 3)."""
+        return self.distance(points.reshape(-1, 3)).reshape(points.shape[:-1])
+
+
+@dataclass(frozen=True)
+class Box(Region):
+    """A box along the axes of the world.
+
+    Raises:
+        InvalidInput: No low < high along each axis.
+    """
+
+    low: Triple
+    """Lower corner [m]."""
+    high: Triple
+    """Upper corner [m]."""
+
+    def __post_init__(self) -> None:
+        low, high = (_triple(name, getattr(self, name)) for name in ("low", "high"))
+        for axis, start, end in zip("xyz", low, high, strict=True):
+            if not start < end:
+                allowed = f"below high = {end:g} m, so that the box is not empty"
+                raise InvalidInput(f"low along {axis}", start, allowed)
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
+
+    @property
+    def volume(self) -> float:
+        """Volume [m³]."""
+        return float(np.prod(np.subtract(self.high, self.low)))
+
+    @property
+    def bounds(self) -> Array:
+        """Its corners [m], shape (2, 3)."""
+        return np.array([self.low, self.high])
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points (n, 3) to its faces [m], negative inside, shape (n,)."""
+        x = as_points("points", points)
+        beyond = np.maximum(self.low - x, x - self.high)
+        return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
+
+    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+        """As `Region.section_distances`; the least by faces where they tell more than a ball."""
+        reach = radius[..., None] * np.sqrt(np.maximum(1.0 - normal**2, 0.0))
+        beyond = np.maximum(self.low - center, center - self.high)
+        ball = self._distances(center) - radius
+        return np.maximum(ball, (beyond - reach).max(axis=-1)), (beyond + reach).max(axis=-1)
+
+    def wireframe(self, around: Array) -> list[Array]:
+        """Its edges [m]."""
+        del around
+        corners = np.array(list(np.ndindex(2, 2, 2)))
+        ends = [(a, b) for a in corners for b in corners if (b - a).sum() == 1 and (b >= a).all()]
+        pick = self.bounds
+        return [np.stack([pick[end, range(3)] for end in pair]) for pair in ends]
+
+
+@dataclass(frozen=True)
+class Sphere(Region):
+    """A ball.
+
+    Raises:
+        InvalidInput: No finite center, or no radius > 0.
+    """
+
+    center: Triple
+    """Its middle [m]."""
+    radius: float
+    """Its radius [m]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", _triple("center", self.center))
+        allowed = POSITIVE._replace(unit="m")
+        object.__setattr__(self, "radius", as_number("radius", self.radius, allowed))
+
+    @property
+    def volume(self) -> float:
+        """Volume [m³]."""
+        return 4.0 / 3.0 * np.pi * self.radius**3
+
+    @property
+    def bounds(self) -> Array:
+        """Corners of the box around it [m], shape (2, 3)."""
+        return np.array(self.center) + self.radius * np.array([[-1.0], [1.0]])
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points (n, 3) to its surface [m], negative inside, shape (n,)."""
+        return np.linalg.norm(as_points("points", points) - self.center, axis=1) - self.radius
+
+    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+        """As `Region.section_distances`, exact."""
+        apart = center - self.center
+        height = (apart * normal).sum(axis=-1)
+        across = np.sqrt(np.maximum((apart**2).sum(axis=-1) - height**2, 0.0))
+        least, most = np.maximum(across - radius, 0.0), across + radius
+        return np.hypot(height, least) - self.radius, np.hypot(height, most) - self.radius
+
+    def wireframe(self, around: Array) -> list[Array]:
+        """Three great circles [m]."""
+        del around
+        flat = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE), 0.0 * _CIRCLE], axis=1)
+        return [self.center + self.radius * np.roll(flat, k, axis=1) for k in range(3)]
+
+
+@dataclass(frozen=True)
+class HalfSpace(Region):
+    """Everything behind a plane: (x - point) · normal <= 0.
+
+    Raises:
+        InvalidInput: No finite point, or a normal without length.
+    """
+
+    point: Triple
+    """A point of the plane [m]."""
+    normal: Triple
+    """Out of the half-space, of any length."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", _triple("point", self.point))
+        unit = as_directions("normal", _triple("normal", self.normal))
+        object.__setattr__(self, "normal", tuple(unit.tolist()))
+
+    @property
+    def volume(self) -> float:
+        """Infinite."""
+        return np.inf
+
+    @property
+    def bounds(self) -> Array:
+        """No end anywhere, shape (2, 3)."""
+        return np.array([[-np.inf] * 3, [np.inf] * 3])
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points (n, 3) to the plane [m], negative behind it, shape (n,)."""
+        return (as_points("points", points) - self.point) @ np.array(self.normal)
+
+    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+        """As `Region.section_distances`, exact."""
+        distance = (center - self.point) @ np.array(self.normal)
+        along = normal @ np.array(self.normal)
+        reach = radius * np.sqrt(np.maximum(1.0 - along**2, 0.0))
+        return distance - reach, distance + reach
+
+    def wireframe(self, around: Array) -> list[Array]:
+        """A square of the plane, about as large as what else is drawn [m]."""
+        middle, half = around.mean(axis=0), 0.5 * float(np.ptp(around, axis=0).max())
+        normal = np.array(self.normal)
+        foot = middle - ((middle - self.point) @ normal) * normal
+        first = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
+        first /= np.linalg.norm(first)
+        second = np.cross(normal, first)
+        corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)], float)
+        return [foot + half * corners @ np.stack([first, second])]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mesh(Region):
+    """What closed triangles hold.
+
+    Raises:
+        InvalidInput: Triangles that leave an edge open, share one by more than two, or do not face
+            the same way; or nothing inside.
+    """
+
+    vertices: Array
+    """Corners [m], shape (v, 3)."""
+    faces: Index
+    """Indices of the corners, shape (f, 3); they are turned so that all face out."""
+    source: str = ""
+    """File that it was read from; empty for none."""
+    unit: str = "m"
+    """Unit of length of that file."""
+
+    def __post_init__(self) -> None:
+        vertices = as_points("vertices", self.vertices)
+        faces = as_faces("faces", self.faces, len(vertices))
+        _check_closed(faces, self.source or "mesh")
+        volume = enclosed_volume(vertices, faces)
+        if not abs(volume) > 0.0:
+            raise InvalidInput(self.source or "mesh", "no volume", "around some space")
+        faces = faces if volume > 0.0 else faces[:, ::-1]
+        object.__setattr__(self, "vertices", read_only(vertices.copy()))
+        object.__setattr__(self, "faces", read_only(np.ascontiguousarray(faces, np.int64)))  # pyright: ignore[reportArgumentType]
+
+    @classmethod
+    def load(cls, path: str | PathLike[str], *, unit: str = "m") -> Self:
+        """The mesh of a file: STL, PLY, OBJ and what else trimesh reads.
+
+        Args:
+            path: The file.
+            unit: Unit of length that the file counts in: "m", "cm" or "mm".
+
+        Raises:
+            InvalidInput: No such file, no triangles in it, or a mesh with holes.
+            MissingExtra: trimesh is not installed.
+        """
+        name, size = as_path("path", path), as_unit(unit)
+        if not Path(name).is_file():
+            raise InvalidInput("path", repr(name), "a file that exists")
+        trimesh = load_library("trimesh")
+        try:
+            mesh: Any = trimesh.load(name, force="mesh")
+            mesh.merge_vertices()
+            load_library("trimesh.repair").fix_winding(mesh)
+            vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+        except Exception as error:  # of readers of many formats
+            raise InvalidInput("path", repr(name), f"a mesh that can be read: {error}") from None
+        if not len(faces):
+            raise InvalidInput("path", repr(name), "a file with triangles")
+        return cls(vertices * size.size, faces, name, size.name)
+
+    def __repr__(self) -> str:
+        name = f" of {self.source}" if self.source else ""
+        return f"Mesh{name}: {counted(len(self.faces), 'triangle')}, {self.volume:.4g} m³"
+
+    @property
+    def volume(self) -> float:
+        """Volume inside [m³]."""
+        return self._volume
+
+    @cached_property
+    def _volume(self) -> float:
+        return enclosed_volume(self.vertices, self.faces)
+
+    @property
+    def bounds(self) -> Array:
+        """Corners of the box around it [m], shape (2, 3)."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points (n, 3) to the nearest triangle [m], negative inside, shape (n,).
+
+        The sign is that of the normal of the nearest face, edge or corner, weighted by angles.
+        """
+        points = as_points("points", points)
+        out, face = np.empty(len(points)), np.empty(len(points), np.int64)
+        table = (self.vertices, self.faces, *self._spheres)
+        parallel.run(
+            partial(nearest_faces, points[block], *table, face[block], out[block])
+            for block in parallel.blocks(len(points), _BLOCK // 16)
+        )
+        for block in parallel.blocks(len(points), _BLOCK):
+            normal, foot = self._nearest_feature(points[block], face[block])
+            outside = ((points[block] - foot) * normal).sum(axis=1)
+            out[block] = np.where(outside < 0.0, -out[block], out[block])
+        return out
+
+    def wireframe(self, around: Array) -> list[Array]:
+        """Edges at which it is creased [m]."""
+        del around
+        edges, beside = self._edges[:2]
+        first, second = self._face_normals[beside].swapaxes(0, 1)
+        sharp = (first * second).sum(axis=1) < _CREASE
+        return list(self.vertices[edges[sharp]])
+
+    @cached_property
+    def _corners(self) -> Array:
+        return self.vertices[self.faces]
+
+    @cached_property
+    def _spheres(self) -> tuple[Array, Array]:
+        center = self._corners.mean(axis=1)
+        radius = np.linalg.norm(self._corners - center[:, None], axis=2).max(axis=1)
+        return np.ascontiguousarray(center), radius
+
+    @cached_property
+    def _face_normals(self) -> Array:
+        a, b, c = self._corners.swapaxes(0, 1)
+        normal = np.cross(b - a, c - a)
+        size = np.linalg.norm(normal, axis=1, keepdims=True)
+        return np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
+
+    @cached_property
+    def _edges(self) -> tuple[Index, Index, Index]:
+        """Edges as vertices (e, 2), the faces beside each (e, 2), and edges of each face (f, 3)."""
+        pairs = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2), axis=2)
+        edges, number = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+        number = number.ravel()
+        beside = np.argsort(number, kind="stable").reshape(-1, 2) // 3
+        return edges, beside, number.reshape(-1, 3)
+
+    @cached_property
+    def _edge_normals(self) -> Array:
+        return self._face_normals[self._edges[1]].sum(axis=1)
+
+    @cached_property
+    def _vertex_normals(self) -> Array:
+        normals = np.zeros_like(self.vertices)
+        for k in range(3):
+            here, after, before = (self._corners[:, (k + j) % 3] for j in range(3))
+            u, v = after - here, before - here
+            angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
+            np.add.at(normals, self.faces[:, k], angle[:, None] * self._face_normals)
+        return normals
+
+    def _nearest_feature(self, points: Array, face: Index) -> tuple[Array, Array]:
+        """Normal and nearest point of the face, edge or corner of a triangle nearest to points."""
+        normal, corners = self._face_normals[face].copy(), self._corners[face]
+        a, b, c = corners.swapaxes(0, 1)
+        height = ((points - a) * normal).sum(axis=1, keepdims=True)
+        foot = points - height * normal
+        inside = np.ones(len(points), bool)
+        for start, end in ((a, b), (b, c), (c, a)):
+            inside &= (np.cross(end - start, foot - start) * normal).sum(axis=1) >= 0.0
+        rest = np.flatnonzero(~inside | ~normal.any(axis=1))
+        nearest = np.full(len(rest), np.inf)
+        for k in range(3):
+            start, end = corners[rest, k], corners[rest, (k + 1) % 3]
+            along = end - start
+            square = (along**2).sum(axis=1)
+            share = ((points[rest] - start) * along).sum(axis=1) / np.where(square > 0, square, 1.0)
+            share = share.clip(0.0, 1.0)
+            place = start + share[:, None] * along
+            apart = np.linalg.norm(points[rest] - place, axis=1)
+            better = apart < nearest
+            nearest[better], foot[rest[better]] = apart[better], place[better]
+            of_edge = self._edge_normals[self._edges[2][face[rest], k]]
+            of_start = self._vertex_normals[self.faces[face[rest], k]]
+            of_end = self._vertex_normals[self.faces[face[rest], (k + 1) % 3]]
+            feature = np.where(share[:, None] <= 0.0, of_start, of_edge)
+            feature = np.where(share[:, None] >= 1.0, of_end, feature)
+            normal[rest[better]] = feature[better]
+        return normal, foot
+
+
+def _triple(name: str, value: object) -> Triple:
+    """Three finite numbers."""
+    allowed = "three finite numbers"
+    numbers = check_finite(name, as_floats(name, value, allowed))
+    if numbers.shape != (3,):
+        raise InvalidInput(name, value, allowed)
+    x, y, z = numbers.tolist()
+    return x, y, z
+
+
+def _check_closed(faces: Any, name: str) -> None:
+    """Refuse triangles that leave a hole or do not face the same way."""
+    if not len(faces):
+        raise InvalidInput(name, "no triangles", "a closed surface")
+    ways = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    _, counts = np.unique(np.sort(ways, axis=1), axis=0, return_counts=True)
+    if number := int((counts == 1).sum()):
+        text = f"a mesh with holes: {counted(number, 'open edge')}"
+        raise InvalidInput(name, text, "closed, so that inside and outside can be told apart")
+    if number := int((counts != 2).sum()):
+        text = f"{counted(number, 'edge')} of more than two triangles"
+        raise InvalidInput(name, text, "a surface that does not branch")
+    if len(np.unique(ways, axis=0)) < len(ways):
+        raise InvalidInput(name, "triangles that face both ways", "of triangles that all face out")
