@@ -1,0 +1,307 @@
+"""Free parameters of a search: ranges, choices, ties, and the arm with given values of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.material import named_material
+from softreach.arm.number import fields_of
+from softreach.arm.parameters import Parameter, changed
+from softreach.arm.parameters.changes import parameters_by_every_name, unknown_parameter
+from softreach.arm.tables import check_extension
+from softreach.support.arguments import as_given, as_mapping, plain
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput
+from softreach.support.quantity import read_quantity
+
+__all__ = ["FreeParameter", "FreeParameters", "Tie", "Values", "free_parameters"]
+
+Values = Mapping[str, float | str]
+"""Free parameter -> its value [SI unit], or the chosen name."""
+
+BUNDLES, DESIGN, MATERIAL = "bundles", "design", "material"
+"""Choices that are no parameters: how many bundles, which of several designs, of what material."""
+
+_TIE = re.compile(
+    r"\s*(?P<sign>[+-]?)\s*(?:(?P<factor>\d[\d.eE]*)\s*\*)?\s*(?P<name>[^\s*+-][^*+]*?)"
+    r"\s*(?:(?P<way>[+-])\s*(?P<constant>\d[\w.%°]*))?\s*"
+)
+_TIES = 'another free parameter with a factor and a constant, such as "-left.revolution + 90deg"'
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeParameter:
+    """A number in a range, or a choice."""
+
+    name: str
+    unit: str
+    """SI unit; "1" for none."""
+    low: float = np.nan
+    """Least value of a range."""
+    high: float = np.nan
+    """Largest value of a range."""
+    choices: tuple[float | str, ...] = ()
+    """Values to choose from, instead of a range."""
+    whole: bool = False
+    """It counts something."""
+
+    @property
+    def is_real(self) -> bool:
+        """True of a number that can change a little."""
+        return not self.choices and not self.whole
+
+    @property
+    def text(self) -> str:
+        """Range or choices in words."""
+        if self.choices:
+            return f"one of {', '.join(map(str, self.choices))}"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.low:.6g} to {self.high:.6g}{unit}"
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A parameter that follows from a free one: value = factor · free + constant."""
+
+    name: str
+    of: str
+    factor: float
+    constant: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeParameters:
+    """All free parameters of a search, and the arm with given values of them."""
+
+    bases: Mapping[str, Manipulator]
+    """The designs that others are variations of, by name; "" for a single one."""
+    free: tuple[FreeParameter, ...]
+    ties: tuple[Tie, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free parameters."""
+        return tuple(parameter.name for parameter in self.free)
+
+    @cached_property
+    def real(self) -> tuple[FreeParameter, ...]:
+        """Those that can change a little, which a polish moves."""
+        return tuple(parameter for parameter in self.free if parameter.is_real)
+
+    @property
+    def bounds(self) -> Array:
+        """Ends of the ranges of the real ones, shape (n, 2)."""
+        return np.array([(p.low, p.high) for p in self.real], float).reshape(-1, 2)
+
+    def arm(self, values: Values) -> Manipulator:
+        """The design with these values, and what is tied to them.
+
+        Raises:
+            InvalidDesign: No such arm can exist, or some activation would shorten it to nothing.
+        """
+        arm = self.bases[str(values[DESIGN])] if DESIGN in values else self._only
+        for name, make in _CHOICES.items():
+            if name in values:
+                arm = make(arm, values[name])
+        numbers = {name: value for name, value in values.items() if name not in _WORDS}
+        for tie in self.ties:
+            numbers[tie.name] = tie.factor * float(numbers[tie.of]) + tie.constant
+        varies = DESIGN in values or BUNDLES in values
+        known = parameters_by_every_name(arm) if varies else numbers
+        numbers = {
+            name: int(value) if name in self._whole else float(value)
+            for name, value in numbers.items()
+            if name in known  # else of another base, or of another number of bundles
+        }
+        made = changed(arm, numbers)
+        check_extension(made)
+        return made
+
+    def moved(self, values: Values, reals: Array) -> dict[str, float | str]:
+        """The values with others of the real parameters, in their order."""
+        return {**values, **dict(zip((p.name for p in self.real), reals.tolist(), strict=True))}
+
+    def reals(self, values: Values) -> Array:
+        """Values of the real parameters, shape (n,)."""
+        return np.array([float(values[p.name]) for p in self.real])
+
+    def start(self) -> dict[str, float | str] | None:
+        """Values of the first base, within the ranges; None where it does not tell them."""
+        arm = next(iter(self.bases.values()))
+        known, values = parameters_by_every_name(arm), {}
+        for parameter in self.free:
+            if parameter.name in _WORDS:
+                values[parameter.name] = parameter.choices[0]
+                continue
+            value = known[parameter.name].value(arm) if parameter.name in known else np.nan
+            if not np.isfinite(value):
+                return None
+            if parameter.choices:
+                near = np.argmin([abs(float(choice) - value) for choice in parameter.choices])
+                values[parameter.name] = parameter.choices[int(near)]
+            else:
+                values[parameter.name] = float(np.clip(value, parameter.low, parameter.high))
+        return values
+
+    @property
+    def _only(self) -> Manipulator:
+        return next(iter(self.bases.values()))
+
+    @cached_property
+    def _whole(self) -> frozenset[str]:
+        return frozenset(parameter.name for parameter in self.free if parameter.whole)
+
+
+def free_parameters(
+    base: Manipulator | Mapping[str, Manipulator],
+    free: Mapping[str, Any],
+    choices: Mapping[str, Sequence[Any]] | None = None,
+) -> FreeParameters:
+    """Free parameters from what a user gives.
+
+    Args:
+        base: A design, or several by name, one of which is chosen.
+        free: Parameter -> (low, high) [SI unit], or the parameter that it is tied to:
+            `"-left.revolution"`, `"0.5*left.offset + 90deg"`.
+        choices: Parameter -> values; `bundles` -> numbers of copies of the first actuator, evenly
+            spread; `material` of everything -> names of materials.
+
+    Raises:
+        InvalidInput: An unknown parameter, a range that is reversed, empty or beyond what the
+            parameter may be, a choice without values, or a tie to what is not free.
+    """
+    bases = as_mapping("base", base, a_manipulator) if isinstance(base, Mapping) else {}
+    bases = bases or {"": a_manipulator("base", base)}
+    given = as_mapping("free", free, lambda _, value: value)
+    picks = as_mapping("choices", choices or {}, lambda _, value: value)
+    known = _known_parameters(bases.values(), picks.get(BUNDLES, ()))
+    texts = {name: text for name, text in given.items() if isinstance(text, str)}
+    found = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]
+    if len(bases) > 1:
+        found.append(FreeParameter(name=DESIGN, unit="1", choices=tuple(bases)))
+    found += [_choice(known, bases, name, values) for name, values in picks.items()]
+    names = [parameter.name for parameter in found]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InvalidInput("free", twice[0], "given once")
+    if not found:
+        raise InvalidInput("free", "none", "one parameter or more with a range or choices")
+    ties = tuple(_tie(known, names, name, text) for name, text in texts.items())
+    return FreeParameters(bases=bases, free=tuple(found), ties=ties)
+
+
+def _known_parameters(arms: Iterable[Manipulator], counts: Any) -> dict[str, Parameter]:
+    """Parameters that any of the designs has, also with other numbers of bundles."""
+    known: dict[str, Parameter] = {}
+    for arm in arms:
+        counted = counts if isinstance(counts, list | tuple) else ()
+        for variant in (arm, *(_with_bundles(arm, count) for count in counted)):
+            known = {**parameters_by_every_name(variant), **known}
+    return known
+
+
+def _parameter(known: Mapping[str, Parameter], name: str) -> Parameter:
+    if name not in known:
+        raise unknown_parameter(name, known)
+    return known[name]
+
+
+def _ranged(known: Mapping[str, Parameter], name: str, ends: Any) -> FreeParameter:
+    parameter = _parameter(known, name)
+    try:
+        low, high = (plain(end) for end in ends)
+        low, high = float(low), float(high)
+    except (TypeError, ValueError):
+        allowed = "a range (low, high), or text that ties it to a free parameter"
+        raise InvalidInput(f"free {name}", as_given(ends), allowed) from None
+    if not low < high:  # NaN too
+        raise InvalidInput(f"free {name}", (low, high), "a range (low, high) with low < high")
+    for end in (low, high):
+        if not parameter.range._replace(whole=False).admits(end):
+            raise InvalidInput(f"free {name}", end, f"in its range: {parameter.range.text}")
+    if parameter.whole:
+        low, high = float(np.ceil(low)), float(np.floor(high))
+    whole = parameter.whole
+    return FreeParameter(name=name, unit=parameter.unit, low=low, high=high, whole=whole)
+
+
+def _choice(
+    known: Mapping[str, Parameter], bases: Mapping[str, Manipulator], name: str, values: Any
+) -> FreeParameter:
+    several = isinstance(values, list | tuple | np.ndarray)
+    picks = tuple(plain(value) for value in values) if several else ()
+    if not picks or len({*picks}) < len(picks):
+        allowed = "a list of different values to choose from"
+        raise InvalidInput(f"choices {name}", as_given(values), allowed)
+    unit = "1"
+    if name in _CHOICES:
+        for arm in bases.values():
+            for value in picks:
+                _CHOICES[name](arm, value)
+    elif name == DESIGN:
+        raise InvalidInput("choices", DESIGN, "given as base: a dictionary of designs by name")
+    else:
+        unit = _parameter(known, name).unit
+        if wrong := [v for v in picks if isinstance(v, bool) or not isinstance(v, int | float)]:
+            raise InvalidInput(f"choices {name}", as_given(wrong[0]), "numbers")
+    return FreeParameter(name=name, unit=unit, choices=picks)
+
+
+def _tie(known: Mapping[str, Parameter], free: list[str], name: str, text: str) -> Tie:
+    unit, match = _parameter(known, name).unit, _TIE.fullmatch(text)
+    if match is None or match["name"] not in free:
+        allowed = f"{_TIES}; free are {', '.join(free) or 'none'}"
+        raise InvalidInput(f"free {name}", as_given(text), allowed)
+    try:
+        factor = float(match["factor"] or 1.0) * (-1.0 if match["sign"] == "-" else 1.0)
+        constant = _constant(match["constant"] or "0", unit)
+    except ValueError:
+        raise InvalidInput(f"free {name}", as_given(text), _TIES) from None
+    if name in free:
+        raise InvalidInput("free", name, "given once")
+    return Tie(name, match["name"], factor, -constant if match["way"] == "-" else constant)
+
+
+def _constant(text: str, unit: str) -> float:
+    """A constant with its unit, or in the SI unit."""
+    try:
+        return float(text)
+    except ValueError:
+        return read_quantity(text, unit)
+
+
+def _with_bundles(arm: Manipulator, count: Any) -> Manipulator:
+    """Copies of the first actuator, evenly spread around the arm."""
+    first = arm.actuators[0]
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise InvalidInput(f"choices {BUNDLES}", as_given(count), "whole numbers of 1 or more")
+    if arm.drives or "offset" not in fields_of(type(first)):
+        what = "an arm with drives" if arm.drives else f"of {first.name}, which has no offset"
+        raise InvalidInput(f"choices {BUNDLES}", what, "asked of actuators that have an offset")
+    offset = float(first.value_on("offset", arm.profile, arm.section))
+    turns = offset + 2.0 * np.pi * np.arange(count) / count
+    copies = (
+        first.replace(name=f"{first.name} {k + 1}", offset=float(turn % (2.0 * np.pi)))
+        for k, turn in enumerate(turns)
+    )
+    return arm.replace(actuators=tuple(copies))
+
+
+def _of_material(arm: Manipulator, name: Any) -> Manipulator:
+    """The arm made of one material."""
+    material, section = named_material(name), arm.section
+    rings = tuple(ring.replace(material=material) for ring in section.rings)
+    return arm.replace(section=section.replace(rings=rings, core=None))
+
+
+_CHOICES = {BUNDLES: _with_bundles, MATERIAL: _of_material}
+_WORDS = (*_CHOICES, DESIGN)

@@ -1,0 +1,301 @@
+"""Objectives of a search: numbers of a design, what they need, and what can be differentiated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.command import Command
+from softreach.atlas.design_task import Intermediates
+from softreach.atlas.metric import Metric, Need
+from softreach.atlas.metrics import chosen_metrics, known_metric
+from softreach.atlas.space import DesignSpace
+from softreach.requirements.checks import Check, check
+from softreach.requirements.requirements import Requirements
+from softreach.rod.rods import tip_map
+from softreach.sampling import cube_blocks
+from softreach.support.arguments import as_given, as_names
+from softreach.support.errors import InvalidInput, did_you_mean, no_warnings
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.workspace import ReachableSet
+
+__all__ = ["OBJECTIVES", "DesignCase", "Goal", "Objective", "Value", "goals"]
+
+_COARSE, _FINE = 1 << 12, 1 << 15
+"""Samples of a cloud, for what is asked of one, of coarse and of fine cases."""
+_RADIUS = 0.1  # of neighbors for D̄, in L
+_SHARE = 0.8  # of the volume, that the payload leaves
+
+
+class Value(NamedTuple):
+    """A number and how far off it may be."""
+
+    value: float
+    error: float = math.nan
+
+
+@dataclass(eq=False)
+class DesignCase:
+    """A design under requirements, and what is asked of it at one accuracy, each computed once."""
+
+    arm: Manipulator
+    requirements: Requirements
+    accuracy: float
+    """Relative error of volumes."""
+    fine: bool = True
+    """Clouds have as many samples as numbers that are reported need."""
+
+    @cached_property
+    @no_warnings()
+    def reached(self) -> ReachableSet:
+        """The reachable set."""
+        from softreach.workspace import reachable_set
+
+        return reachable_set(self.arm, accuracy=self.accuracy)
+
+    @cached_property
+    @no_warnings()
+    def check(self) -> Check:
+        """What is met and what is missed."""
+        return check(self.arm, self.requirements, accuracy=self.accuracy)
+
+    @cached_property
+    @no_warnings()
+    def cloud(self) -> xr.Dataset:
+        """Samples of the activation box."""
+        from softreach.cloud import compute_cloud
+
+        return compute_cloud(self.arm, self.samples, sampler="sobol")
+
+    @property
+    def samples(self) -> int:
+        """Samples of a cloud."""
+        return _FINE if self.fine else _COARSE
+
+    @no_warnings()
+    def metric(self, metric: Metric) -> float:
+        """A metric of the atlas."""
+        if metric.needs == (Need.REACHABLE_SET,):
+            return float(metric.value({Need.REACHABLE_SET: self.reached}, {}))
+        return float(metric.value(self._intermediates, {}))
+
+    @cached_property
+    def _intermediates(self) -> Intermediates:
+        (cube,) = cube_blocks("sobol", self.samples, tip_map(self.arm).box.bundles, 0, self.samples)
+        command = Command(
+            space=DesignSpace(base=self.arm, parameters=()),
+            n=self.samples,
+            seed=0,
+            sampler="sobol",
+            tol=1e-6,
+            alpha_over_length=4.0 / np.cbrt(self.samples),
+            accuracy=self.accuracy,
+            metrics=chosen_metrics(["extent"]),
+            keep_clouds=False,
+        )
+        return Intermediates(self.arm, cube, command, ())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Objective:
+    """A number of a design that a search makes large or small."""
+
+    name: str
+    unit: str
+    meaning: str
+    compute: Callable[[DesignCase], Value]
+    asks: str = ""
+    """Part of the requirements that it is about: "targets" or "regions"; "" for none."""
+    smooth: bool = False
+    """A polish knows its derivatives."""
+
+
+class Goal(NamedTuple):
+    """An objective, and whether it is to be large or small."""
+
+    objective: Objective
+    sense: float
+    """1 to maximize, -1 to minimize."""
+
+    @property
+    def name(self) -> str:
+        """Name of the objective."""
+        return self.objective.name
+
+    def value(self, case: DesignCase) -> Value:
+        """Value of a design; NaN where it has none, as a flat set has no unreachability."""
+        value = self.objective.compute(case)
+        return value if math.isfinite(value.value) else Value(math.nan)
+
+
+def goals(
+    maximize: str | Metric | Sequence[str | Metric],
+    minimize: str | Metric | Sequence[str | Metric],
+    requirements: Requirements,
+) -> tuple[Goal, ...]:
+    """Objectives with their senses, in the order in which they are given.
+
+    Args:
+        maximize: Names of objectives, or metrics of your own.
+        minimize: The same.
+        requirements: What some of them are about.
+
+    Raises:
+        InvalidInput: An unknown one, one that is given twice, or one about targets or regions that
+            the requirements do not have.
+    """
+    result = []
+    for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
+        several = [given] if isinstance(given, Metric) else _each(word, given)
+        result += [Goal(_objective(word, each), sense) for each in several]
+    names = [goal.name for goal in result]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InvalidInput("objective", twice[0], "given once")
+    has = {
+        "targets": bool(requirements.targets),
+        "regions": any(target.region is not None for target in requirements.targets),
+    }
+    for goal in result:
+        if goal.objective.asks and not has[goal.objective.asks]:
+            allowed = f"asked with {goal.objective.asks} among the requirements"
+            raise InvalidInput("objective", goal.name, allowed)
+    return tuple(result)
+
+
+def _each(word: str, given: Any) -> Sequence[str | Metric]:
+    if isinstance(given, list | tuple) and any(isinstance(each, Metric) for each in given):
+        return given
+    return as_names(word, given)
+
+
+def _objective(word: str, given: str | Metric) -> Objective:
+    if isinstance(given, str) and given in OBJECTIVES:
+        return OBJECTIVES[given]
+    metric = given if isinstance(given, Metric) else known_metric(given)
+    if metric is None:
+        hint = did_you_mean(str(given), OBJECTIVES)
+        allowed = f"one of {', '.join(OBJECTIVES)}, or a metric of the atlas"
+        raise InvalidInput(word, as_given(given), allowed, hint)
+    if metric.over:
+        raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
+    return Objective(
+        name=metric.name, unit=metric.unit, meaning=metric.meaning, compute=partial(_metric, metric)
+    )
+
+
+def _metric(metric: Metric, case: DesignCase) -> Value:
+    return Value(case.metric(metric))
+
+
+def _volume(case: DesignCase) -> Value:
+    return Value(case.reached.volume, case.reached.volume_error)
+
+
+def _convex_volume(case: DesignCase) -> Value:
+    return Value(case.reached.convex_volume, case.reached.convex_volume_error)
+
+
+def _unreachability(case: DesignCase) -> Value:
+    return Value(case.reached.unreachability, case.reached.unreachability_error)
+
+
+def _coverage(case: DesignCase) -> Value:
+    covered = case.check.coverages
+    shares = [each.share for each in covered]
+    return Value(float(np.mean(shares)), float(np.mean([each.error for each in covered])))
+
+
+def _mean_effort(case: DesignCase) -> Value:
+    return Value(float(np.mean(case.check.effort)), 0.0)
+
+
+def _worst_effort(case: DesignCase) -> Value:
+    return Value(float(np.max(case.check.effort)), 0.0)
+
+
+def _sampled(values: Any) -> Value:
+    """Mean of values over samples of the activation box, and its standard error."""
+    known = np.asarray(values, float)
+    known = known[np.isfinite(known)]
+    if not len(known):
+        return Value(math.nan)
+    return Value(float(known.mean()), float(known.std() / math.sqrt(len(known))))
+
+
+def _manipulability(case: DesignCase) -> Value:
+    from softreach.cloud.dexterity import dexterity
+
+    return _sampled(dexterity(case.cloud).manipulability)
+
+
+def _inverse_condition(case: DesignCase) -> Value:
+    from softreach.cloud.dexterity import dexterity
+
+    return _sampled(1.0 / dexterity(case.cloud).condition)
+
+
+def _activation_distance(case: DesignCase) -> Value:
+    from softreach.cloud.redundancy import activation_distance
+
+    radius = _RADIUS * case.arm.length
+    return _sampled(activation_distance(case.cloud, radius, queries=min(4096, case.samples)))
+
+
+def _compliance(case: DesignCase) -> Value:
+    from softreach.stiffness import principal_compliances, tip_compliance
+
+    gamma = case.cloud.activation.values[:256]
+    return _sampled(principal_compliances(tip_compliance(case.arm, gamma)).values[:, 0])
+
+
+def _payload(case: DesignCase) -> Value:
+    from softreach.workspace.payload import payload_curve
+
+    accuracy = max(case.accuracy, 0.01)
+    most = payload_curve(case.arm, [], accuracy=accuracy).largest_payload(_SHARE, accuracy=accuracy)
+    return Value(most.payload, most.payload_error)
+
+
+def _mass(case: DesignCase) -> Value:
+    from softreach.arm.summary import mass
+
+    value = mass(case.arm)
+    return Value(math.nan if value is None else value, 0.0)
+
+
+def _actuators(case: DesignCase) -> Value:
+    return Value(float(case.arm.inputs), 0.0)
+
+
+_ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value], str, bool], ...] = (
+    ("exact_volume", "m3", "volume of the reachable set", _volume, "", True),
+    ("exact_convex_volume", "m3", "volume of its convex hull", _convex_volume, "", True),
+    ("exact_unreachability", "1", "1 - volume / convex volume", _unreachability, "", True),
+    ("coverage", "1", "mean share of the regions that is reached", _coverage, "regions", False),
+    ("mean_effort", "1", "mean effort at the targets", _mean_effort, "targets", True),
+    ("worst_effort", "1", "largest effort at the targets", _worst_effort, "targets", True),
+    ("manipulability", "m3", "mean √det(J Jᵀ) over the box", _manipulability, "", False),
+    ("dexterity", "1", "mean of 1 / condition of J over the box", _inverse_condition, "", False),
+    ("activation_distance", "1", "mean D̄ within L/10", _activation_distance, "", False),
+    ("payload", "kg", "payload under which 80 % of the volume is left", _payload, "", False),
+    ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance, "", False),
+    ("mass", "kg", "mass of the arm", _mass, "", True),
+    ("actuators", "1", "number of inputs", _actuators, "", False),
+)
+
+OBJECTIVES = {
+    name: Objective(
+        name=name, unit=unit, meaning=meaning, compute=compute, asks=asks, smooth=smooth
+    )
+    for name, unit, meaning, compute, asks, smooth in _ROWS
+}
+"""Objectives by name, beside the metrics of the atlas."""

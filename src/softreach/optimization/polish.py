@@ -1,0 +1,186 @@
+"""A design made better from where it stands: quadratic programs on exact derivatives (SLSQP)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.optimization.free_parameters import Values
+from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.program import DesignPoint, Point
+from softreach.rod.rods import tip_map
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
+
+__all__ = ["Polished", "can_polish", "polished"]
+
+_MOST_POSES = 60  # that move with the design
+_ITERATIONS = 30
+_TOLERANCE = 0.01  # of the accuracy
+_WORSE = 10.0  # times the cost of the start: a design that cannot exist
+
+
+class Polished(NamedTuple):
+    """The end of a polish."""
+
+    candidate: Candidate
+    """The better of both ends, judged as its start was."""
+    designs: int
+    """Designs that were looked at."""
+
+
+def can_polish(problem: Problem) -> bool:
+    """True of problems with numbers that can change a little, and goals with derivatives."""
+    needs = problem.requirements
+    return (
+        len(problem.parameters.real) > 0
+        and len(needs.places) * max(1, len(needs.payloads)) <= _MOST_POSES
+        and all(goal.objective.smooth for goal in problem.goals)
+    )
+
+
+@no_warnings()
+def polished(
+    problem: Problem,
+    start: Candidate,
+    *,
+    accuracy: float | None = None,
+    goal: int = 0,
+    floors: Sequence[float] = (),
+    iterations: int = _ITERATIONS,
+) -> Polished:
+    """The local optimum of one goal next to a design; poses at the targets move along with it.
+
+    Args:
+        problem: The problem.
+        start: The design to begin with.
+        accuracy: Relative error of volumes, instead of that of coarse sets.
+        goal: Number of the goal that is optimized.
+        floors: Costs of all goals that are not to be exceeded, but for that one.
+        iterations: Most quadratic programs.
+    """
+    program = _Program(problem, start, accuracy or problem.coarse, goal, floors)
+    try:
+        first = program.begin()
+        end = _solved(program, first, iterations)
+        candidate = problem.judged(program.values_of(end), program.point(end).design.case)
+    except (InvalidDesign, InvalidInput):
+        return Polished(start, max(1, program.designs))
+    better = min((start, candidate), key=problem.score) if len(problem.goals) < 2 else candidate
+    return Polished(better, program.designs)
+
+
+def _solved(program: _Program, first: Array, iterations: int) -> Array:
+    from scipy.optimize import minimize
+
+    point = program.point(first)
+    constraints = []
+    for kind, given in (("eq", point.equations), ("ineq", point.rooms)):
+        if len(given[0]):
+            fun, jac = program.asked(kind, 0), program.asked(kind, 1)
+            constraints.append({"type": kind, "fun": fun, "jac": jac})
+    result = minimize(
+        program.cost,
+        first,
+        jac=program.cost_slope,
+        bounds=[(0.0, 1.0)] * len(first),
+        constraints=constraints,
+        method="SLSQP",
+        options={"maxiter": iterations, "ftol": program.tolerance},
+    )
+    return np.clip(result.x, 0.0, 1.0) if np.isfinite(result.x).all() else first
+
+
+class _Program:
+    """The program of one start: unknowns are the real parameters and the poses, from 0 to 1."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        start: Candidate,
+        accuracy: float,
+        goal: int,
+        floors: Sequence[float],
+    ) -> None:
+        self.designs = 0
+        """Designs made so far."""
+        self._problem, self._start, self._accuracy = problem, start, accuracy
+        self._goal, self._floors = goal, floors
+        self._shape, self._scale = (0, 0), 1.0
+        self._points: dict[bytes, Point] = {}
+
+    def begin(self) -> Array:
+        """Unknowns of the start.
+
+        Raises:
+            InvalidDesign: It is no design.
+        """
+        problem = self._problem
+        low, high = problem.parameters.bounds.T
+        reals = (problem.parameters.reals(self._start.values) - low) / (high - low)
+        poses = np.empty((0, 0))
+        if len(problem.requirements.places):
+            case = problem.case(self._start.values, self._accuracy)
+            box = tip_map(case.arm).box
+            gamma = np.nan_to_num(case.check.poses.reshape(-1, box.bundles))
+            poses = np.clip(box.to_cube(box.clip(gamma))[:, box.free], 0.0, 1.0)
+        self._shape = poses.shape
+        first = np.concatenate([np.clip(reals, 0.0, 1.0), poses.ravel()])
+        self._scale = abs(self.point(first).cost[0]) or 1.0
+        return first
+
+    @property
+    def tolerance(self) -> float:
+        """Change of the cost, over that of the start, at which the program ends."""
+        return _TOLERANCE * self._accuracy
+
+    def values_of(self, unknowns: Array) -> Values:
+        """Free parameters of unknowns."""
+        parameters = self._problem.parameters
+        low, high = parameters.bounds.T
+        reals = low + unknowns[: len(low)] * (high - low)
+        return parameters.moved(self._start.values, np.clip(reals, low, high))
+
+    def point(self, unknowns: Array) -> Point:
+        """All that is asked at some unknowns; a design that poses alone differ at is made once."""
+        key = unknowns.tobytes()
+        if key not in self._points:
+            count = len(self._problem.parameters.real)
+            reals, poses = unknowns[:count].copy(), unknowns[count:].reshape(self._shape).copy()
+            design = next(
+                (p.design for p in self._points.values() if (p.reals == reals).all()), None
+            )
+            if design is None:
+                self.designs += 1
+                design = DesignPoint(self._problem, self.values_of(unknowns), self._accuracy)
+            if len(self._points) > 3:
+                self._points.pop(next(iter(self._points)))
+            self._points[key] = Point(design, reals, poses, self._goal, self._floors)
+        return self._points[key]
+
+    def cost(self, unknowns: Array) -> float:
+        """Cost over that of the start; that of a design that cannot exist is large."""
+        try:
+            cost = self.point(unknowns).cost_value / self._scale
+        except (InvalidDesign, InvalidInput):
+            return _WORSE
+        return cost if math.isfinite(cost) else _WORSE
+
+    def cost_slope(self, unknowns: Array) -> Array:
+        """Its derivatives."""
+        try:
+            return np.nan_to_num(self.point(unknowns).cost[1] / self._scale)
+        except (InvalidDesign, InvalidInput):
+            return np.zeros(len(unknowns))
+
+    def asked(self, kind: str, order: int) -> Callable[[Array], Array]:
+        """Equations ("eq") or rooms ("ineq"), or their derivatives (order 1)."""
+
+        def values(unknowns: Array) -> Array:
+            point = self.point(unknowns)
+            return (point.equations if kind == "eq" else point.rooms)[order]
+
+        return values

@@ -1,0 +1,160 @@
+"""Problem of a search: free parameters, requirements and goals; a design judged by them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, NamedTuple, Self
+
+import numpy as np
+
+from softreach.atlas.metric import MetricFailed
+from softreach.optimization.free_parameters import FreeParameters, Values
+from softreach.optimization.objectives import DesignCase, Goal, Value
+from softreach.requirements.findings import quick_excess
+from softreach.requirements.requirements import Requirements
+from softreach.support.errors import InvalidDesign, InvalidInput
+
+__all__ = ["Candidate", "Fidelity", "Problem"]
+
+Fidelity = Literal["bounds", "coarse", "full"]
+"""A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A design that was judged."""
+
+    values: Values
+    """Its free parameters."""
+    objectives: tuple[Value, ...] = ()
+    """One for each goal; none where requirements are missed."""
+    excess: float = 0.0
+    """Sum of what is missed, over L or relative; 0 if all requirements are met, infinite where no
+    such arm can exist."""
+    missed: Mapping[str, float] = field(default_factory=dict)
+    """Part of it by requirement."""
+    fidelity: Fidelity = "coarse"
+    fault: str = ""
+    """Reason why no such arm can exist, or why it has no such number."""
+    designs: int = 1
+    """Designs that were looked at for it."""
+
+    @property
+    def is_feasible(self) -> bool:
+        """True of an arm that meets all requirements and has all objectives."""
+        known = all(math.isfinite(value.value) for value in self.objectives)
+        return self.excess == 0.0 and not self.fault and known
+
+    def with_designs(self, designs: int) -> Self:
+        """The same, for which so many designs were looked at."""
+        return replace(self, designs=designs)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All but the values in plain ones; `from_dict` makes an equal one."""
+        return {
+            "objectives": [[*value] for value in self.objectives],
+            "excess": self.excess,
+            "missed": dict(self.missed),
+            "fidelity": self.fidelity,
+            "fault": self.fault,
+            "designs": self.designs,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Values, record: Mapping[str, Any]) -> Self:
+        """The candidate that `to_dict` described."""
+        objectives = tuple(Value(*pair) for pair in record["objectives"])
+        return cls(values=values, **{**record, "objectives": objectives})
+
+
+class Score(NamedTuple):
+    """Order of candidates of one goal, or of none: the least first."""
+
+    excess: float
+    cost: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """Everything that decides which design is best."""
+
+    parameters: FreeParameters
+    requirements: Requirements
+    goals: tuple[Goal, ...]
+    accuracy: float
+    """Relative error of volumes that are reported."""
+    coarse: float
+    """Relative error of volumes on the way."""
+
+    def case(self, values: Values, accuracy: float) -> DesignCase:
+        """The design with these values, to be asked to a relative error of volumes.
+
+        Raises:
+            InvalidDesign: No such arm can exist.
+        """
+        fine = accuracy <= self.accuracy
+        return DesignCase(self.parameters.arm(values), self.requirements, accuracy, fine)
+
+    def judge(self, values: Values, *, fine: bool = False) -> Candidate:
+        """A design against all requirements and goals: bounds first, which cost next to nothing."""
+        try:
+            case = self.case(values, self.accuracy if fine else self.coarse)
+        except InvalidDesign as error:
+            return Candidate(values=values, excess=math.inf, fidelity="bounds", fault=str(error))
+        findings = quick_excess(case.arm, self.requirements)
+        proved = {each.name: each.excess for each in findings if each.excess > 0.0}
+        if total := sum(proved.values()):
+            return Candidate(values=values, excess=total, missed=proved, fidelity="bounds")
+        return self.judged(values, case)
+
+    def judged(self, values: Values, case: DesignCase) -> Candidate:
+        """A design of which a case is known."""
+        fidelity: Fidelity = "full" if case.fine else "coarse"
+        try:
+            missed = {each.name: each.excess for each in case.check.findings if each.excess > 0.0}
+            if total := sum(missed.values()):
+                return Candidate(values=values, excess=total, missed=missed, fidelity=fidelity)
+            objectives = tuple(goal.value(case) for goal in self.goals)
+        except (InvalidInput, InvalidDesign, MetricFailed) as error:
+            # Nothing stable under these loads, or a number that this kind of arm does not have.
+            fault = str(error)
+            return Candidate(values=values, excess=math.inf, fidelity=fidelity, fault=fault)
+        lacking = [
+            goal.name
+            for goal, value in zip(self.goals, objectives, strict=True)
+            if not math.isfinite(value.value)
+        ]
+        fault = f"no {', '.join(lacking)}" if lacking else ""
+        return Candidate(values=values, objectives=objectives, fidelity=fidelity, fault=fault)
+
+    def costs(self, candidate: Candidate) -> tuple[float, ...]:
+        """Objectives to be made small, of a feasible design."""
+        pairs = zip(self.goals, candidate.objectives, strict=True)
+        return tuple(-goal.sense * value.value for goal, value in pairs)
+
+    def score(self, candidate: Candidate) -> Score:
+        """Place among others: what is missed first, then the only goal."""
+        if not candidate.is_feasible:
+            return Score(candidate.excess or math.inf, 0.0)
+        return Score(0.0, self.costs(candidate)[0] if self.goals else 0.0)
+
+    def front(self, candidates: Iterable[Candidate]) -> list[Candidate]:
+        """Feasible designs that no other one beats in every goal; the best alone for one goal.
+
+        Without a feasible design that which misses least.
+        """
+        every = list(candidates)
+        feasible = [each for each in every if each.is_feasible]
+        if not feasible or len(self.goals) < 2:
+            return [min(feasible or every, key=self.score)] if every else []
+        costs = np.array([self.costs(each) for each in feasible])
+        kept = [
+            k
+            for k, own in enumerate(costs)
+            if not ((costs <= own).all(axis=1) & (costs < own).any(axis=1)).any()
+            and not (costs[:k] == own).all(axis=1).any()
+        ]
+        kept.sort(key=lambda k: tuple(costs[k]))
+        return [feasible[k] for k in kept]

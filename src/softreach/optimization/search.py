@@ -1,0 +1,264 @@
+"""Search for the best designs: spread, polish, sample where it pays, judge the best again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.metric import Metric
+from softreach.optimization.free_parameters import free_parameters
+from softreach.optimization.objectives import goals
+from softreach.optimization.polish import Polished, can_polish, polished
+from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.result import Search
+from softreach.optimization.study import SAMPLERS, Sampler, Study
+from softreach.requirements.requirements import Requirements
+from softreach.support import parallel
+from softreach.support.arguments import (
+    as_function,
+    as_instance,
+    as_integer,
+    as_number,
+    as_one_of,
+    as_path,
+)
+from softreach.support.arrays import Array
+from softreach.support.progress import Progress, as_progress
+from softreach.workspace.reach import ACCURACIES
+
+__all__ = ["search"]
+
+_BATCH = 4  # designs asked together, whatever the number of threads, so that this changes nothing
+_COARSER = 10.0  # times the accuracy, on the way
+_COARSEST = 0.03
+_FIRST_SHARE = 0.25  # of all designs, before anything is known
+_ROUND_SHARE = 0.15  # of all designs, between polishes
+_POLISHES = 4  # side by side
+_DESIGNS_OF_POLISH = 30  # at most, as a rule
+_APART = 0.08  # of the ranges, in the mean: designs nearer to each other lead to the same end
+_LAST = 3  # designs that are judged to full accuracy
+
+
+def search(
+    base: Manipulator | Mapping[str, Manipulator],
+    free: Mapping[str, Any],
+    requirements: Requirements | None = None,
+    *,
+    maximize: str | Metric | Sequence[str | Metric] = (),
+    minimize: str | Metric | Sequence[str | Metric] = (),
+    choices: Mapping[str, Sequence[Any]] | None = None,
+    designs: int = 200,
+    accuracy: float = 3e-3,
+    polish: bool = True,
+    sampler: Sampler = "auto",
+    seed: int = 0,
+    storage: str | PathLike[str] | None = None,
+    follow: Callable[[Candidate], object] | None = None,
+    progress: Progress | None = None,
+) -> Search:
+    """The designs that meet requirements and are best in one objective or in several.
+
+    A design is judged by bounds first, which prove in a millisecond what it cannot do, then on
+    coarse sets. The first quarter of the designs is spread evenly over all ranges and choices; the
+    best of them are polished by quadratic programs on exact derivatives, in which the poses at the
+    targets move along with the design; then a sampler of Optuna (CMA-ES for numbers, TPE where
+    there are choices, NSGA-II for several objectives) looks where it pays, and the best of what it
+    finds are polished again. What is reported was computed again to full accuracy, the best
+    polished there once more.
+
+    Args:
+        base: The design to vary, or several by name, one of which is chosen.
+        free: Parameter -> range (low, high) in its SI unit, or text that ties it to a free one:
+            `{"left.revolution": (-3.1, 3.1), "right.revolution": "-left.revolution"}`. Names as
+            `arm.parameters` has them.
+        requirements: What every design must meet; None for nothing.
+        maximize: Objectives to make large: names of `OBJECTIVES`, or metrics of the atlas.
+        minimize: Objectives to make small. Without any objective the search is for a design that
+            meets the requirements, and ends with the first.
+        choices: Parameter -> values to choose from; `bundles` -> numbers of copies of the first
+            actuator; `material` -> names of materials.
+        designs: Number of designs that are looked at, with those of polishes.
+        accuracy: Relative error of the volumes that are reported.
+        polish: Whether designs are polished, where objectives have derivatives.
+        sampler: Sampler of Optuna: "cma", "tpe", "nsga2", "nsga3", "sobol", "random"; "auto"
+            chooses.
+        seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
+            number of threads.
+        storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
+            same call goes on where it was interrupted, and several processes work on one search.
+        follow: Called with each `Candidate` that was judged.
+        progress: Called with the number of designs since its last call.
+
+    Returns:
+        The best designs, the front of several objectives, and everything that was judged.
+
+    Raises:
+        InvalidInput: An argument out of range, an unknown parameter or objective, or a storage that
+            cannot be used or belongs to another search.
+        MissingExtra: Optuna is not installed.
+    """
+    needs = Requirements() if requirements is None else requirements
+    as_instance("requirements", needs, Requirements, "Requirements")
+    accuracy = as_number("accuracy", accuracy, ACCURACIES)
+    problem = Problem(
+        parameters=free_parameters(base, free, choices),
+        requirements=needs,
+        goals=goals(maximize, minimize, needs),
+        accuracy=accuracy,
+        coarse=min(_COARSER * accuracy, max(accuracy, _COARSEST)),
+    )
+    run = _Run(
+        problem,
+        as_integer("designs", designs, 1, 1_000_000),
+        follow=(lambda _: None) if follow is None else as_function("follow", follow),
+        progress=as_progress(progress),
+    )
+    run.polishes = bool(polish) and can_polish(problem)
+    study = Study(
+        problem,
+        storage=None if storage is None else as_path("storage", storage),
+        sampler=as_one_of("sampler", sampler, SAMPLERS),
+        seed=as_integer("seed", seed, 0, 2**31),
+        first=run.first,
+    )
+    return run.result(study)
+
+
+class _Run:
+    """One run of a search, with its budget."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        designs: int,
+        *,
+        follow: Callable[[Candidate], object],
+        progress: Progress,
+    ) -> None:
+        self.problem, self._designs = problem, designs
+        self._follow, self._progress = follow, progress
+        self.polishes = True
+        """Whether designs are polished."""
+        self._spent = 0
+        self._begun = time.perf_counter()
+        self._starts: list[Array] = []
+
+    @property
+    def first(self) -> int:
+        """Designs that are spread evenly."""
+        least = min(self._designs, 4 * len(self.problem.parameters))
+        return max(least, int(_FIRST_SHARE * self._designs))
+
+    def result(self, study: Study) -> Search:
+        """Search until the designs are spent, then judge the best again."""
+        known = study.candidates()
+        self._spent = sum(each.designs for each in known)
+        self._sample(study, self.first - len(known))
+        study.focus()
+        while not self._is_over(study):
+            self._polish(study)
+            if not self._is_over(study):
+                part = max(_BATCH, int(_ROUND_SHARE * self._designs))
+                self._sample(study, min(part, self._designs - self._spent))
+        every = study.candidates()
+        return Search(
+            problem=self.problem,
+            front=tuple(self._at_full_accuracy(every)),
+            candidates=tuple(every),
+            designs=self._spent,
+            seconds=time.perf_counter() - self._begun,
+        )
+
+    def _is_over(self, study: Study) -> bool:
+        if self._spent >= self._designs:
+            return True
+        return not self.problem.goals and any(c.is_feasible for c in study.candidates())
+
+    def _sample(self, study: Study, count: int) -> None:
+        """Designs of the sampler."""
+        while count > 0:
+            asked = study.ask(min(_BATCH, count))
+            count -= len(asked)
+            tasks = (partial(self._judged, values) for _, values in asked)
+            for (trial, _), candidate in zip(asked, parallel.in_order(tasks), strict=True):
+                study.tell(trial, candidate)
+                self._note(candidate)
+
+    def _judged(self, values: Any) -> Candidate:
+        with parallel.undivided():
+            return self.problem.judge(values)
+
+    def _polish(self, study: Study) -> None:
+        """Local optima next to the best designs that no polish has begun at."""
+        if not self.polishes:
+            return
+        room = max(1, (self._designs - self._spent) // _DESIGNS_OF_POLISH)
+        starts = self._chosen(study.candidates(), min(_POLISHES, room))
+        for end in parallel.in_order(partial(self._polished, start) for start in starts):
+            candidate = end.candidate.with_designs(end.designs)
+            study.add(candidate)
+            self._note(candidate)
+            self._starts.append(self._place(candidate))
+
+    def _polished(self, start: Candidate) -> Polished:
+        with parallel.undivided():
+            if len(self.problem.goals) < 2:
+                return polished(self.problem, start)
+            # One goal at a time, in turn, while the others stay as good as they are.
+            goal = len(self._starts) % len(self.problem.goals)
+            floors = self.problem.costs(start) if start.is_feasible else ()
+            return polished(self.problem, start, goal=goal, floors=floors)
+
+    def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
+        """The best designs that lie apart from each other and from ends of polishes."""
+        if len(self.problem.goals) > 1:
+            ordered = self.problem.front(candidates)
+        else:
+            judged = [each for each in candidates if np.isfinite(each.excess)]
+            ordered = sorted(judged, key=self.problem.score)
+        chosen: list[Candidate] = []
+        for candidate in ordered:
+            place = self._place(candidate)
+            if all(np.abs(place - start).mean() > _APART for start in self._starts):
+                chosen.append(candidate)
+                self._starts.append(place)
+            if len(chosen) == count:
+                break
+        return chosen
+
+    def _place(self, candidate: Candidate) -> Array:
+        """Place of a design in the ranges and choices, each from 0 to 1."""
+        place = []
+        for parameter in self.problem.parameters.free:
+            value = candidate.values[parameter.name]
+            if parameter.choices:
+                place.append(float(parameter.choices.index(value)))
+            else:
+                place.append((float(value) - parameter.low) / (parameter.high - parameter.low))
+        return np.array(place)
+
+    def _note(self, candidate: Candidate) -> None:
+        self._spent += candidate.designs
+        self._follow(candidate)
+        self._progress(candidate.designs)
+
+    def _at_full_accuracy(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """The best, polished on finer sets and judged as they are reported."""
+        problem, several = self.problem, len(self.problem.goals) > 1
+        best = problem.front(candidates)
+        if not several:
+            judged = [each for each in candidates if np.isfinite(each.excess)]
+            best = sorted(judged, key=problem.score)[:_LAST]
+            if self.polishes and best:
+                end = polished(
+                    problem, best[0], accuracy=min(_FINER * problem.accuracy, problem.coarse)
+                )
+                best.append(end.candidate)
+                self._spent += end.designs
+        return problem.front([problem.judge(each.values, fine=True) for each in best])

@@ -1,0 +1,269 @@
+"""Study of a search: designs asked of Optuna's samplers and told, in a storage that resumes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from softreach.optimization.free_parameters import FreeParameter, Values
+from softreach.optimization.problem import Candidate, Problem
+from softreach.support.arguments import as_one_of, as_path
+from softreach.support.errors import InvalidInput, MissingExtra, in_short
+
+if TYPE_CHECKING:
+    import optuna
+
+__all__ = ["SAMPLERS", "Sampler", "Study"]
+
+Sampler = Literal["auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random"]
+SAMPLERS = ("auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random")
+
+_NAME = "softreach"
+_MISSED = 1e12
+"""Cost of a design that misses requirements by 1: more than any objective has, as only the order
+matters to the samplers."""
+_NEVER = 1e15
+"""Cost of what cannot exist."""
+_JUDGED, _PROBLEM = "judged", "problem"
+
+
+class Study:
+    """Designs of a search: where they come from, and where they are kept."""
+
+    def __init__(
+        self, problem: Problem, *, storage: str | None, sampler: str, seed: int, first: int
+    ) -> None:
+        """Open the storage, or begin it with the first designs.
+
+        Args:
+            problem: The problem.
+            storage: File of a journal, or an SQLite file by its suffix `.db` or `.sqlite`; None for
+                memory alone.
+            sampler: One of `SAMPLERS`.
+            seed: Of the sampler.
+            first: Number of designs, evenly spread, that come before those of the sampler.
+
+        Raises:
+            InvalidInput: The storage cannot be opened or belongs to another search.
+            MissingExtra: Optuna is not installed.
+        """
+        self.problem, self._first = problem, first
+        self._sampler = as_one_of("sampler", sampler, SAMPLERS)
+        self._seed = seed
+        self._optuna = _library()
+        with _quiet():
+            self._study = self._opened(storage)
+            self._begin()
+
+    def ask(self, count: int) -> list[tuple[Any, dict[str, float | str]]]:
+        """Trials to be told, and their designs."""
+        space = {each.name: self._distribution(each) for each in self.problem.parameters.free}
+        with _quiet():
+            trials = [self._study.ask(space) for _ in range(count)]
+        return [(trial, dict(trial.params)) for trial in trials]
+
+    def tell(self, trial: Any, candidate: Candidate) -> None:
+        """Keep a design that was asked."""
+        with _quiet():
+            trial.set_user_attr(_JUDGED, candidate.to_dict())
+            self._study.tell(trial, self._costs(candidate))
+
+    def add(self, candidate: Candidate) -> None:
+        """Keep a design that came from elsewhere, such as a polish."""
+        space = {each.name: self._distribution(each) for each in self.problem.parameters.free}
+        params = {
+            each.name: float(np.clip(float(candidate.values[each.name]), each.low, each.high))
+            if each.is_real
+            else candidate.values[each.name]
+            for each in self.problem.parameters.free
+        }
+        with _quiet():
+            self._study.add_trial(
+                self._optuna.trial.create_trial(
+                    params=params,
+                    distributions=space,
+                    values=self._costs(candidate),
+                    user_attrs={_JUDGED: candidate.to_dict()},
+                )
+            )
+
+    def candidates(self) -> list[Candidate]:
+        """All designs that were judged, by this process or another, in their order."""
+        with _quiet():
+            trials = self._study.get_trials(deepcopy=False, states=self._complete)
+        return [
+            Candidate.from_dict(trial.params, trial.user_attrs[_JUDGED])
+            for trial in trials
+            if _JUDGED in trial.user_attrs
+        ]
+
+    def focus(self) -> None:
+        """Let a sampler that begins at one place begin where the best of the known designs are."""
+        if self._kind() != "cma":
+            return
+        with _quiet():
+            self._study.sampler = self._optuna.samplers.CmaEsSampler(
+                source_trials=self._study.get_trials(states=self._complete),
+                n_startup_trials=0,
+                seed=self._seed + 1,
+                warn_independent_sampling=False,
+            )
+
+    @property
+    def _complete(self) -> tuple[Any, ...]:
+        return (self._optuna.trial.TrialState.COMPLETE,)
+
+    def _opened(self, storage: str | None) -> optuna.Study:
+        optuna, place = self._optuna, None if storage is None else as_path("storage", storage)
+        try:
+            return optuna.create_study(
+                study_name=_NAME,
+                storage=None if place is None else _storage(optuna, place),
+                directions=["minimize"] * max(1, len(self.problem.goals)),
+                sampler=self._made_sampler(),
+                load_if_exists=True,
+            )
+        except InvalidInput:
+            raise
+        except Exception as error:
+            allowed = "a file that can be written, of this kind of search"
+            raise InvalidInput("storage", storage, allowed, in_short(error)) from error
+
+    def _begin(self) -> None:
+        """Note the problem and ask for the first designs; refuse the storage of another one."""
+        digest = _digest(self.problem)
+        known = self._study.user_attrs.get(_PROBLEM)
+        if known is not None:
+            if known != digest:
+                allowed = "one of the same designs, requirements and objectives"
+                raise InvalidInput("storage", "of another search", allowed, "choose another file")
+            return
+        for values in first_designs(self.problem, self._first, self._seed):
+            self._study.enqueue_trial(dict(values))
+        self._study.set_user_attr(_PROBLEM, digest)
+
+    def _kind(self) -> str:
+        """The sampler, chosen by what is free and how many goals there are."""
+        if self._sampler != "auto":
+            return self._sampler
+        if len(self.problem.goals) > 1:
+            return "nsga2" if len(self.problem.goals) < 4 else "nsga3"
+        real = all(each.is_real for each in self.problem.parameters.free)
+        return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
+
+    def _made_sampler(self) -> Any:
+        samplers, seed = self._optuna.samplers, self._seed
+        population = max(8, min(self._first, 48))
+        return {
+            "cma": lambda: samplers.CmaEsSampler(seed=seed, warn_independent_sampling=False),
+            "tpe": lambda: samplers.TPESampler(
+                seed=seed, multivariate=True, constant_liar=True, n_startup_trials=self._first
+            ),
+            "nsga2": lambda: samplers.NSGAIISampler(seed=seed, population_size=population),
+            "nsga3": lambda: samplers.NSGAIIISampler(seed=seed, population_size=population),
+            "sobol": lambda: samplers.QMCSampler(
+                seed=seed, scramble=True, warn_independent_sampling=False
+            ),
+            "random": lambda: samplers.RandomSampler(seed=seed),
+        }[self._kind()]()
+
+    def _distribution(self, parameter: FreeParameter) -> Any:
+        kinds = self._optuna.distributions
+        if parameter.choices:
+            return kinds.CategoricalDistribution(parameter.choices)
+        if parameter.whole:
+            return kinds.IntDistribution(int(parameter.low), int(parameter.high))
+        return kinds.FloatDistribution(parameter.low, parameter.high)
+
+    def _costs(self, candidate: Candidate) -> list[float]:
+        """What the samplers make small: objectives, or what is missed before all of them."""
+        if candidate.is_feasible and self.problem.goals:
+            return [*self.problem.costs(candidate)]
+        if not self.problem.goals and not candidate.fault:
+            return [candidate.excess]
+        missed = min(_MISSED * (1.0 + candidate.excess), _NEVER)
+        return [missed] * max(1, len(self.problem.goals))
+
+
+def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
+    """Designs evenly spread over all ranges and choices, after the one that the user has."""
+    from scipy.stats import qmc
+
+    start = problem.parameters.start()
+    if start is not None:
+        yield start
+    free = problem.parameters.free
+    sampler = qmc.Sobol(len(free), rng=np.random.default_rng(seed))
+    cube = sampler.random(1 << max(0, math.ceil(math.log2(max(count, 1)))))[:count]
+    for place in cube:
+        yield {each.name: _at(each, float(x)) for each, x in zip(free, place, strict=True)}
+
+
+def _at(parameter: FreeParameter, place: float) -> float | str | int:
+    """A value of a parameter from a place between 0 and 1."""
+    if parameter.choices:
+        return parameter.choices[
+            min(int(place * len(parameter.choices)), len(parameter.choices) - 1)
+        ]
+    if parameter.whole:
+        low, high = int(parameter.low), int(parameter.high)
+        return min(low + int(place * (high - low + 1)), high)
+    return parameter.low + place * (parameter.high - parameter.low)
+
+
+def _digest(problem: Problem) -> str:
+    """Fingerprint of all that decides what a design is worth."""
+    parameters = problem.parameters
+    record = {
+        "bases": {name: arm.to_toml() for name, arm in parameters.bases.items()},
+        "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
+        "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
+        "requirements": problem.requirements.to_toml(),
+        "goals": [[goal.name, goal.sense] for goal in problem.goals],
+    }
+    text = json.dumps(record, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _storage(optuna: Any, place: str) -> Any:
+    path = Path(place)
+    if not path.parent.is_dir() or path.is_dir():
+        allowed = "a file in a folder that exists"
+        raise InvalidInput("storage", place, allowed)
+    if path.suffix in (".db", ".sqlite", ".sqlite3"):
+        return f"sqlite:///{path}"
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
+    return JournalStorage(JournalFileBackend(str(path)))
+
+
+def _library() -> Any:
+    try:
+        import cmaes  # pyright: ignore[reportUnusedImport]  # noqa: F401
+        import optuna
+    except ImportError as error:
+        raise MissingExtra(("optuna", "search"), ("cmaes", "search")) from error
+    return optuna
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what Optuna logs for people who use it themselves."""
+    optuna = _library()
+    before = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+            yield
+    finally:
+        optuna.logging.set_verbosity(before)
