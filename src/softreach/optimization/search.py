@@ -256,9 +256,7 @@ class _Run:
             judged = [each for each in candidates if np.isfinite(each.excess)]
             best = sorted(judged, key=problem.score)[:_LAST]
             if self.polishes and best:
-                end = polished(
-                    problem, best[0], accuracy=min(_FINER * problem.accuracy, problem.coarse)
-                )
+                end = polished(problem, best[0], accuracy=problem.accuracy)
                 best.append(end.candidate)
                 self._spent += end.designs
         return problem.front([problem.judge(each.values, fine=True) for each in best])
