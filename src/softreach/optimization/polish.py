@@ -19,7 +19,8 @@ __all__ = ["Polished", "can_polish", "polished"]
 
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
-_TOLERANCE = 0.01  # of the accuracy
+_TOLERANCE = 0.003  # of the accuracy
+_GENTLE = 0.1  # of the cost: the first step is along its slope, and as long
 _WORSE = 10.0  # times the cost of the start: a design that cannot exist
 
 
@@ -129,13 +130,13 @@ class _Program:
             poses = np.clip(box.to_cube(box.clip(gamma))[:, box.free], 0.0, 1.0)
         self._shape = poses.shape
         first = np.concatenate([np.clip(reals, 0.0, 1.0), poses.ravel()])
-        self._scale = abs(self.point(first).cost[0]) or 1.0
+        self._scale = (abs(self.point(first).cost[0]) or 1.0) / _GENTLE
         return first
 
     @property
     def tolerance(self) -> float:
         """Change of the cost, over that of the start, at which the program ends."""
-        return _TOLERANCE * self._accuracy
+        return _TOLERANCE * self._accuracy * _GENTLE
 
     def values_of(self, unknowns: Array) -> Values:
         """Free parameters of unknowns."""
