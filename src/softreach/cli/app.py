@@ -1,6 +1,7 @@
 """The `softreach` command and what its exit codes mean.
 
-0 done, 2 wrong input or nowhere to write, 141 nobody reads the output any more, 128 + signal.
+0 done, 1 a requirement is missed (`check`), 2 wrong input or nowhere to write, 141 nobody reads the
+output any more, 128 + signal.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
 _COMMANDS = (
-    (Group("Design", sort_key=-6), ("design", "list", "studio")),
+    (Group("Design", sort_key=-6), ("design", "check", "list", "studio")),
     (Group("Bench", sort_key=-5.5), ("plan-poses", "calibrate")),
     (Group("Reach", sort_key=-5), ("reach", "cloud", "volume", "payload", "gradient")),
     (Group("Places", sort_key=-4), ("solve", "track", "equilibria")),
@@ -101,17 +102,16 @@ def _start(
             "run. May be repeated.",
         ),
     ] = None,
-) -> None:
+) -> int | None:
     """Say how much is printed, import what is the user's own, then run the command."""
     if quiet and verbose:
         raise InvalidInput("quiet", quiet, "left out with --verbose")
     console.set(quiet=quiet, verbose=verbose)
     if not imports:
-        app(words, result_action="return_value")
-        return
+        return app(words, result_action="return_value")
     with importing(imports):
         _check_kinds()
-        app(words, result_action="return_value")
+        return app(words, result_action="return_value")
 
 
 def _check_kinds() -> None:
@@ -130,7 +130,7 @@ def run(arguments: list[str]) -> int:
         try:
             if not _NAMES & {*arguments}:
                 _ = [app[name] for name in _NAMES]  # imports them: help lists their docstrings
-            app.meta(arguments, result_action="return_value")
+            code = app.meta(arguments, result_action="return_value")
             console.flush()
         except BrokenPipeError:
             console.discard()
@@ -145,7 +145,7 @@ def run(arguments: list[str]) -> int:
         except KeyboardInterrupt as error:
             console.error("; ".join([INTERRUPTED, *getattr(error, "__notes__", ())]))
             return 130
-    return 0
+    return code or 0
 
 
 def _message(error: Exception) -> str:

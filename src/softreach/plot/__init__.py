@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from softreach.plot.arm import DesignPanel, plot_arm, plot_designs
 from softreach.plot.calibration import plot_calibration
+from softreach.plot.check import plot_check
 from softreach.plot.clouds import plot_cloud, plot_slab, plot_views
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.curvature import plot_curvature
@@ -27,6 +28,7 @@ __all__ = [
     "plot_3d",
     "plot_arm",
     "plot_calibration",
+    "plot_check",
     "plot_cloud",
     "plot_cloud_sheet",
     "plot_compliance",

@@ -23,12 +23,14 @@ from softreach.requirements.findings import (
     with_payload,
 )
 from softreach.requirements.poses import PoseRules, worst_pose
+from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Keep, Requirements, Target
+from softreach.rod.kinematics import configuration
 from softreach.rod.rods import tip_map
 from softreach.schema import AXES, provenance
 from softreach.support import parallel
-from softreach.support.arguments import as_instance, as_number
-from softreach.support.arrays import Array, Index
+from softreach.support.arguments import as_instance, as_integer, as_number
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidInput, Range, no_warnings
 from softreach.support.progress import Progress, as_progress
 from softreach.support.units import LengthUnit
@@ -168,10 +170,36 @@ class Check:
         counts = [0 if t.places is None else len(t.places) for t in self.requirements.targets]
         return np.repeat(np.arange(len(counts)), counts)
 
-    @cached_property
-    def reached(self) -> np.ndarray:
+    @property
+    def reached(self) -> Mask:
         """Mask of the places that are met, shape (payload, place)."""
         return self.gaps <= np.maximum(_within(self.requirements), _TOL * self.arm.length)
+
+    @property
+    def regions(self) -> tuple[tuple[str, Region], ...]:
+        """Regions with what they are for: "stay_inside", "avoid" or "cover"."""
+        kept = ((keep.kind, keep.region) for keep in self.requirements.keeps)
+        targets = (target.region for target in self.requirements.targets)
+        return (*kept, *(("cover", region) for region in targets if region is not None))
+
+    def shapes(self, count: int) -> xr.Dataset | None:
+        """The arm in poses of some places that are apart, under the largest payload.
+
+        Args:
+            count: Number of poses at most.
+
+        Returns:
+            As `configuration` has them; None where there are no places.
+        """
+        count = as_integer("count", count, 0)
+        rows = np.unique(np.linspace(0, len(self.places) - 1, count).round().astype(int))
+        rows = rows[rows >= 0] if len(self.places) else rows[:0]
+        if not len(rows):
+            return None
+        arm = with_payload(self.arm, self.payloads[-1])
+        shapes = configuration(arm, self.poses[-1, rows])
+        held = np.isfinite(shapes["position"].values).all(axis=(1, 2))
+        return shapes.isel(sample=held) if held.any() else None
 
     def __repr__(self) -> str:
         missed = sum(not finding.met for finding in self.findings)
@@ -336,7 +364,7 @@ def _coverage(
     return Coverage(target.name, payload, share, error, count)
 
 
-def _reachable(arm: Manipulator, places: Array, within: float, accuracy: float) -> np.ndarray:
+def _reachable(arm: Manipulator, places: Array, within: float, accuracy: float) -> Mask:
     """Mask of the places that the tip reaches, whatever the pose."""
     try:
         with no_warnings():
@@ -395,8 +423,8 @@ def _reach_findings(
         yield Finding(target.name, "reach", False, excess, text + more)
 
 
-def _length(value: float, unit: LengthUnit) -> str:
-    return f"{value / unit.size:.4g} {unit.name}"
+def _length(value: float, unit: LengthUnit, digits: int = 4) -> str:
+    return f"{value / unit.size + 0.0:.{digits}g} {unit.name}"  # + 0.0: no minus before 0
 
 
 def _cover_findings(made: Check) -> Iterator[Finding]:
@@ -458,7 +486,7 @@ def _kept(
 ) -> Finding:
     """How far a region is missed, or by how much it is kept to."""
     of = "the tip" if keep.of == "tip" else "the arm"
-    close = f" (to {_length(error, unit)})" if keep.of == "arm" else ""
+    close = f" (to {_length(error, unit, 2)})" if keep.of == "arm" else ""
     if excess > 0.0:
         beyond = "outside" if keep.inside else "inside or too near"
         text = f"{of} is {_length(value, unit)}{close} {beyond} {where}"

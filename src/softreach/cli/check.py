@@ -1,0 +1,95 @@
+"""`softreach check`: a design against what it is for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import (
+    OUTPUT,
+    AsJson,
+    Design,
+    Overwrite,
+    Unit,
+    check_picture,
+    out_option,
+    refuse,
+)
+from softreach.cli.values import NUMBER
+
+if TYPE_CHECKING:
+    from softreach.requirements import Check
+
+
+def check(
+    design: Design,
+    needs: Annotated[Path, Parameter(help="Requirements (.toml).")],
+    /,
+    *,
+    accuracy: Annotated[
+        float, NUMBER, Parameter(help="Error of shares that are covered, and of volumes.")
+    ] = 1e-2,
+    changes: Changes = UNCHANGED,
+    out: Annotated[Path | None, out_option("Draw the arm at the places (.png .pdf .svg).")] = None,
+    view: Annotated[
+        str | None,
+        Parameter(group=OUTPUT, help="oblique (if left out), front, side or top."),
+    ] = None,
+    overwrite: Overwrite = False,
+    unit: Unit = None,
+    json: AsJson = False,
+) -> int:
+    """Check a design against requirements: met or missed, and by how much.
+
+    Places to reach, regions to stay in or to avoid, payloads, limits, measures;
+    for what is missed, how far, which bounds hold the arm back, and what it would
+    take. The exit code is 0 if all is met and 1 if not.
+
+    Example: softreach check arm.toml needs.toml --out check.png
+    """
+    from softreach.picture.projection import view_angles
+    from softreach.requirements import Requirements
+    from softreach.requirements import check as checked
+    from softreach.support import progress
+
+    arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
+    if view is not None:
+        view_angles(view)
+    if out is None:
+        refuse("left out without a picture: give --out check.png too", view=view)
+    check_picture(out, overwrite)
+    requirements = Requirements.load(needs, length=arm.length)
+    shown = arm.replace(display_unit=lengths.unit.name)
+    with progress.bar("checking", None) as step:
+        result = checked(shown, requirements, accuracy=accuracy, progress=step)
+    if json:
+        console.json(_record(result, lengths))
+    else:
+        console.line(result)
+    if out is not None:
+        from softreach.plot import plot_check, save_figure
+
+        axes: Any = plot_check(result, view=view or "oblique", unit=lengths.unit)
+        save_figure(axes.figure, out, overwrite=overwrite)
+    return 0 if result.met else 1
+
+
+def _record(result: Check, lengths: Lengths) -> dict[str, object]:
+    """The result for machines."""
+    return {
+        "met": result.met,
+        "excess": result.excess,
+        "findings": [vars(finding) for finding in result.findings],
+        "payloads_kg": list(result.payloads),
+        **lengths.record("places", result.places.tolist()),
+        **lengths.record("gaps", result.gaps.tolist()),
+        "poses": result.poses.tolist(),
+        "effort": result.effort.tolist(),
+        "coverages": [coverage._asdict() for coverage in result.coverages],
+    }

@@ -1,0 +1,276 @@
+"""Laws of the check of a design against requirements."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import softreach as sr
+from softreach.requirements import (
+    Box,
+    HalfSpace,
+    Keep,
+    Limits,
+    Requirements,
+    Sphere,
+    Target,
+    quick_excess,
+)
+from tests.laws import arms
+
+ARM = sr.designs.minimal_trunk()
+GAMMA = np.random.default_rng(5).uniform(-1.6, 0.0, (5, 3))
+TIPS = sr.tip_positions(ARM, GAMMA)
+SOFT = sr.Material(young_modulus=1e6, density=1000.0)
+
+
+def checked(arm=ARM, **parts):
+    return sr.check(arm, Requirements(**parts))
+
+
+def test_places_that_are_tips_are_met_with_no_more_effort_than_that_took():
+    check = checked(targets=[Target(TIPS)])
+    assert check.met
+    assert check.gaps.shape == (1, 5)
+    assert (check.gaps < 1e-9).all()
+    np.testing.assert_allclose(sr.tip_positions(ARM, check.poses[0]), TIPS, atol=1e-9)
+    largest = np.abs(ARM.bounds).max(axis=1)
+    assert (check.effort[0] <= np.linalg.norm(GAMMA / largest, axis=1) + 1e-9).all()
+
+
+def test_a_place_out_of_reach_is_missed_by_its_distance_from_the_reachable_set():
+    away = TIPS * 1.5
+    check = checked(targets=[Target(away, name="far")])
+    distance = sr.reachable_set(ARM, accuracy=0.01).distance(away).clip(0.0)
+    np.testing.assert_allclose(check.gaps[0], distance, atol=4e-3)
+    (finding,) = check.findings
+    assert not finding.met
+    assert finding.excess == pytest.approx(check.gaps.max() / ARM.length)
+    assert "of 5 places reached" in finding.text
+    assert checked(targets=[Target(away, within=check.gaps.max() * 1.001)]).met
+    assert not checked(targets=[Target(away, within=check.gaps.max() * 0.999)]).met
+
+
+def test_a_finding_is_met_where_its_excess_is_zero_and_the_check_where_all_are():
+    needs = dict(
+        targets=[Target(TIPS, name="near"), Target([2.0, 0.0, 0.0], name="far")],
+        keeps=[
+            Keep(Box((-1, -1, 0), (2, 1, 0.8)), True, name="low", of="tip", when="always"),
+            Keep(Sphere((0, 0, 3), 1.0), False, name="lamp"),
+        ],
+        limits=Limits(actuators=2, bending=2.0, shortening=0.01),
+        measures={"exact_volume": (10.0, None), "reach_height": (None, 10.0)},
+    )
+    check = checked(**needs)
+    for finding in check.findings:
+        assert finding.met == (finding.excess == 0.0)
+        assert np.isfinite(finding.excess)
+    verdicts = {finding.name: finding.met for finding in check.findings}
+    assert verdicts == {
+        "near": True,
+        "far": False,
+        "low": False,
+        "lamp": True,
+        "actuators": False,
+        "shortening": False,
+        "bending κR2": True,
+        "exact_volume": False,
+        "reach_height": True,
+    }
+    assert not check.met
+    assert repr(check).startswith("Requirements of an arm of 1 m: missed, 5 of 9")
+    data = check.to_dataset()
+    assert data.met.values.tolist() == [finding.met for finding in check.findings]
+    assert data.pose.dims == ("payload", "place", "input")
+    assert data.reached.values.tolist() == [[True] * 5 + [False]]
+
+
+def needs_of(places, factor=1.0, move=lambda x: x, turn=lambda x: x):
+    center, point = move(factor * np.array([[0.3, 0.1, 0.5], [0, 0, 0.55]]))
+    return Requirements(
+        targets=[Target(move(factor * places))],
+        keeps=[
+            Keep(Sphere(center, 0.25 * factor), False),
+            Keep(
+                HalfSpace(point, turn(np.array([[0.1, 0.2, 1.0]]))[0]),
+                True,
+                clearance=0.01 * factor,
+            ),
+        ],
+        limits=Limits(shortening=0.2, bending=0.3),
+    )
+
+
+PLACES = TIPS * np.array([1.0, 1.0, 0.7])
+
+
+def same(one, other, factor=1.0):
+    np.testing.assert_allclose(other.gaps, factor * one.gaps, atol=1e-7)
+    excess = [[finding.excess for finding in check.findings] for check in (one, other)]
+    np.testing.assert_allclose(*excess, atol=1e-5)
+
+
+def test_arm_places_and_regions_scale_together():
+    small = sr.designs.minimal_trunk(length=0.2)
+    same(sr.check(ARM, needs_of(PLACES)), sr.check(small, needs_of(PLACES, 0.2)), 0.2)
+
+
+def test_base_and_requirements_turn_together():
+    base = sr.Base(points="x", position=(0.3, -2.0, 1.0))
+    moved = needs_of(PLACES, 1.0, base.to_world, base.directions_to_world)
+    same(sr.check(ARM, needs_of(PLACES)), sr.check(ARM.replace(base=base), moved))
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_the_whole_arm_keeps_to_a_region_as_its_skin_does(inside):
+    """Against points all over the skin, of each pose; the stated error bounds what is between."""
+    region = Sphere((0.1, 0.0, 0.4), 0.5) if inside else Sphere((0.35, 0.1, 0.4), 0.1)
+    needs = Requirements(targets=[Target(TIPS, within=3.0)], keeps=[Keep(region, inside, of="arm")])
+    # Places that the region forbids are no contradiction here: the tip need not come near.
+    check = sr.check(ARM, needs, accuracy=1e-3)
+    shapes = sr.configuration(ARM, check.poses[0], 1001)
+    angle = np.linspace(0, 2 * np.pi, 60)[:, None, None, None]
+    first, second = (shapes.directors.values[:, :, k] for k in (0, 1))
+    radius = shapes.radius.values[:, None]
+    skin = shapes.position.values + radius * (np.cos(angle) * first + np.sin(angle) * second)
+    distance = region.distance(skin.reshape(-1, 3)) * (1 if inside else -1)
+    finding = check.findings[-1]
+    assert finding.excess == pytest.approx(max(distance.max(), 0.0), abs=2e-3)
+
+
+def test_the_pose_that_keeps_to_a_region_is_chosen_where_there_are_several():
+    arm = sr.designs.redundant_trunk()
+    places = sr.tip_positions(arm, np.full((1, arm.bundles), -0.6))
+    free = sr.check(arm, Requirements(targets=[Target(places)]))
+    middle = sr.configuration(arm, free.poses[0, 0], [0.6 * arm.length]).position.values[0]
+    beside = middle + np.array([0.0, 0.0, 0.0])
+    others = sr.solve_inverse(arm, places, family=16).activations
+    apart = sr.configuration(arm, others, [0.6 * arm.length]).position.values[:, 0] - beside
+    room = np.linalg.norm(apart, axis=1).max() - float(arm.profile.radius(0.6 * arm.length))
+    assert room > 0.0  # else no pose keeps away
+    needs = Requirements(targets=[Target(places)], keeps=[Keep(Sphere(beside, 0.3 * room), False)])
+    check = sr.check(arm, needs)
+    assert check.effort[0, 0] > free.effort[0, 0]
+    assert check.findings[0].met
+    assert check.findings[1].excess < 0.3 * room / arm.length
+
+
+def test_bounds_that_are_said_to_reach_a_place_reach_it():
+    import re
+
+    narrow = ARM.with_bounds(0.6 * ARM.bounds)
+    wanted = sr.tip_positions(ARM, 0.9 * ARM.bounds[:, :1].T)
+    text = sr.check(narrow, Requirements(targets=[Target(wanted)])).findings[0].text
+    told = re.findall(r"a (lower|n upper) bound of ([\w ]+?) at (\S+) instead", text)
+    assert told
+    bounds = narrow.bounds.copy()
+    for end, name, value in told:
+        bounds[ARM.input_names.index(name), 0 if end == "lower" else 1] = float(value)
+    gap = sr.check(narrow.with_bounds(bounds), Requirements(targets=[Target(wanted)])).gaps
+    assert gap.max() < 1e-3
+
+
+def test_the_worst_pose_is_found_among_all_within_the_bounds():
+    keep = Keep(HalfSpace((0, 0, 0.4), (1.0, 0.0, 0.3)), True, of="tip", when="always")
+    (finding,) = checked(keeps=[keep]).findings
+    box = ARM.bounds
+    samples = box[:, 0] + np.random.default_rng(0).random((20_000, 3)) * (box[:, 1] - box[:, 0])
+    worst = keep.missed(sr.tip_positions(ARM, samples)).max()
+    assert finding.excess >= worst
+    assert finding.excess == pytest.approx(worst, rel=0.05)
+
+
+def test_the_share_of_a_region_is_that_of_its_volume():
+    reached = sr.reachable_set(ARM, accuracy=0.01)
+    low, high = reached.surface().vertices.min(axis=0), reached.surface().vertices.max(axis=0)
+    box = Box(low, high)
+    target = Target(region=box, share=0.2)
+    open_check = checked(targets=[target])
+    share = reached.volume / box.volume
+    (coverage,) = open_check.coverages
+    assert abs(coverage.share - share) < 3 * coverage.error
+    assert open_check.met == (coverage.share >= 0.2)
+    # The same by single poses, which a limit that nothing breaks asks for.
+    by_poses = sr.check(
+        ARM, Requirements(targets=[target], limits=Limits(bending=50.0)), accuracy=0.03
+    )
+    assert abs(by_poses.coverages[0].share - share) < 4 * by_poses.coverages[0].error
+
+
+def test_limits_without_targets_are_those_of_all_bounds():
+    from softreach.arm.bending import sharpest_bending
+
+    (finding,) = checked(limits=Limits(bending=0.1)).findings
+    assert finding.excess == pytest.approx(sharpest_bending(ARM).value / 0.1 - 1.0)
+    tendons = sr.designs.three_tendon_robot()
+    most = np.abs(tendons.bounds).max()
+    for name in ("force", "stroke"):
+        (finding,) = checked(tendons, limits=Limits(**{name: 0.5 * most})).findings
+        expected = 1.0 if tendons.bundle_units[0] == {"force": "N", "stroke": "m"}[name] else 0.0
+        assert finding.excess == pytest.approx(expected)
+
+
+def test_more_payloads_are_never_less_to_ask_for():
+    arm = sr.designs.minimal_trunk(material=SOFT, length=0.3).replace(loads=sr.Loads())
+    places = sr.tip_positions(arm, [[-0.4, -0.2, -0.1], [0.0, -0.3, -0.5]])
+    gaps = {}
+    for payloads in ((0.0,), (0.05,), (0.0, 0.05)):
+        check = sr.check(arm, Requirements(targets=[Target(places)], payloads=payloads))
+        gaps[payloads] = check.gaps
+        assert check.excess >= 0.0
+    np.testing.assert_allclose(
+        gaps[0.0, 0.05], np.concatenate([gaps[0.0,], gaps[0.05,]]), atol=1e-12
+    )
+
+
+def test_a_payload_that_nothing_holds_is_missed_and_not_an_error():
+    arm = sr.designs.minimal_trunk(material=sr.Material(young_modulus=1e3, density=1000.0))
+    arm = arm.replace(loads=sr.Loads(gravity=(0, 0, -9.81)))
+    check = sr.check(arm, Requirements(targets=[Target([0, 0, 1.0])], payloads=[100.0]))
+    assert not check.met
+    assert np.isfinite(check.excess)
+    assert np.isfinite(check.gaps).all()
+
+
+@settings(max_examples=25)
+@given(arm=arms(), seed=st.integers(0, 1000))
+def test_what_is_refused_at_once_is_missed_by_at_least_as_much(arm, seed):
+    rng = np.random.default_rng(seed)
+    places = rng.normal(size=(3, 3)) * arm.length * rng.uniform(0.5, 3.0)
+    needs = Requirements(
+        targets=[Target(places, name="near", within=0.05 * arm.length * rng.random())],
+        limits=Limits(actuators=int(rng.integers(0, 4))),
+    )
+    refused = quick_excess(arm, needs)
+    if not refused:
+        return
+    found = {finding.name: finding for finding in sr.check(arm, needs).findings}
+    for finding in refused:
+        assert not found[finding.name].met
+        assert finding.excess <= found[finding.name].excess + 1e-9
+
+
+def test_no_tip_is_farther_than_the_longest_arm():
+    from softreach.requirements.findings import longest_reach
+
+    arm = ARM.with_bounds((0.0, 0.8))  # which lengthens
+    tips = sr.tip_positions(arm, np.full((1, 3), 0.8))
+    straight = sr.designs.minimal_trunk()
+    assert np.linalg.norm(tips) <= longest_reach(arm)
+    assert longest_reach(straight) == pytest.approx(straight.length, rel=1e-5)
+
+
+def test_many_places_are_met_in_blocks_that_change_nothing(monkeypatch):
+    from softreach.requirements import checks
+
+    tips = sr.tip_positions(ARM, np.random.default_rng(0).uniform(-1.6, 0, (64, 3)))
+    needs = Requirements(targets=[Target(tips * 1.1)], limits=Limits(bending=0.3))
+    done = []
+    one = sr.check(ARM, needs, progress=done.append)
+    assert sum(done) == 64
+    monkeypatch.setattr(checks, "_BLOCK", 10)
+    other = sr.check(ARM, needs)
+    np.testing.assert_array_equal(one.poses, other.poses)
+    np.testing.assert_array_equal(one.gaps, other.gaps)
