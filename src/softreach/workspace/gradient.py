@@ -27,7 +27,7 @@ from softreach.workspace.boundary_samples import (
 )
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
 from softreach.workspace.image import Image
-from softreach.workspace.measure import Estimate, outer_vertices
+from softreach.workspace.measure import FLUX_PART, Estimate, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.redundant import cloud_on_faces, not_among
 from softreach.workspace.shifts import Shifts, shifts_along
@@ -37,7 +37,6 @@ from softreach.workspace.tip_derivatives import TipDerivatives
 if TYPE_CHECKING:
     import xarray as xr
 
-_FLUX_PART = 0.01  # of the accuracy: relative error of what flows through the faces
 _LINES = 2  # times as many lines of sight along each direction as for the volume itself
 _TOL = 3e-10  # in L, of what the flux alone tells
 _HULL_CELLS = 28  # along each edge of the box, of which corners of a hull are at least
@@ -203,16 +202,20 @@ def _flux(solid: ReachableSolid, accuracy: float) -> Flux | None:
     """What flows through the faces of three bundles' box, as exactly as the route asks for."""
     if solid.route == "search":
         return None
-    enough = 0.0 if solid.route == "flux" else _FLUX_PART * accuracy
+    enough = 0.0 if solid.route == "flux" else FLUX_PART * accuracy
     return signed_volume(solid.tip_map, enough=enough)
 
 
 def _volume(solid: ReachableSolid, flux: Flux | None, tips: TipDerivatives) -> _Swept:
     """Derivatives of the volume: what is told by the flux, and what lines of sight add to it."""
     if flux is None:
-        swept = _sum(boundary_samples(solid.image), tips)
-        missing = solid.volume_error / solid.volume if solid.volume else np.inf
-        return swept._replace(error=swept.error + missing * np.abs(swept.value))
+        nodes = boundary_samples(solid.image)
+        slopes = tips.at(nodes.cube)
+        swept = np.abs(np.einsum("ni,nip->np", nodes.area, slopes)).sum(axis=0)
+        # What no search meets may have as much of the boundary as of the volume.
+        missing = solid.volume_error / solid.volume * swept
+        error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())
+        return _Swept(nodes.derivative(slopes), nodes.noise(slopes) + missing + error)
     sense = 1 if flux.value >= 0 else -1
     slopes = tips.at(flux.faces.cube)
     through = sense * np.einsum("ni,nip->np", flux.area, slopes)
@@ -322,7 +325,7 @@ def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
     gamma, tips = cloud_on_faces(rod, 0)
     gamma = gamma[not_among(cells.reached, cells.lattice, tips)]
     gamma = np.concatenate([cells.crossings.beyond, gamma])
-    tips, cube = rod.tips(gamma), box.to_cube(gamma)[:, box.free]
+    tips, cube = rod.tips(gamma), box.to_cube(gamma)[:, box.free].clip(0.0, 1.0)
     return HullCorners.of(tips, cube), HullCorners.of(tips[::4], cube[::4])
 
 
