@@ -130,7 +130,7 @@ def _of_cells(cells: ReachedCells) -> BoundarySamples:
     area = np.zeros((len(every), 3))
     area[every, edges.axis] = lattice.cell**2 * edges.sense
     return BoundarySamples(
-        rod.box.to_cube(crossings.beyond)[:, rod.box.free],
+        rod.box.to_cube(crossings.beyond)[:, rod.box.free].clip(0.0, 1.0),
         crossings.points(every, crossings.place),
         area,
         _group(edges.axis, i, j),

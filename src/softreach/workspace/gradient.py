@@ -12,6 +12,8 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.geometry.hull import convex_hull
 from softreach.rod.rods import refined, tip_map
+from softreach.rod.tip_map import TipMap
+from softreach.rod.view import stable_tips
 from softreach.schema import provenance
 from softreach.support.arguments import as_names, as_number
 from softreach.support.arrays import Array, Index
@@ -25,7 +27,7 @@ from softreach.workspace.boundary_samples import (
 )
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
 from softreach.workspace.image import Image
-from softreach.workspace.measure import Estimate, outer_vertices
+from softreach.workspace.measure import FLUX_PART, Estimate, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.redundant import cloud_on_faces, not_among
 from softreach.workspace.shifts import Shifts, shifts_along
@@ -35,9 +37,10 @@ from softreach.workspace.tip_derivatives import TipDerivatives
 if TYPE_CHECKING:
     import xarray as xr
 
-_FLUX_PART = 0.01  # of the accuracy: relative error of what flows through the faces
 _LINES = 2  # times as many lines of sight along each direction as for the volume itself
-_HULL_GRID = 2  # times as many cells along each edge of the box as for the convex volume itself
+_TOL = 3e-10  # in L, of what the flux alone tells
+_HULL_CELLS = 28  # along each edge of the box, of which corners of a hull are at least
+_AROUND = np.indices((3, 3, 3)).reshape(3, -1).T - 1
 _RASTER_STEP = 2e-2  # of a parameter, where neighbors are rasterized, which is rough
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
 _MEANINGS = {
@@ -190,7 +193,7 @@ def _swept(
     flux = _flux(solid, accuracy)
     if solid.route == "flux" or rod.supports_unstable:
         rod = refined(rod, flux_tol(rod))
-    tips = TipDerivatives(rod, parameters)
+    tips = TipDerivatives(rod, parameters, _TOL)
     volume = _volume(solid, flux, tips)
     return volume, _limit(*(_sum(each, tips) for each in hull_corners(solid)))
 
@@ -199,16 +202,20 @@ def _flux(solid: ReachableSolid, accuracy: float) -> Flux | None:
     """What flows through the faces of three bundles' box, as exactly as the route asks for."""
     if solid.route == "search":
         return None
-    enough = 0.0 if solid.route == "flux" else _FLUX_PART * accuracy
+    enough = 0.0 if solid.route == "flux" else FLUX_PART * accuracy
     return signed_volume(solid.tip_map, enough=enough)
 
 
 def _volume(solid: ReachableSolid, flux: Flux | None, tips: TipDerivatives) -> _Swept:
     """Derivatives of the volume: what is told by the flux, and what lines of sight add to it."""
     if flux is None:
-        swept = _sum(boundary_samples(solid.image), tips)
-        missing = solid.volume_error / solid.volume if solid.volume else np.inf
-        return swept._replace(error=swept.error + missing * np.abs(swept.value))
+        nodes = boundary_samples(solid.image)
+        slopes = tips.at(nodes.cube)
+        swept = np.abs(np.einsum("ni,nip->np", nodes.area, slopes)).sum(axis=0)
+        # What no search meets may have as much of the boundary as of the volume.
+        missing = solid.volume_error / solid.volume * swept
+        error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())
+        return _Swept(nodes.derivative(slopes), nodes.noise(slopes) + missing + error)
     sense = 1 if flux.value >= 0 else -1
     slopes = tips.at(flux.faces.cube)
     through = sense * np.einsum("ni,nip->np", flux.area, slopes)
@@ -237,10 +244,10 @@ def _sum(nodes: BoundarySamples | HullCorners, tips: TipDerivatives) -> _Swept:
 def _limit(fine: _Swept, coarse: _Swept) -> _Swept:
     """For infinitely fine grids, whose error falls as 1/n² or a little slower.
 
-    Corners jump from vertex to vertex: twice what is removed is the error.
+    Corners jump from vertex to vertex: all that is removed is the error.
     """
     removed = (fine.value - coarse.value) / 3.0
-    return _Swept(fine.value + removed, fine.error + 2.0 * np.abs(removed))
+    return _Swept(fine.value + removed, fine.error + np.abs(removed))
 
 
 def _by_differences(
@@ -303,19 +310,32 @@ def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
     """Corners of the hull of a solid, and of that of half as fine a grid or half as many lines."""
     rod = solid.tip_map
     if solid.route == "flux":
-        cube = grid_faces(_HULL_GRID * solid.cells)
+        cells = 2 * round(solid.cells / 3)
+        cube = grid_faces(cells)
         tips = rod.tips(rod.box.from_free_cube(cube))
-        even = (np.rint(_HULL_GRID * solid.cells * cube) % 2 == 0).all(axis=1)
+        even = (np.rint(cells * cube) % 2 == 0).all(axis=1)
         return HullCorners.of(tips, cube), HullCorners.of(tips[even], cube[even])
     if isinstance(solid.image, Image):
         assert solid.coarse_image is not None
-        return _corners_of(solid.image), _corners_of(solid.coarse_image)
+        corners = _corners_of(solid.image)
+        if solid.cells >= _HULL_CELLS:
+            return corners, _corners_of(solid.coarse_image)
+        return _finer(corners, rod, solid.cells), corners
     cells, box = solid.image, rod.box
     gamma, tips = cloud_on_faces(rod, 0)
     gamma = gamma[not_among(cells.reached, cells.lattice, tips)]
     gamma = np.concatenate([cells.crossings.beyond, gamma])
-    tips, cube = rod.tips(gamma), box.to_cube(gamma)[:, box.free]
+    tips, cube = rod.tips(gamma), box.to_cube(gamma)[:, box.free].clip(0.0, 1.0)
     return HullCorners.of(tips, cube), HullCorners.of(tips[::4], cube[::4])
+
+
+def _finer(corners: HullCorners, rod: TipMap, cells: int) -> HullCorners:
+    """Corners of the hull of a grid twice as fine, of which only what is beside them is mapped."""
+    shape = (2 * cells + 1,) * 3
+    places = np.rint(2 * cells * corners.cube).astype(np.int64)[:, None] + _AROUND
+    keys = np.unique(np.ravel_multi_index(np.moveaxis(places, 2, 0), shape, mode="clip"))
+    cube = np.stack(np.unravel_index(keys, shape), axis=1) / (2 * cells)
+    return HullCorners.of(stable_tips(rod).tips(rod.box.from_free_cube(cube)), cube)
 
 
 def _corners_of(image: Image) -> HullCorners:

@@ -131,7 +131,8 @@ class Image:
         a, b, c = flat[:, 0], flat[:, 1], flat[:, 2]
         shares = np.stack([_twice_area(b, c), _twice_area(c, a), _twice_area(a, b)], axis=1)
         shares /= shares.sum(axis=1, keepdims=True)
-        return np.einsum("tk,tki->ti", shares, self.cube_vertices(corners))
+        places = np.einsum("tk,tki->ti", shares, self.cube_vertices(corners))
+        return places.clip(0.0, 1.0)  # to rounding they are within
 
     def cube_vertices(self, which: Index) -> Array:
         """Vertices of the grid of n³ boxes in the unit cube by number, shape (*which.shape, 3)."""

@@ -142,7 +142,7 @@ def rasterized_set(
     stretches = grid_stretches(rod, tips, cells, left_out)
     grid = _Grid(tips, stretches, left_out)
     fine, coarse = grid.image(lattice, progress), grid.every_second().image(lattice)
-    measures = None if left_out.any() else _entire(rod, fine, coarse)
+    measures = None if left_out.any() else _entire(rod, fine, coarse, accuracy)
     volume, convex, overlaps = measures or _in_part(rod, grid, fine, coarse)
     return ReachableSolid(
         tip_map=rod,
@@ -318,9 +318,9 @@ _Measures = tuple[measure.Estimate, measure.Estimate, _Overlaps]
 """Volume, volume of the convex hull, overlaps."""
 
 
-def _entire(rod: TipMap, fine: Image, coarse: Image) -> _Measures | None:
+def _entire(rod: TipMap, fine: Image, coarse: Image, accuracy: float) -> _Measures | None:
     """Measures of the image of all of the box; None if not all of it is stable after all."""
-    volume = measure.solid_volume(rod, fine, coarse)
+    volume = measure.solid_volume(rod, fine, coarse, accuracy)
     if np.isnan(volume.value):
         return None
     return volume, measure.convex_volume(fine, coarse), _overlaps(volume, fine, coarse)

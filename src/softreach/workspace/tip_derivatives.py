@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -31,13 +32,14 @@ class TipDerivatives:
     and does not become noise. At the end of a parameter's range both neighbors are on one side.
     """
 
-    def __init__(self, rod: TipMap, parameters: Sequence[Parameter]) -> None:
+    def __init__(self, rod: TipMap, parameters: Sequence[Parameter], tol: float = 0.0) -> None:
         """Make the neighbors.
 
         Args:
             rod: The tip map of the design: its tolerance is that of the derivatives as well, per
                 change of a parameter by itself.
             parameters: The parameters.
+            tol: A larger tolerance of a free arm, for which fewer steps are made: theory (27).
 
         Raises:
             InvalidInput: A parameter counts something, has no value, or its change holds or frees a
@@ -46,11 +48,14 @@ class TipDerivatives:
         """
         relative = _LOADED_STEP if rod.supports_unstable else _STEP
         self._shifts = [shifts_along(rod.arm, each, 1, relative) for each in parameters]
-        self._rods = [_neighbors(rod, each) for each in self._shifts]
+        steps = rod.steps
+        if tol > rod.tol and not rod.supports_unstable:
+            steps = math.ceil(steps * (rod.tol / tol) ** (1.0 / 6.0))
+        self._rods = [_neighbors(rod, each, steps) for each in self._shifts]
         # A parameter may change by as much as itself before it is another design.
         scales = np.array([each.step for each in self._shifts]) / relative
         noise = (rod.tol if rod.supports_unstable else _ROUNDING) / relative
-        self.error = (_SAFETY * rod.tol + noise) * rod.length / scales
+        self.error = (_SAFETY * max(rod.tol, tol) + noise) * rod.length / scales
         """Error of a derivative by each parameter [m per unit], shape (parameters,)."""
 
     def at(self, cube: Array) -> Array:
@@ -83,10 +88,10 @@ class TipDerivatives:
         return out
 
 
-def _neighbors(rod: TipMap, shifts: Shifts) -> list[tuple[float, TipMap]]:
+def _neighbors(rod: TipMap, shifts: Shifts, fewest: int) -> list[tuple[float, TipMap]]:
     """Weights and tip maps of neighbors in one number of steps, that of breakpoints included."""
     used, rods = np.flatnonzero(shifts.weights), list[TipMap]()
-    for steps in range(rod.steps, rod.steps + _TRIES):
+    for steps in range(fewest, fewest + _TRIES):
         rods = [in_steps(shifts.arms[k], steps, rod) for k in used]
         if len({each.steps for each in rods}) == 1:
             break
