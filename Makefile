@@ -4,6 +4,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
+# Bytecode is kept whatever the environment says, or every process would compile all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help setup demo test test-all tests all-tests ready kernels browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
