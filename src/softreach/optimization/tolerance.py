@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.solutions import Status
 from softreach.inverse.solve import solve_inverse
 from softreach.optimization.deviations import (
     NORMAL,
@@ -33,6 +32,7 @@ from softreach.support.progress import Progress, as_progress
 from softreach.workspace.gradient import volume_gradient
 from softreach.workspace.moving_boundary import MovingBoundary
 from softreach.workspace.reach import ACCURACIES, reachable_set
+from softreach.workspace.search import nearest_tips
 from softreach.workspace.solid import ReachableSolid
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ _NEAR = 4.0  # deviations of the boundary
 _IN_REGION = 2048  # places of a region
 _MOST_TRIED = 1024  # places of targets that arms are made for
 _BLOCK = 1 << 22  # numbers at once
+_STARTS = 8  # of searches for a place, beside the solutions of the design
 _MOST = 1_000_000
 
 
@@ -91,8 +92,10 @@ def tolerance(
     To first order the boundary of the reachable set moves along its normal by σ_n, the root of the
     sum of (σ ∂r/∂p · n)²: the share of the set that is kept is 1 - ∮ σ_n dA / (√(2π) V) in the mean,
     theory (99), its quantile is that of samples of the deviations, and a place at a depth d within
-    the boundary is kept with the probability Φ(d / σ_n). Nothing of this is taken on trust: arms
-    are really made with the first of these samples, and their sets and solutions compared.
+    the boundary is kept with the probability Φ(d / σ_n); beside a sharp rim that is too much, as
+    only the nearer of both sheets counts. Nothing of this is taken on trust: arms are really made
+    with the first of these samples, their sets are compared, and places are searched for from all
+    solutions of the design.
 
     Args:
         arm: The design, of three free bundles or more.
@@ -397,7 +400,12 @@ def _arms_made(first: _FirstOrder, count: int, seed: int, progress: Progress) ->
     if not count:
         return _Arms([], 0, math.nan)
     followed = _Followed.of(first, seed)
-    tasks = (partial(_made, first, followed, change) for change in first.changes[:count])
+    starts = [
+        _starts(first, places[_tried(len(places))])
+        for target in _with_places(first.needs)
+        if (places := target.places) is not None
+    ]
+    tasks = (partial(_made, first, followed, starts, change) for change in first.changes[:count])
     made, impossible = [], 0
     for each in parallel.in_order(tasks):
         progress(1)
@@ -409,7 +417,9 @@ def _arms_made(first: _FirstOrder, count: int, seed: int, progress: Progress) ->
     return _Arms(made, impossible, followed.error(kept))
 
 
-def _made(first: _FirstOrder, followed: _Followed, change: Array) -> _Made | None:
+def _made(
+    first: _FirstOrder, followed: _Followed, starts: list[list[Array]], change: Array
+) -> _Made | None:
     """An arm with deviations; None if there is no such arm."""
     with parallel.undivided(), no_warnings():
         try:
@@ -421,7 +431,10 @@ def _made(first: _FirstOrder, followed: _Followed, change: Array) -> _Made | Non
                 followed.kept(solid.contains),
                 solid.volume,
                 solid.unreachability,
-                tuple(_reached(arm, first.needs, t) for t in _with_places(first.needs)),
+                tuple(
+                    _reached(arm, first, target, start)
+                    for target, start in zip(_with_places(first.needs), starts, strict=True)
+                ),
                 tuple(_share(arm, solid, first, t) for t in _with_region(first.needs)),
             )
         except InvalidDesign:
@@ -445,20 +458,35 @@ def _tried(count: int) -> Array:
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_TRIED)).astype(np.int64))
 
 
-def _reached(arm: Manipulator, needs: Requirements, target: Target) -> Mask:
-    """Places that an arm reaches under every payload, of those that are tried."""
+def _starts(first: _FirstOrder, places: Array) -> list[Array]:
+    """Places of the cube to search from: of all solutions of the design, and of a grid."""
+    box, count = tip_map(first.deviations.arm).box, len(places)
+    solutions = solve_inverse(first.deviations.arm, places)
+    rows = [solutions.nearest_activations]
+    for number in range(int(solutions.counts.max(initial=0))):
+        has = solutions.counts > number
+        row = solutions.nearest_activations.copy()
+        row[has] = solutions.activations[solutions.offsets[:-1][has] + number]
+        rows.append(row)
+    known = [np.nan_to_num(box.to_cube(row)[:, box.free], nan=0.5) for row in rows]
+    grid = sample_cube("sobol", _STARTS, box.dimension)
+    return [*known, *(np.tile(start, (count, 1)) for start in grid)]
+
+
+def _reached(arm: Manipulator, first: _FirstOrder, target: Target, starts: list[Array]) -> Mask:
+    """Places that an arm reaches under every payload, of those that are tried: by searches."""
     assert target.places is not None
     places = target.places[_tried(len(target.places))]
-    held = np.ones(len(places), bool)
-    for payload in needs.payloads or (None,):
-        try:
-            solutions = solve_inverse(with_payload(arm, payload), places)
-        except InvalidInput as error:
-            if error.name != "loads":
-                raise
-            return np.zeros(len(places), bool)
-        near = solutions.gaps <= max(target.within, _TOL * arm.length)
-        held &= (solutions.statuses == Status.REACHED) | near
+    within, held = max(target.within, _TOL * arm.length), np.ones(len(places), bool)
+    for payload in first.needs.payloads or (None,):
+        rod, gaps = tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
+        for start in starts:
+            left = np.flatnonzero(gaps > within)
+            if len(left):
+                gamma = rod.box.from_free_cube(start[left])
+                nearest = nearest_tips(rod, gamma, places[left], within)
+                gaps[left] = np.fmin(gaps[left], nearest.distance)
+        held &= gaps <= within
     return held
 
 
