@@ -14,7 +14,7 @@ from softreach.arm.parameters import Parameter, find_parameters
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.tables import check_extension
 from softreach.support.arguments import as_mapping, as_number
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import quantity
 
@@ -135,9 +135,7 @@ class Spread:
         off = abs(self.mean - self.made_mean), abs(self.deviation - self.made_deviation)
         errors = math.hypot(self.made_error, self.error), self.deviation_error + self.error
         rounding = 1e-9 * abs(self.nominal)
-        return all(
-            x <= _AGREEMENT * error + rounding for x, error in zip(off, errors, strict=True)
-        )
+        return all(x <= _AGREEMENT * error + rounding for x, error in zip(off, errors, strict=True))
 
     def with_made(self, values: Array, error: float = 0.0) -> Self:
         """The same with values of arms that were made, NaN for those without one.
@@ -191,4 +189,3 @@ def probabilities(signed: Array, sigma: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = ndtr(signed / sigma)
     return np.where(sigma > 0.0, share, (signed >= 0.0).astype(float))
-

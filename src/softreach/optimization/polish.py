@@ -15,7 +15,7 @@ from softreach.rod.rods import tip_map
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
-__all__ = ["Polished", "can_polish", "polished"]
+__all__ = ["Polished", "can_polish", "point_of", "polished"]
 
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
@@ -72,6 +72,17 @@ def polished(
         return Polished(start, max(1, program.designs))
     better = min((start, candidate), key=problem.score) if len(problem.goals) < 2 else candidate
     return Polished(better, program.designs)
+
+
+@no_warnings()
+def point_of(problem: Problem, candidate: Candidate, accuracy: float, goal: int = 0) -> Point:
+    """The program of one goal at a design, with the poses that it has at the targets.
+
+    Raises:
+        InvalidDesign: It is no design.
+    """
+    program = _Program(problem, candidate, accuracy, goal, ())
+    return program.point(program.begin())
 
 
 def _solved(program: _Program, first: Array, iterations: int) -> Array:

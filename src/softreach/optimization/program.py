@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from softreach.support.arrays import Array
 from softreach.workspace.gradient import VolumeGradient, volume_gradient
 from softreach.workspace.tip_derivatives import TipDerivatives
 
-__all__ = ["DesignPoint", "Point"]
+__all__ = ["DesignPoint", "Point", "Requirement"]
 
 SETS = {
     "exact_volume": "volume",
@@ -132,6 +133,16 @@ def _laden(problem: Problem, arm: Manipulator) -> list[Manipulator]:
     ]
 
 
+class Requirement(NamedTuple):
+    """What an equation or a room of the program is about."""
+
+    name: str
+    unit: str
+    """Of what it allows; "" for that of the limit or measure."""
+    scale: float
+    """What it allows, per unit of the equation or the room."""
+
+
 @dataclass(eq=False)
 class Point:
     """A design with its poses: cost, equations and rooms, each with all derivatives.
@@ -173,6 +184,60 @@ class Point:
         """What must not fall below 0: limits, measures, regions, other goals."""
         parts = [*self._near_places(), *self._rules(), *self._of_design(), *self._other_goals()]
         return _stacked(parts, self._size)
+
+    @cached_property
+    def room_names(self) -> list[Requirement]:
+        """The requirement that each of the rooms is about."""
+        return [*self._place_names(0.0), *self._rule_names(), *self._design_names()]
+
+    @cached_property
+    def equation_names(self) -> list[Requirement]:
+        """The requirement that each of the equations is about."""
+        return [each for each in self._place_names(None) for _ in range(3)]
+
+    def _place_names(self, least: float | None) -> list[Requirement]:
+        """Places to be met within more than a distance, or, for None, exactly."""
+        needs, length = self.design.problem.requirements, self.design.case.arm.length
+        names = [t.name for t in needs.targets if t.places is not None for _ in t.places]
+        numbers = [
+            k + 1 for t in needs.targets if t.places is not None for k in range(len(t.places))
+        ]
+        each = zip(names, numbers, _within(needs.targets), strict=True)
+        kept = [
+            Requirement(f"{name} place {number}", "m", length)
+            for name, number, within in each
+            if (within == 0.0) == (least is None)
+        ]
+        return kept * len(self.design.rods)
+
+    def _rule_names(self) -> list[Requirement]:
+        needs, arm = self.design.problem.requirements, self.design.case.arm
+        if not len(self.poses):
+            return []
+        keeps = [keep for keep in needs.keeps if keep.when == "targets"]
+        rules = PoseRules.of(arm, keeps, needs.limits, np.inf)
+        each = [Requirement(keep.name, "m", arm.length) for keep in rules.keeps]
+        each += [Requirement(name, "", most or 1.0) for name, most in rules.limits.items()]
+        return each * len(self.poses)
+
+    def _design_names(self) -> list[Requirement]:
+        needs, result = self.design.problem.requirements, []
+        for name, ends in needs.measures.items():
+            if name in SETS:
+                for word, end in zip(("most", "least"), reversed(ends), strict=True):
+                    if end is not None:
+                        result.append(Requirement(f"{name} at {word}", "", abs(end) or 1.0))
+        for name in _OF_ARM:
+            most = needs.limits.given.get(name)
+            if most is not None:
+                result.append(Requirement(name, "", abs(most) or 1.0))
+        goals = zip(self.design.problem.goals, self.floors, strict=False)
+        result += [
+            Requirement(f"{goal.name} no worse", "", abs(floor) or 1.0)
+            for k, (goal, floor) in enumerate(goals)
+            if k != self.goal
+        ]
+        return result
 
     @property
     def _size(self) -> int:

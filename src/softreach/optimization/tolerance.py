@@ -26,7 +26,7 @@ from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, counted, no_warnings
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.gradient import volume_gradient
@@ -90,9 +90,9 @@ def tolerance(
     """Share of the reach, and of the targets, that arms keep which deviate as they are made.
 
     To first order the boundary of the reachable set moves along its normal by σ_n, the root of the
-    sum of (σ ∂r/∂p · n)²: the share of the set that is kept is 1 - ∮ σ_n dA / (√(2π) V) in the mean,
-    theory (99), its quantile is that of samples of the deviations, and a place at a depth d within
-    the boundary is kept with the probability Φ(d / σ_n); beside a sharp rim that is too much, as
+    sum of (σ ∂r/∂p · n)²: the share of the set that is kept is 1 - ∮ σ_n dA / (√(2π) V) in the
+    mean, theory (99). Its quantile is that of samples of the deviations; a place at a depth d
+    within the boundary is kept with the probability Φ(d / σ_n); beside a sharp rim that is too much, as
     only the nearer of both sheets counts. Nothing of this is taken on trust: arms are really made
     with the first of these samples, their sets are compared, and places are searched for from all
     solutions of the design.
@@ -453,7 +453,7 @@ def _with_region(needs: Requirements) -> list[Target]:
     return [target for target in needs.targets if target.region is not None]
 
 
-def _tried(count: int) -> Array:
+def _tried(count: int) -> Index:
     """Numbers of the places that arms are made for, evenly spread over all."""
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_TRIED)).astype(np.int64))
 
