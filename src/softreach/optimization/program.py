@@ -14,8 +14,9 @@ from softreach.arm.parameters import find_parameters
 from softreach.arm.parameters.changes import parameters_by_every_name
 from softreach.arm.summary import load_number, mass
 from softreach.optimization.free_parameters import Values
-from softreach.optimization.objectives import DesignCase, Goal
+from softreach.optimization.objectives import SETS, DesignCase, Goal
 from softreach.optimization.problem import Problem
+from softreach.optimization.robust import margin
 from softreach.requirements.poses import PoseRules
 from softreach.rod.rods import refined, tip_map
 from softreach.rod.tip_map import TipMap
@@ -26,12 +27,6 @@ from softreach.workspace.tip_derivatives import TipDerivatives
 
 __all__ = ["DesignPoint", "Point", "Requirement"]
 
-SETS = {
-    "exact_volume": "volume",
-    "exact_convex_volume": "convex_volume",
-    "exact_unreachability": "unreachability",
-}
-"""Goals and measures of the reachable set, and what they are called there."""
 EFFORTS = ("mean_effort", "worst_effort")
 _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
     "mass": lambda arm: mass(arm) or 0.0,
@@ -39,6 +34,7 @@ _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
 }
 _TOL = 1e-9  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
+_WIDE_STEP = 0.02  # of a range, for what is rough
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
@@ -90,6 +86,29 @@ class DesignPoint:
         of = _OF_ARM[name]
         slopes = [(of(ahead) - of(behind)) / step for step, ahead, behind in self.neighbors]
         return of(self.case.arm), np.array(slopes)
+
+    def margin(self, goal: Goal) -> float:
+        """Distance of a robust goal from that of the design itself."""
+        if goal.name not in self._margins:
+            self._margins[goal.name] = margin(goal.objective, self.case)
+        return self._margins[goal.name]
+
+    def margin_slope(self, goal: Goal) -> Array:
+        """Its derivatives by the reals: differences to one side."""
+        parameters = self.problem.parameters
+        reals, (low, high) = parameters.reals(self.values), parameters.bounds.T
+        slopes = []
+        for k, step in enumerate(_WIDE_STEP * (high - low)):
+            moved = reals.copy()
+            moved[k] += step if reals[k] + step <= high[k] else -step
+            case = self.problem.case(parameters.moved(self.values, moved), self.accuracy)
+            change = margin(goal.objective, case) - self.margin(goal)
+            slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
+        return np.array(slopes)
+
+    @cached_property
+    def _margins(self) -> dict[str, float]:
+        return {}
 
     @cached_property
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:
@@ -165,7 +184,8 @@ class Point:
         if not goals or goals[self.goal].name not in SETS:
             return self.cost[0]
         goal = goals[self.goal]
-        return -goal.sense * float(getattr(self.design.case.reached, SETS[goal.name]))
+        cost = -goal.sense * float(getattr(self.design.case.reached, SETS[goal.name]))
+        return cost + self.design.margin(goal) if goal.objective.sigmas else cost
 
     @cached_property
     def cost(self) -> tuple[float, Array]:
@@ -251,7 +271,11 @@ class Point:
             value, slope[: len(self.reals)] = self.design.of_set(goal.name)
         else:
             value, slope[: len(self.reals)] = self.design.of_arm(goal.name)
-        return -goal.sense * value, -goal.sense * slope
+        cost, slope = -goal.sense * value, -goal.sense * slope
+        if goal.objective.sigmas:
+            cost += self.design.margin(goal)
+            slope[: len(self.reals)] += self.design.margin_slope(goal)
+        return cost, slope
 
     def _effort(self, name: str) -> tuple[float, Array]:
         """Mean of |γ| over the largest bound, of a high power for the largest of them."""

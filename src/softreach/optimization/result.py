@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from softreach.arm.manipulator import Manipulator
+from softreach.optimization.deviations import Spread
 from softreach.optimization.problem import Candidate, Problem
 
 __all__ = ["Search"]
@@ -20,6 +21,10 @@ class Search:
     the best alone. Without a design that meets all requirements, the one that misses least."""
     candidates: tuple[Candidate, ...]
     """Everything that was judged, on coarse sets."""
+    spreads: tuple[Spread, ...] = ()
+    """Goals of arms made after the best, which deviate by the tolerances; none without these."""
+    robust: bool = False
+    """Goals are those that 5 % of the arms are worse than; the nominal ones are in `spreads`."""
     designs: int
     """Designs that were looked at, those of polishes too."""
     seconds: float

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from softreach.atlas.metric import MetricFailed
-from softreach.optimization.objectives import Goal
+from softreach.optimization.objectives import SETS, Goal
 from softreach.optimization.polish import point_of
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import SETS, Point
+from softreach.optimization.program import Point
 from softreach.optimization.result import Search
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer

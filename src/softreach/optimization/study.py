@@ -215,7 +215,10 @@ def _digest(problem: Problem) -> str:
         "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
         "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
         "requirements": problem.requirements.to_toml(),
-        "goals": [[goal.name, goal.sense] for goal in problem.goals],
+        "goals": [
+            [goal.name, goal.sense, *([dict(sigmas)] if (sigmas := goal.objective.sigmas) else [])]
+            for goal in problem.goals
+        ],
     }
     text = json.dumps(record, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
