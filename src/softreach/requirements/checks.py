@@ -22,9 +22,10 @@ from softreach.requirements.findings import (
     shown_unit,
     with_payload,
 )
+from softreach.requirements.parts import Keep, Target
 from softreach.requirements.poses import PoseRules, worst_pose
 from softreach.requirements.regions import Region
-from softreach.requirements.requirements import Keep, Requirements, Target
+from softreach.requirements.requirements import Requirements
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import tip_map
 from softreach.schema import AXES, provenance
