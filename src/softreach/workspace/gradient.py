@@ -195,7 +195,7 @@ def _swept(
         rod = refined(rod, flux_tol(rod))
     tips = TipDerivatives(rod, parameters, _TOL)
     volume = _searched(solid, tips) if solid.route == "search" else _flowing(solid, tips, accuracy)
-    return volume, _limit(*(_sum(each, tips) for each in hull_corners(solid)))
+    return volume, _dragged(solid, tips)
 
 
 def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
@@ -223,15 +223,21 @@ def _flowing(solid: ReachableSolid, tips: TipDerivatives, accuracy: float) -> _S
     return _Swept(value + fine.value + removed, error + fine.error + np.abs(removed))
 
 
-def _limit(fine: _Sum, coarse: _Sum) -> _Swept:
-    """For infinitely fine grids, whose error falls as 1/n² or a little slower.
+def _dragged(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
+    """Derivatives of the convex volume, by what the corners drag along, for infinitely fine grids.
 
-    Corners jump from vertex to vertex: the largest part that is removed of the derivative by any
-    parameter, of all that corners sweep, may be wrong of each.
+    Errors fall as 1/n² or a little slower, and corners jump from vertex to vertex: the largest part
+    that is removed of the derivative by any parameter, of all that corners sweep, may be wrong of
+    each, and so may the part that hulls of corners lack of the convex volume.
     """
+    corners = hull_corners(solid)
+    fine, coarse = (_sum(each, tips) for each in corners)
     removed = (fine.value - coarse.value) / 3.0
+    hull, rough = (each.volume for each in corners)
+    missing = abs(hull + (hull - rough) / 3.0 - solid.convex_volume) / hull
     share = np.max(np.abs(removed) / np.maximum(fine.size, np.finfo(float).tiny))
-    return _Swept(fine.value + removed, fine.error + np.abs(removed) + share * fine.size)
+    error = fine.error + np.abs(removed) + (share + missing) * fine.size
+    return _Swept(fine.value + removed, error)
 
 
 class _Sum(NamedTuple):
@@ -296,6 +302,8 @@ class HullCorners:
     """In the unit cube of the free bundles, shape (n, dimension)."""
     area: Array
     """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
+    volume: float
+    """Of the hull [m³]."""
 
     @classmethod
     def of(cls, tips: Array, cube: Array) -> HullCorners:
@@ -307,7 +315,7 @@ class HullCorners:
             # The volume is a sum of triple products over 6: linear in each corner.
             share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
             np.add.at(area, hull.faces[:, k], share)
-        return cls(cube[_rows_of(hull.vertices, tips)], area)
+        return cls(cube[_rows_of(hull.vertices, tips)], area, hull.volume)
 
 
 def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
