@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, settings
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
+from softreach.plot import style
 from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 pytest_plugins = ["tests.durations"]
@@ -37,10 +38,11 @@ def trunk() -> Manipulator:
 
 @pytest.fixture(scope="session", autouse=True)
 def coarse() -> Iterator[None]:
-    """Few pixels, since laws do not depend on their number."""
+    """Few pixels, since laws do not depend on their number, and PDF files without fonts."""
     with pytest.MonkeyPatch.context() as patch:
         for module in ("axes", "sheet", "style"):
             patch.setattr(f"softreach.plot.{module}.DPI", 60)
+        patch.setitem(style._SAVING, "pdf.use14corefonts", True)
         yield
 
 
