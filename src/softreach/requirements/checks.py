@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -35,6 +34,7 @@ from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidInput, Range, no_warnings
+from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSolid, reachable_set
@@ -187,7 +187,7 @@ class Check:
         """The places [m], shape (place, 3)."""
         return self.requirements.places
 
-    @cached_property
+    @lazy
     def target_of(self) -> Index:
         """Index of the target that each place belongs to, shape (place,)."""
         counts = [0 if t.places is None else len(t.places) for t in self.requirements.targets]
@@ -424,7 +424,7 @@ def _coverage(
     places = target.region.places(count)
     near = max(target.within, _TOL * rules.arm.length)
     if len(rules):
-        posed = _solved(rules, places, np.full(count, target.within), step)
+        posed = _solved(rules, places, np.full(count, target.within), step, _chosen)
         inside = (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
     else:
         inside = _reachable(rules.arm, places, target.within, accuracy)
