@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.inverse.prepared import prepared_map
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.advice import advice
@@ -53,6 +54,7 @@ _MOST_PLACES = 100_000
 _TOL = 1e-6
 _SEEDS, _NEIGHBORS = 256, 5
 """Samples that quick descents start from, and how many of them for each place."""
+_CELLS = 16  # along each axis of three bundles: as many solutions as with 32, in half the time
 
 
 class Coverage(NamedTuple):
@@ -316,7 +318,7 @@ def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     arm = rules.arm
     try:
         with no_warnings():
-            solutions = solve_inverse(arm, places, tol=_TOL)
+            solutions = solve_inverse(prepared_map(arm, _TOL, cells=_CELLS), places)
     except InvalidInput as error:
         if error.name != "loads":
             raise
@@ -326,7 +328,9 @@ def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     if (tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
         rows = np.flatnonzero(broken)
         with no_warnings():
-            family = solve_inverse(arm, places[rows], tol=_TOL, family=_FAMILY)
+            family = solve_inverse(
+                prepared_map(arm, _TOL, cells=_CELLS), places[rows], family=_FAMILY
+            )
         for all_places, some in zip(chosen, _best(rules, family), strict=True):
             all_places[rows] = some
     # A place that is reached to the error of the tips is reached.

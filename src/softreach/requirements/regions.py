@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,6 +46,9 @@ _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
 
 class Region(ABC):
     """A part of space; lengths in m, in the world."""
+
+    convex: ClassVar[bool] = True
+    """With two points it holds all between them."""
 
     @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
@@ -281,6 +284,8 @@ class Mesh(Region):
         InvalidInput: Triangles that leave an edge open, share one by more than two, or do not face
             the same way; or nothing inside.
     """
+
+    convex: ClassVar[bool] = False
 
     vertices: Array
     """Corners [m], shape (v, 3)."""
