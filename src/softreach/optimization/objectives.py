@@ -292,7 +292,7 @@ _ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value], str, bool], ...
     ("payload", "kg", "payload under which 80 % of the volume is left", _payload, "", False),
     ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance, "", False),
     ("mass", "kg", "mass of the arm", _mass, "", True),
-    ("actuators", "1", "number of inputs", _actuators, "", False),
+    ("actuators", "1", "number of inputs", _actuators, "", True),
 )
 
 OBJECTIVES = {

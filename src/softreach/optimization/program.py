@@ -17,7 +17,7 @@ from softreach.optimization.objectives import DesignCase, Goal
 from softreach.optimization.problem import Problem
 from softreach.requirements.checks import effort_scales
 from softreach.requirements.poses import PoseRules
-from softreach.rod.rods import refined, tip_map
+from softreach.rod.rods import in_steps, refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
@@ -37,11 +37,12 @@ EFFORTS = ("mean_effort", "worst_effort")
 _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
     "mass": lambda arm: mass(arm) or 0.0,
     "load_number": lambda arm: load_number(arm) or 0.0,
+    "actuators": lambda arm: float(arm.inputs),
 }
-_TOL = 1e-9  # of tips at the targets, in L
+_TOL = 1e-7  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
 _FAR = 0.25  # over L or relative: room beyond which a rule is not differentiated
-_ROOM = 0.99  # of the distance within which a tip must come to a place
+_ROOM = 0.98  # of the distance within which a tip must come to a place
 _SPARE = 1e-4  # over L or relative, by which limits are kept
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
@@ -54,6 +55,8 @@ class DesignPoint:
     problem: Problem
     values: Values
     accuracy: float
+    like: Sequence[TipMap] = ()
+    """Tip maps of a design nearby, in as many steps."""
 
     @lazy
     def case(self) -> DesignCase:
@@ -63,7 +66,11 @@ class DesignPoint:
     @lazy
     def rods(self) -> tuple[TipMap, ...]:
         """Its tip map under each payload."""
-        return tuple(refined(tip_map(arm), _TOL) for arm in _laden(self.problem, self.case.arm))
+        arms = _laden(self.problem, self.case.arm)
+        if not self.like:
+            return tuple(refined(tip_map(arm), _TOL) for arm in arms)
+        pairs = zip(arms, self.like, strict=True)
+        return tuple(in_steps(arm, rod.steps, rod) for arm, rod in pairs)
 
     @lazy
     def derivatives(self) -> tuple[TipDerivatives, ...]:
@@ -256,7 +263,9 @@ class Point:
 
         def rules_of(arm: Manipulator, number: int) -> PoseRules:
             laden = _laden(self.design.problem, arm)[number]
-            return PoseRules.of(laden, keeps, needs.limits, np.inf)
+            like = self.design.rods[number]
+            rod = like if arm is self.design.case.arm else in_steps(laden, like.steps, like)
+            return PoseRules.of(laden, keeps, needs.limits, np.inf, rod)
 
         for number, (_, cube) in enumerate(self._by_payload()):
             rules = rules_of(self.design.case.arm, number)
@@ -357,10 +366,10 @@ def stacked_slopes(parts: Sequence[Part]) -> Array:
 
 
 def _near_place(part: Part) -> Part:
-    """How much nearer the tip is than it must be, over that distance."""
-    gap, within = part.value, _ROOM * part.within
-    value = np.array([(within**2 - gap @ gap) / within])
-    return Part(part.name, value, lambda: -2.0 / within * (gap @ part.slope())[None])
+    """Room on both sides along each axis in a cube within the distance that is allowed."""
+    half = _ROOM * part.within / np.sqrt(3.0)
+    value = np.concatenate([half - part.value, half + part.value])
+    return Part(part.name, value, lambda: np.concatenate([-part.slope(), part.slope()]))
 
 
 def _row(slopes: Callable[[], Array], k: int) -> Array:
