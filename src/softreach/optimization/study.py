@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import warnings
 from collections.abc import Iterator
@@ -32,6 +30,8 @@ _MISSED = 1e12
 matters to the samplers."""
 _NEVER = 1e15
 """Cost of what cannot exist."""
+_WARM = 10
+"""Designs that CMA-ES begins from at least: the best tenth of them must be one or more."""
 _JUDGED, _PROBLEM = "judged", "problem"
 
 
@@ -57,7 +57,7 @@ class Study:
         """
         self.problem, self._first = problem, first
         self._sampler = as_one_of("sampler", sampler, SAMPLERS)
-        self._seed = seed
+        self.seed = seed
         self._optuna = _library()
         with _quiet():
             self._study = self._opened(storage)
@@ -107,13 +107,16 @@ class Study:
 
     def focus(self) -> None:
         """Let a sampler that begins at one place begin where the best of the known designs are."""
-        if self._kind() != "cma":
+        if self.kind != "cma":
             return
         with _quiet():
+            known = self._study.get_trials(states=self._complete)
+            if len(known) < _WARM:
+                return
             self._study.sampler = self._optuna.samplers.CmaEsSampler(
-                source_trials=self._study.get_trials(states=self._complete),
+                source_trials=known,
                 n_startup_trials=0,
-                seed=self._seed + 1,
+                seed=self.seed + 1,
                 warn_independent_sampling=False,
             )
 
@@ -139,18 +142,19 @@ class Study:
 
     def _begin(self) -> None:
         """Note the problem and ask for the first designs; refuse the storage of another one."""
-        digest = _digest(self.problem)
+        digest = self.problem.digest
         known = self._study.user_attrs.get(_PROBLEM)
         if known is not None:
             if known != digest:
                 allowed = "one of the same designs, requirements and objectives"
                 raise InvalidInput("storage", "of another search", allowed, "choose another file")
             return
-        for values in first_designs(self.problem, self._first, self._seed):
+        for values in first_designs(self.problem, self._first, self.seed):
             self._study.enqueue_trial(dict(values))
         self._study.set_user_attr(_PROBLEM, digest)
 
-    def _kind(self) -> str:
+    @property
+    def kind(self) -> str:
         """The sampler, chosen by what is free and how many goals there are."""
         if self._sampler != "auto":
             return self._sampler
@@ -160,7 +164,7 @@ class Study:
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
     def _made_sampler(self) -> Any:
-        samplers, seed = self._optuna.samplers, self._seed
+        samplers, seed = self._optuna.samplers, self.seed
         population = max(8, min(self._first, 48))
         return {
             "cma": lambda: samplers.CmaEsSampler(seed=seed, warn_independent_sampling=False),
@@ -173,7 +177,7 @@ class Study:
                 seed=seed, scramble=True, warn_independent_sampling=False
             ),
             "random": lambda: samplers.RandomSampler(seed=seed),
-        }[self._kind()]()
+        }[self.kind]()
 
     def _distribution(self, parameter: FreeParameter) -> Any:
         kinds = self._optuna.distributions
@@ -217,20 +221,6 @@ def _at(parameter: FreeParameter, place: float) -> float | str | int:
         low, high = int(parameter.low), int(parameter.high)
         return min(low + int(place * (high - low + 1)), high)
     return parameter.low + place * (parameter.high - parameter.low)
-
-
-def _digest(problem: Problem) -> str:
-    """Fingerprint of all that decides what a design is worth."""
-    parameters = problem.parameters
-    record = {
-        "bases": {name: arm.to_toml() for name, arm in parameters.bases.items()},
-        "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
-        "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
-        "requirements": problem.requirements.to_toml(),
-        "goals": [[goal.name, goal.sense] for goal in problem.goals],
-    }
-    text = json.dumps(record, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _storage(optuna: Any, place: str) -> Any:
