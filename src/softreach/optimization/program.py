@@ -15,6 +15,7 @@ from softreach.arm.summary import load_number, mass
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.objectives import DesignCase, Goal
 from softreach.optimization.problem import Problem
+from softreach.requirements.checks import effort_scales
 from softreach.requirements.poses import PoseRules
 from softreach.rod.rods import refined, tip_map
 from softreach.rod.tip_map import TipMap
@@ -38,6 +39,8 @@ _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
 }
 _TOL = 1e-9  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
+_ROOM = 0.99  # of the distance within which a tip must come to a place
+_SPARE = 1e-4  # over L or relative, by which limits are kept
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
@@ -189,15 +192,15 @@ class Point:
         return -goal.sense * value, -goal.sense * slope
 
     def _effort(self, name: str) -> tuple[float, Array]:
-        """Mean of |γ| over the largest bound, of a high power for the largest of them."""
+        """Mean of |γ|, each over its largest bound; of a high power for the largest of them."""
         box, count = self.design.rods[0].box, len(self.poses)
-        scales = np.abs(box.bounds).max()
+        scales = effort_scales(self.design.case.arm)
         gamma = box.from_free_cube(self.poses) / scales
         each = np.linalg.norm(gamma, axis=1).clip(1e-12)
         power = 1 if name == "mean_effort" else _POWER
         mean = float((each**power).mean() ** (1.0 / power))
         weight = (each / mean) ** (power - 1) / count
-        widths = box.widths[box.free] / scales
+        widths = (box.widths / scales)[box.free]
         slope = np.zeros(self._size)
         slope[len(self.reals) :] = (
             weight[:, None] * gamma[:, box.free] / each[:, None] * widths
@@ -233,7 +236,7 @@ class Point:
         """Places that need not be met exactly: how much nearer the tip is than it must be."""
         return [
             (np.array([(within**2 - gap @ gap) / within]), -2.0 / within * (gap @ slope)[None])
-            for gap, slope, within in self._tips
+            for gap, slope, within in ((g, s, _ROOM * w) for g, s, w in self._tips)
             if within > 0.0
         ]
 
@@ -310,7 +313,7 @@ class Point:
             return None
         scale, row = abs(most) or 1.0, np.zeros((1, self._size))
         row[0, : len(self.reals)] = -slope / scale
-        return np.array([(most - value) / scale]), row
+        return np.array([(most - value) / scale - _SPARE]), row
 
     def _room_above(
         self, value: float, slope: Array, least: float | None
@@ -325,7 +328,7 @@ def _room(rules: PoseRules, cube: Array) -> Array:
     scale = np.array(
         [rules.arm.length] * len(rules.keeps) + [x or 1.0 for x in most[len(rules.keeps) :]]
     )
-    return np.nan_to_num((most - value) / scale, nan=-1.0, neginf=-1.0, posinf=1.0)
+    return np.nan_to_num((most - value) / scale - _SPARE, nan=-1.0, neginf=-1.0, posinf=1.0)
 
 
 def _within(targets: Sequence[object]) -> Array:

@@ -13,7 +13,7 @@ from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import strain_stations
-from softreach.requirements.requirements import POSE_LIMITS, Keep, Limits
+from softreach.requirements.parts import POSE_LIMITS, Keep, Limits
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap

@@ -92,7 +92,9 @@ class Region(ABC):
                 raise InvalidInput("region", self, "thick enough for places inside it")
         return np.concatenate(kept)[:n]
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """Least and largest distance of the points of circular sections, negative inside.
 
         Exact for half-spaces and for spheres; of boxes the largest is exact by faces. Otherwise a
@@ -100,10 +102,10 @@ class Region(ABC):
 
         Args:
             center: Centers [m], shape (..., 3).
-            normal: Normals [-], shape (..., 3).
+            tangent: Unit vectors across the sections, d3 [-], shape (..., 3).
             radius: Radii [m], shape (...).
         """
-        del normal
+        del tangent
         distance = self._distances(center)
         return distance - radius, distance + radius
 
@@ -150,9 +152,11 @@ class Box(Region):
         beyond = np.maximum(self.low - x, x - self.high)
         return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """As `Region.section_distances`; the least by faces where they tell more than a ball."""
-        reach = radius[..., None] * np.sqrt(np.maximum(1.0 - normal**2, 0.0))
+        reach = radius[..., None] * np.sqrt(np.maximum(1.0 - tangent**2, 0.0))
         beyond = np.maximum(self.low - center, center - self.high)
         ball = self._distances(center) - radius
         return np.maximum(ball, (beyond - reach).max(axis=-1)), (beyond + reach).max(axis=-1)
@@ -198,10 +202,12 @@ class Sphere(Region):
         """Distance of points (n, 3) to its surface [m], negative inside, shape (n,)."""
         return np.linalg.norm(as_points("points", points) - self.center, axis=1) - self.radius
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """As `Region.section_distances`, exact."""
         apart = center - self.center
-        height = (apart * normal).sum(axis=-1)
+        height = (apart * tangent).sum(axis=-1)
         across = np.sqrt(np.maximum((apart**2).sum(axis=-1) - height**2, 0.0))
         least, most = np.maximum(across - radius, 0.0), across + radius
         return np.hypot(height, least) - self.radius, np.hypot(height, most) - self.radius
@@ -245,10 +251,12 @@ class HalfSpace(Region):
         """Distance of points (n, 3) to the plane [m], negative behind it, shape (n,)."""
         return (as_points("points", points) - self.point) @ np.array(self.normal)
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """As `Region.section_distances`, exact."""
         distance = (center - self.point) @ np.array(self.normal)
-        along = normal @ np.array(self.normal)
+        along = tangent @ np.array(self.normal)
         reach = radius * np.sqrt(np.maximum(1.0 - along**2, 0.0))
         return distance - reach, distance + reach
 
