@@ -318,3 +318,5 @@ def _of_material(arm: Manipulator, name: Any) -> Manipulator:
 
 _CHOICES = {BUNDLES: _with_bundles, MATERIAL: _of_material}
 _WORDS = (*_CHOICES, DESIGN)
+NAMED_CHOICES = tuple(_CHOICES)
+"""Choices that are no parameters."""

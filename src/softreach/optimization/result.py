@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.optimization.free_parameters import Values
+from softreach.optimization.objectives import Goal
 from softreach.optimization.problem import Candidate, Problem
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, quick_excess
@@ -130,7 +130,7 @@ class Search:
         }
 
     @property
-    def goals(self) -> tuple:
+    def goals(self) -> tuple[Goal, ...]:
         """Objectives with their senses."""
         return self.problem.goals
 
@@ -144,9 +144,10 @@ class Search:
 
         every = (*self.candidates, *self.finalists)
         free, goals = self.problem.parameters.free, self.goals
-        places = {_key(each.values): k for k, each in enumerate(self.candidates)}
+        names = self.problem.parameters.names
+        places = {_key(each, names): k for k, each in enumerate(self.candidates)}
         ways = len(self.candidates)
-        coarse = [-1] * ways + [places.get(_key(each.values), -1) for each in self.finalists]
+        coarse = [-1] * ways + [places.get(_key(each, names), -1) for each in self.finalists]
         values = [[p.number(each.values[p.name]) for p in free] for each in every]
         pairs = [each.objectives or [(math.nan, math.nan)] * len(goals) for each in every]
         shape = len(every), len(goals), 2
@@ -268,5 +269,5 @@ class Search:
         return f"{card}<pre>{escape(repr(self))}</pre>"
 
 
-def _key(values: Values) -> tuple[float | str, ...]:
-    return tuple(values.values())
+def _key(candidate: Candidate, names: Sequence[str]) -> tuple[float | str, ...]:
+    return tuple(candidate.values[name] for name in names)

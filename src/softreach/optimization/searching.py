@@ -158,9 +158,12 @@ class _Run:
 
     def result(self, study: Study) -> Search:
         """Search until the designs are spent, then judge the best again."""
-        known = study.candidates()
-        self._spent = sum(each.designs for each in known)
-        self._sample(study, self.first - len(known))
+        self._spent = sum(each.designs for each in study.candidates())
+        if self._spent:
+            self._progress(self._spent)
+        # Other processes may be at work on the same storage.
+        while (left := self.first - len(study.candidates())) > 0:
+            self._sample(study, min(left, _BATCH))
         study.focus()
         while not self._is_over(study):
             self._polish(study)
@@ -181,9 +184,11 @@ class _Run:
         )
 
     def _is_over(self, study: Study) -> bool:
+        known = study.candidates()
+        self._spent = max(self._spent, sum(each.designs for each in known))
         if self._spent >= self._designs:
             return True
-        return not self.problem.goals and any(c.is_feasible for c in study.candidates())
+        return not self.problem.goals and any(each.is_feasible for each in known)
 
     def _sample(self, study: Study, count: int) -> None:
         """Designs of the sampler."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -61,7 +61,7 @@ class Study:
         self._optuna = _library()
         with _quiet():
             self._study = self._opened(storage)
-            self._begin()
+            self._begin(storage)
 
     def ask(self, count: int) -> list[tuple[Any, dict[str, float | str]]]:
         """Trials to be told, and their designs."""
@@ -131,7 +131,7 @@ class Study:
                 study_name=_NAME,
                 storage=None if place is None else _storage(optuna, place),
                 directions=["minimize"] * max(1, len(self.problem.goals)),
-                sampler=self._made_sampler(),
+                sampler=self._made_sampler(self.seed),
                 load_if_exists=True,
             )
         except InvalidInput:
@@ -140,18 +140,26 @@ class Study:
             allowed = "a file that can be written, of this kind of search"
             raise InvalidInput("storage", storage, allowed, in_short(error)) from error
 
-    def _begin(self) -> None:
-        """Note the problem and ask for the first designs; refuse the storage of another one."""
+    def _begin(self, place: str | None) -> None:
+        """Note the problem and ask for the first designs; refuse the storage of another one.
+
+        What was killed in between goes on, and a second process asks for none again.
+        """
         digest = self.problem.digest
-        known = self._study.user_attrs.get(_PROBLEM)
-        if known is not None:
-            if known != digest:
-                allowed = "one of the same designs, requirements and objectives"
-                raise InvalidInput("storage", "of another search", allowed, "choose another file")
-            return
-        for values in first_designs(self.problem, self._first, self.seed):
-            self._study.enqueue_trial(dict(values))
+        noted = self._study.user_attrs.get(_PROBLEM, digest)
+        if noted != digest:
+            allowed = "that of the same designs, requirements and objectives"
+            hint = "it is of another search: remove it, or choose another file"
+            raise InvalidInput("storage", place, allowed, hint)
         self._study.set_user_attr(_PROBLEM, digest)
+        known = self._study.get_trials(deepcopy=False)
+        if known:  # else another process would draw the same designs
+            self._study.sampler = self._made_sampler(self.seed + len(known))
+        names = self.problem.parameters.names
+        asked = {_values_of(trial, names) for trial in known}
+        for values in first_designs(self.problem, self._first, self.seed):
+            if tuple(values[name] for name in names) not in asked:
+                self._study.enqueue_trial(dict(values))
 
     @property
     def kind(self) -> str:
@@ -163,8 +171,8 @@ class Study:
         real = all(each.is_real for each in self.problem.parameters.free)
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
-    def _made_sampler(self) -> Any:
-        samplers, seed = self._optuna.samplers, self.seed
+    def _made_sampler(self, seed: int) -> Any:
+        samplers = self._optuna.samplers
         population = max(8, min(self._first, 48))
         return {
             "cma": lambda: samplers.CmaEsSampler(seed=seed, warn_independent_sampling=False),
@@ -195,6 +203,12 @@ class Study:
             return [candidate.excess]
         missed = min(_MISSED * (1.0 + candidate.excess), _NEVER)
         return [missed] * max(1, len(self.problem.goals))
+
+
+def _values_of(trial: Any, names: Sequence[str]) -> tuple[Any, ...]:
+    """Values of a trial, or those that it is going to have."""
+    values = trial.params or trial.system_attrs.get("fixed_params", {})
+    return tuple(values.get(name) for name in names)
 
 
 def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
