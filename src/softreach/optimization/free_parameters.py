@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from softreach.arm.tables import check_extension
 from softreach.support.arguments import as_given, as_mapping, plain
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 from softreach.support.quantity import read_quantity
 
 __all__ = [
@@ -101,7 +101,7 @@ class FreeParameters:
         """Names of the free parameters."""
         return tuple(parameter.name for parameter in self.free)
 
-    @cached_property
+    @lazy
     def real(self) -> tuple[FreeParameter, ...]:
         """Those that can change a little, which a polish moves."""
         return tuple(parameter for parameter in self.free if parameter.is_real)
@@ -165,7 +165,7 @@ class FreeParameters:
     def _only(self) -> Manipulator:
         return next(iter(self.bases.values()))
 
-    @cached_property
+    @lazy
     def _whole(self) -> frozenset[str]:
         return frozenset(parameter.name for parameter in self.free if parameter.whole)
 

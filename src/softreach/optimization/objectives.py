@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from softreach.rod.rods import tip_map
 from softreach.sampling import cube_blocks
 from softreach.support.arguments import as_given, as_names
 from softreach.support.errors import InvalidInput, did_you_mean, no_warnings
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,7 +55,7 @@ class DesignCase:
     fine: bool = True
     """Clouds have as many samples as numbers that are reported need."""
 
-    @cached_property
+    @lazy
     @no_warnings()
     def reached(self) -> ReachableSet:
         """The reachable set."""
@@ -62,7 +63,7 @@ class DesignCase:
 
         return reachable_set(self.arm, accuracy=self.accuracy)
 
-    @cached_property
+    @lazy
     @no_warnings()
     def check(self) -> Check:
         """What is met and what is missed; on the way by poses that few descents find."""
@@ -70,7 +71,7 @@ class DesignCase:
             return check(self.arm, self.requirements, accuracy=self.accuracy)
         return quick_check(self.arm, self.requirements, self.accuracy)
 
-    @cached_property
+    @lazy
     @no_warnings()
     def cloud(self) -> xr.Dataset:
         """Samples of the activation box."""
@@ -90,7 +91,7 @@ class DesignCase:
             return float(metric.value({Need.REACHABLE_SET: self.reached}, {}))
         return float(metric.value(self._intermediates, {}))
 
-    @cached_property
+    @lazy
     def _intermediates(self) -> Intermediates:
         (cube,) = cube_blocks("sobol", self.samples, tip_map(self.arm).box.bundles, 0, self.samples)
         command = Command(

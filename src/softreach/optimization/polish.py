@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import DesignPoint, Point
+from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
 from softreach.rod.rods import tip_map
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
@@ -79,9 +79,9 @@ def _solved(program: _Program, first: Array, iterations: int) -> Array:
 
     point = program.point(first)
     constraints = []
-    for kind, given in (("eq", point.equations), ("ineq", point.rooms)):
-        if len(given[0]):
-            fun, jac = program.asked(kind, 0), program.asked(kind, 1)
+    for kind, parts in (("eq", point.equations), ("ineq", point.rooms)):
+        if parts:
+            fun, jac = program.asked(kind, stacked), program.asked(kind, stacked_slopes)
             constraints.append({"type": kind, "fun": fun, "jac": jac})
     result = minimize(
         program.cost,
@@ -177,11 +177,11 @@ class _Program:
         except (InvalidDesign, InvalidInput):
             return np.zeros(len(unknowns))
 
-    def asked(self, kind: str, order: int) -> Callable[[Array], Array]:
-        """Equations ("eq") or rooms ("ineq"), or their derivatives (order 1)."""
+    def asked(self, kind: str, what: Callable[[Sequence[Part]], Array]) -> Callable[[Array], Array]:
+        """Function of unknowns: values or derivatives of equations ("eq") or rooms ("ineq")."""
 
         def values(unknowns: Array) -> Array:
             point = self.point(unknowns)
-            return (point.equations if kind == "eq" else point.rooms)[order]
+            return what(point.equations if kind == "eq" else point.rooms)
 
         return values

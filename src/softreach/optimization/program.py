@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, partial
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from softreach.rod.rods import refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
+from softreach.support.lazy import lazy
 from softreach.workspace.gradient import VolumeGradient, volume_gradient
 from softreach.workspace.tip_derivatives import TipDerivatives
 
@@ -39,6 +40,7 @@ _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
 }
 _TOL = 1e-9  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
+_FAR = 0.25  # over L or relative: room beyond which a rule is not differentiated
 _ROOM = 0.99  # of the distance within which a tip must come to a place
 _SPARE = 1e-4  # over L or relative, by which limits are kept
 _POWER = 40  # of the mean that stands for the largest effort
@@ -53,17 +55,17 @@ class DesignPoint:
     values: Values
     accuracy: float
 
-    @cached_property
+    @lazy
     def case(self) -> DesignCase:
         """The design, to be asked."""
         return self.problem.case(self.values, self.accuracy)
 
-    @cached_property
+    @lazy
     def rods(self) -> tuple[TipMap, ...]:
         """Its tip map under each payload."""
         return tuple(refined(tip_map(arm), _TOL) for arm in _laden(self.problem, self.case.arm))
 
-    @cached_property
+    @lazy
     def derivatives(self) -> tuple[TipDerivatives, ...]:
         """∂r/∂p of each of these, by parameters of the arm."""
         known = [find_parameters(rod.arm, self._paths[0]) for rod in self.rods]
@@ -72,12 +74,12 @@ class DesignPoint:
             for rod, each in zip(self.rods, known, strict=True)
         )
 
-    @cached_property
+    @lazy
     def chain(self) -> Array:
         """Change of parameters of the arm by unknowns: ranges and ties, shape (paths, reals)."""
         return self._paths[1]
 
-    @cached_property
+    @lazy
     def sets(self) -> VolumeGradient:
         """Derivatives of the reachable set."""
         return volume_gradient(self.case.arm, self._paths[0], accuracy=self.accuracy)
@@ -93,7 +95,7 @@ class DesignPoint:
         slopes = [(of(ahead) - of(behind)) / step for step, ahead, behind in self.neighbors]
         return of(self.case.arm), np.array(slopes)
 
-    @cached_property
+    @lazy
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:
         """Designs on both sides along each real parameter, and how far they are apart."""
         parameters, pairs = self.problem.parameters, []
@@ -108,7 +110,7 @@ class DesignPoint:
             pairs.append((float((ends[0] - ends[1]) / (high - low)[k]), *arms))
         return pairs
 
-    @cached_property
+    @lazy
     def _paths(self) -> tuple[tuple[str, ...], Array]:
         """Parameters of the arm that move, and the chain."""
         parameters = self.problem.parameters
@@ -150,7 +152,7 @@ class Point:
     goal: int
     floors: Sequence[float]
 
-    @cached_property
+    @lazy
     def cost_value(self) -> float:
         """Cost of the goal alone, for which sets need not be differentiated."""
         goals = self.design.problem.goals
@@ -159,23 +161,22 @@ class Point:
         goal = goals[self.goal]
         return -goal.sense * float(getattr(self.design.case.reached, SETS[goal.name]))
 
-    @cached_property
+    @lazy
     def cost(self) -> tuple[float, Array]:
         """Cost of the goal and its derivatives."""
         goals = self.design.problem.goals
         return self._cost_of(goals[self.goal]) if goals else (0.0, np.zeros(self._size))
 
-    @cached_property
-    def equations(self) -> tuple[Array, Array]:
+    @lazy
+    def equations(self) -> tuple[Part, ...]:
         """Tips less the places that they must be at, over L."""
-        parts = self._tips
-        return _stacked([(gap, slope) for gap, slope, within in parts if within == 0.0], self._size)
+        return tuple(part for part in self._tips if part.within == 0.0)
 
-    @cached_property
-    def rooms(self) -> tuple[Array, Array]:
+    @lazy
+    def rooms(self) -> tuple[Part, ...]:
         """What must not fall below 0: limits, measures, regions, other goals."""
-        parts = [*self._near_places(), *self._rules(), *self._of_design(), *self._other_goals()]
-        return _stacked(parts, self._size)
+        near = (_near_place(part) for part in self._tips if part.within > 0.0)
+        return (*near, *self._rules(), *self._of_design(), *self._other_goals())
 
     @property
     def _size(self) -> int:
@@ -207,118 +208,172 @@ class Point:
         ).ravel()
         return mean, slope
 
-    @cached_property
-    def _tips(self) -> list[tuple[Array, Array, float]]:
-        """Tip less place over L, its derivatives, and how near it must come, of each pose."""
-        needs, result = self.design.problem.requirements, []
-        places, within = needs.places, _within(needs.targets)
-        if not len(places):
-            return []
-        poses = self.poses.reshape(len(self.design.rods), -1, self.poses.shape[-1])
-        count, start = len(self.reals), len(self.reals)
-        for rod, derivatives, cube in zip(
-            self.design.rods, self.design.derivatives, poses, strict=True
-        ):
-            box, length = rod.box, rod.length
-            tips, slopes = stable_tips(rod).tips_and_slopes(box.from_free_cube(cube))
-            by_pose = slopes[:, :, box.free] * box.widths[box.free] / length
-            by_real = derivatives.at(cube) @ self.design.chain / length
-            gaps = np.nan_to_num((tips - places) / length, nan=_NOWHERE)
-            for k in range(len(places)):
-                slope = np.zeros((3, self._size))
-                slope[:, :count] = np.nan_to_num(by_real[k])
-                slope[:, start : start + cube.shape[1]] = np.nan_to_num(by_pose[k])
-                start += cube.shape[1]
-                result.append((gaps[k], slope, within[k] / length))
-        return result
-
-    def _near_places(self) -> list[tuple[Array, Array]]:
-        """Places that need not be met exactly: how much nearer the tip is than it must be."""
-        return [
-            (np.array([(within**2 - gap @ gap) / within]), -2.0 / within * (gap @ slope)[None])
-            for gap, slope, within in ((g, s, _ROOM * w) for g, s, w in self._tips)
-            if within > 0.0
-        ]
-
-    def _rules(self) -> list[tuple[Array, Array]]:
-        """Regions to keep to and limits of poses, by differences."""
-        needs = self.design.problem.requirements
-        keeps = [keep for keep in needs.keeps if keep.when == "targets"]
-        if not len(self.poses):
-            return []
-        arms, parts = _laden(self.design.problem, self.design.case.arm), []
-        poses = self.poses.reshape(len(arms), -1, self.poses.shape[-1])
-        start = len(self.reals)
-        for number, (arm, cube) in enumerate(zip(arms, poses, strict=True)):
-            rules = PoseRules.of(arm, keeps, needs.limits, np.inf)
-            if not len(rules):
-                return []
-            value = _room(rules, cube)
-            slope = np.zeros((*value.shape, self._size))
-            for k, (apart, *pair) in enumerate(self.design.neighbors):
-                ahead, behind = (
-                    _room(
-                        PoseRules.of(
-                            _laden(self.design.problem, a)[number], keeps, needs.limits, np.inf
-                        ),
-                        cube,
-                    )
-                    for a in pair
-                )
-                slope[:, :, k] = (ahead - behind) / apart
-            for j in range(cube.shape[1]):
-                ends = []
-                for side in (1, -1):
-                    moved = cube.copy()
-                    moved[:, j] = np.clip(moved[:, j] + side * _STEP, 0.0, 1.0)
-                    ends.append((moved[:, j], _room(rules, moved)))
-                (high, ahead), (low, behind) = ends
-                column = start + np.arange(len(cube)) * cube.shape[1] + j
-                change = (ahead - behind) / (high - low)[:, None]
-                slope[np.arange(len(cube)), :, column] = change
-            start += cube.size
-            parts.append((value.ravel(), slope.reshape(-1, self._size)))
+    @lazy
+    def _tips(self) -> list[Part]:
+        """Tip less place over L of each pose."""
+        needs, parts = self.design.problem.requirements, []
+        within = _within(needs.targets)
+        for number, (rod, cube) in enumerate(self._by_payload()):
+            tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+            gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
+            slopes = lazily(partial(self._tip_slopes, number))
+            for k, gap in enumerate(gaps):
+                slope = partial(_row, slopes, k)
+                parts.append(Part(f"place {k + 1}", gap, slope, within[k] / rod.length))
         return parts
 
-    def _of_design(self) -> list[tuple[Array, Array]]:
+    def _tip_slopes(self, number: int) -> Array:
+        """Derivatives of tips over L under one payload, shape (place, 3, unknowns)."""
+        rod, cube = self._by_payload()[number]
+        box, count = rod.box, len(self.reals)
+        _, slopes = stable_tips(rod).tips_and_slopes(box.from_free_cube(cube))
+        result = np.zeros((len(cube), 3, self._size))
+        result[:, :, :count] = self.design.derivatives[number].at(cube) @ self.design.chain
+        for j, column in enumerate(self._columns(number)):
+            result[np.arange(len(cube)), :, column] = (
+                slopes[:, :, box.free[j]] * box.widths[box.free[j]]
+            )
+        return np.nan_to_num(result / rod.length)
+
+    def _by_payload(self) -> list[tuple[TipMap, Array]]:
+        """Tip map and poses under each payload."""
+        if not len(self.poses):
+            return []
+        rods = self.design.rods
+        return list(zip(rods, self.poses.reshape(len(rods), -1, self.poses.shape[1]), strict=True))
+
+    def _columns(self, number: int) -> Array:
+        """Columns of the unknowns of poses under one payload, shape (free inputs, place)."""
+        rods, free = len(self.design.rods), self.poses.shape[1]
+        places = len(self.poses) // rods
+        first = len(self.reals) + number * places * free
+        return first + np.arange(places * free).reshape(places, free).T
+
+    def _rules(self) -> Iterator[Part]:
+        """Regions to keep to and limits of poses."""
+        needs = self.design.problem.requirements
+        keeps = [keep for keep in needs.keeps if keep.when == "targets"]
+
+        def rules_of(arm: Manipulator, number: int) -> PoseRules:
+            laden = _laden(self.design.problem, arm)[number]
+            return PoseRules.of(laden, keeps, needs.limits, np.inf)
+
+        for number, (_, cube) in enumerate(self._by_payload()):
+            rules = rules_of(self.design.case.arm, number)
+            if not len(rules):
+                return
+            value = _room(rules, cube)
+            slopes = lazily(partial(self._rule_slopes, rules_of, number, value))
+            names = [*(keep.name for keep in keeps), *rules.limits]
+            for column, name in enumerate(names):
+                yield Part(name, value[:, column], partial(_column, slopes, column))
+
+    def _rule_slopes(
+        self, rules_of: Callable[[Manipulator, int], PoseRules], number: int, value: Array
+    ) -> Array:
+        """Derivatives of rules by differences, shape (place, rule, unknowns); 0 far from them."""
+        slope = np.zeros((*value.shape, self._size))
+        if (value > _FAR).all():
+            return slope
+        rules, cube = rules_of(self.design.case.arm, number), self._by_payload()[number][1]
+        for k, (apart, *pair) in enumerate(self.design.neighbors):
+            ahead, behind = (_room(rules_of(arm, number), cube) for arm in pair)
+            slope[:, :, k] = (ahead - behind) / apart
+        for j, column in enumerate(self._columns(number)):
+            ends, rooms = np.repeat(cube[None], 2, axis=0), []
+            ends[:, :, j] = np.clip(cube[:, j] + np.array([[_STEP], [-_STEP]]), 0.0, 1.0)
+            rooms = [_room(rules, end) for end in ends]
+            apart = (ends[0, :, j] - ends[1, :, j])[:, None]
+            slope[np.arange(len(cube)), :, column] = (rooms[0] - rooms[1]) / apart
+        return slope
+
+    def _of_design(self) -> Iterator[Part]:
         """Limits and measures that follow from the design or its set."""
-        needs, parts = self.design.problem.requirements, []
+        needs = self.design.problem.requirements
         for name, (low, high) in needs.measures.items():
-            if name not in SETS:
-                continue
-            value, slope = self.design.of_set(name)
-            parts += [self._room_below(value, slope, high), self._room_above(value, slope, low)]
+            if name in SETS:
+                value = float(getattr(self.design.case.reached, SETS[name]))
+                slope = partial(self.design.of_set, name)
+                for sense, limit in ((1.0, high), (-1.0, low)):
+                    if limit is not None:
+                        yield self._limit(name, sense, value, limit, slope)
         for name in _OF_ARM:
             most = needs.limits.given.get(name)
             if most is not None:
-                parts.append(self._room_below(*self.design.of_arm(name), most))
-        return [part for part in parts if part is not None]
+                value = _OF_ARM[name](self.design.case.arm)
+                yield self._limit(name, 1.0, value, most, partial(self.design.of_arm, name))
 
-    def _other_goals(self) -> list[tuple[Array, Array]]:
+    def _limit(
+        self,
+        name: str,
+        sense: float,
+        value: float,
+        limit: float,
+        derived: Callable[[], tuple[float, Array]],
+    ) -> Part:
+        """Room below a limit (sense 1) or above it (-1), relative."""
+        scale = abs(limit) or 1.0
+
+        def slope() -> Array:
+            row = np.zeros((1, self._size))
+            row[0, : len(self.reals)] = -sense * derived()[1] / scale
+            return row
+
+        return Part(name, np.array([sense * (limit - value) / scale - _SPARE]), slope)
+
+    def _other_goals(self) -> Iterator[Part]:
         """Goals that must not become worse than given."""
-        parts = []
-        for k, (goal, floor) in enumerate(
-            zip(self.design.problem.goals, self.floors, strict=False)
-        ):
+        goals = self.design.problem.goals
+        for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
             if k != self.goal:
                 cost, slope = self._cost_of(goal)
                 scale = abs(floor) or 1.0
-                parts.append((np.array([(floor - cost) / scale]), -slope[None] / scale))
-        return parts
+                value = np.array([(floor - cost) / scale])
+                yield Part(goal.name, value, partial(np.multiply, -1.0 / scale, slope[None]))
 
-    def _room_below(
-        self, value: float, slope: Array, most: float | None
-    ) -> tuple[Array, Array] | None:
-        if most is None:
-            return None
-        scale, row = abs(most) or 1.0, np.zeros((1, self._size))
-        row[0, : len(self.reals)] = -slope / scale
-        return np.array([(most - value) / scale - _SPARE]), row
 
-    def _room_above(
-        self, value: float, slope: Array, least: float | None
-    ) -> tuple[Array, Array] | None:
-        return None if least is None else self._room_below(-value, -slope, -least)
+@dataclass(frozen=True)
+class Part:
+    """Equations or rooms of one requirement, whose derivatives are made when asked for."""
+
+    name: str
+    """Of the requirement."""
+    value: Array
+    """Shape (n,)."""
+    slope: Callable[[], Array]
+    """Makes the derivatives by all unknowns, shape (n, unknowns)."""
+    within: float = 0.0
+    """Distance to a place that is allowed, over L."""
+
+
+def stacked(parts: Sequence[Part]) -> Array:
+    """All values, shape (n,)."""
+    return np.concatenate([np.empty(0), *(part.value for part in parts)])
+
+
+def stacked_slopes(parts: Sequence[Part]) -> Array:
+    """All derivatives, shape (n, unknowns)."""
+    return np.concatenate([part.slope() for part in parts])
+
+
+def _near_place(part: Part) -> Part:
+    """How much nearer the tip is than it must be, over that distance."""
+    gap, within = part.value, _ROOM * part.within
+    value = np.array([(within**2 - gap @ gap) / within])
+    return Part(part.name, value, lambda: -2.0 / within * (gap @ part.slope())[None])
+
+
+def _row(slopes: Callable[[], Array], k: int) -> Array:
+    return slopes()[k]
+
+
+def _column(slopes: Callable[[], Array], k: int) -> Array:
+    return slopes()[:, k]
+
+
+def lazily(make: Callable[[], Array]) -> Callable[[], Array]:
+    """A function that calls another once."""
+    return cache(make)
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:
@@ -339,9 +394,3 @@ def _within(targets: Sequence[object]) -> Array:
         if target.places is not None  # pyright: ignore
     ]
     return np.concatenate([np.empty(0), *each])
-
-
-def _stacked(parts: Sequence[tuple[Array, Array]], size: int) -> tuple[Array, Array]:
-    values = [value for value, _ in parts]
-    slopes = [slope for _, slope in parts]
-    return np.concatenate([np.empty(0), *values]), np.concatenate([np.empty((0, size)), *slopes])

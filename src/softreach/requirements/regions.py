@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,7 @@ from softreach.support.arrays import (
     read_only,
 )
 from softreach.support.errors import InvalidInput, counted
+from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
 __all__ = ["Box", "HalfSpace", "Mesh", "Region", "Sphere"]
@@ -45,6 +46,9 @@ _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
 
 class Region(ABC):
     """A part of space; lengths in m, in the world."""
+
+    convex: ClassVar[bool] = True
+    """With two points it holds all between them."""
 
     @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
@@ -281,6 +285,8 @@ class Mesh(Region):
             the same way; or nothing inside.
     """
 
+    convex: ClassVar[bool] = False
+
     vertices: Array
     """Corners [m], shape (v, 3)."""
     faces: Index
@@ -337,7 +343,7 @@ class Mesh(Region):
         """Volume inside [m³]."""
         return self._volume
 
-    @cached_property
+    @lazy
     def _volume(self) -> float:
         return enclosed_volume(self.vertices, self.faces)
 
@@ -372,24 +378,24 @@ class Mesh(Region):
         sharp = (first * second).sum(axis=1) < _CREASE
         return list(self.vertices[edges[sharp]])
 
-    @cached_property
+    @lazy
     def _corners(self) -> Array:
         return self.vertices[self.faces]
 
-    @cached_property
+    @lazy
     def _spheres(self) -> tuple[Array, Array]:
         center = self._corners.mean(axis=1)
         radius = np.linalg.norm(self._corners - center[:, None], axis=2).max(axis=1)
         return np.ascontiguousarray(center), radius
 
-    @cached_property
+    @lazy
     def _face_normals(self) -> Array:
         a, b, c = self._corners.swapaxes(0, 1)
         normal = np.cross(b - a, c - a)
         size = np.linalg.norm(normal, axis=1, keepdims=True)
         return np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
 
-    @cached_property
+    @lazy
     def _edges(self) -> tuple[Index, Index, Index]:
         """Edges as vertices (e, 2), the faces beside each (e, 2), and edges of each face (f, 3)."""
         pairs = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2), axis=2)
@@ -398,11 +404,11 @@ class Mesh(Region):
         beside = np.argsort(number, kind="stable").reshape(-1, 2) // 3
         return edges, beside, number.reshape(-1, 3)
 
-    @cached_property
+    @lazy
     def _edge_normals(self) -> Array:
         return self._face_normals[self._edges[1]].sum(axis=1)
 
-    @cached_property
+    @lazy
     def _vertex_normals(self) -> Array:
         normals = np.zeros_like(self.vertices)
         for k in range(3):
