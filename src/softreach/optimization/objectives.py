@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from softreach.workspace import ReachableSet
 
-__all__ = ["OBJECTIVES", "DesignCase", "Goal", "Objective", "Value", "goals"]
+__all__ = ["OBJECTIVES", "DesignCase", "Goal", "Objective", "Value", "goals", "known_objective"]
 
 _COARSE, _FINE = 1 << 12, 1 << 15
 """Samples of a cloud, for what is asked of one, of coarse and of fine cases."""
@@ -159,7 +159,7 @@ def goals(
     result = []
     for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
         several = [given] if isinstance(given, Metric) else _each(word, given)
-        result += [Goal(_objective(word, each), sense) for each in several]
+        result += [Goal(known_objective(word, each), sense) for each in several]
     names = [goal.name for goal in result]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("objective", twice[0], "given once")
@@ -180,7 +180,16 @@ def _each(word: str, given: Any) -> Sequence[str | Metric]:
     return as_names(word, given)
 
 
-def _objective(word: str, given: str | Metric) -> Objective:
+def known_objective(word: str, given: str | Metric) -> Objective:
+    """The objective of a name, or of a metric.
+
+    Args:
+        word: What errors call it.
+        given: Its name, or a metric.
+
+    Raises:
+        InvalidInput: There is none.
+    """
     if isinstance(given, str) and given in OBJECTIVES:
         return OBJECTIVES[given]
     metric = given if isinstance(given, Metric) else known_metric(given)

@@ -95,7 +95,8 @@ class _Reader:
 
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""
-        self._check_keys(document, {key: key for key in _KEYS}, "", ("payloads",))
+        keys = (*_KEYS, "search")  # which the search of designs reads
+        self._check_keys(document, {key: key for key in keys}, "", ("payloads",))
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
         payloads = self._value(document, "", "payloads", "kg", several=True)
