@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 
@@ -14,6 +15,7 @@ from hypothesis import HealthCheck, settings
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
+from softreach.plot import style
 from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 pytest_plugins = ["tests.durations"]
@@ -36,10 +38,11 @@ def trunk() -> Manipulator:
 
 @pytest.fixture(scope="session", autouse=True)
 def coarse() -> Iterator[None]:
-    """Few pixels, since laws do not depend on their number."""
+    """Few pixels, since laws do not depend on their number, and PDF files without fonts."""
     with pytest.MonkeyPatch.context() as patch:
         for module in ("axes", "sheet", "style"):
             patch.setattr(f"softreach.plot.{module}.DPI", 60)
+        patch.setitem(style._SAVING, "pdf.use14corefonts", True)
         yield
 
 
@@ -56,6 +59,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     half = len(long) // 2
     first = max(0, len(items) // 2 - half)
     items[:] = [*long[:half], *short[:first], *long[half:], *short[first:]]
+
+
+def pytest_collection_finish() -> None:
+    """Thousands of tests and all modules stay to the end: no search for garbage looks at them."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

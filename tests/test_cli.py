@@ -505,7 +505,11 @@ def test_every_command_calls_its_output_by_one_name():
     assert set(written) >= {"cloud", "volume", "reach", "design", "track", "show", "demo"}
     for name in set(written) - {"export", "import"}:
         words = ["--out", "a.xyz"], ["-o", "a.xyz"]
-        least = {"track": ["x", "y"], "calibrate": ["x", "y", "--free", "pose"]}
+        least = {
+            "track": ["x", "y"],
+            "check": ["x", "y"],
+            "calibrate": ["x", "y", "--free", "pose"],
+        }
         least |= {"demo": [], "paper": [], "plan-poses": ["x", "--free", "pose"]}
         long, short = (
             app.parse_args([name, *least.get(name, ["x"]), *one])[1].arguments["out"]

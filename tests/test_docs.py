@@ -3,13 +3,14 @@
 A fence in `README.md` or `docs/` is one of these, or the test fails:
 
 - `python`: executed, in order, in one namespace per page and a folder that is empty but for the
-  files `tentacle.*` of `examples/`. One that cannot be
+  files `tentacle.*`, `three_fibers.toml` and `five_places.toml` of `examples/`. One that cannot be
   says why in its first line: `# not executed: REASON`. One that begins with a name, `# magnets.py`,
   is written to a file of this name, from which others can import.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
-  `# exit code 2` must fail so, and `softreach studio` is ended once it serves its page. Other lines
-  set up a machine and are not executed.
-- `toml`: read as a design.
+  `# exit code 2` must fail so, one in `# exit code 1` find a requirement missed, and
+  `softreach studio` is ended once it serves its page. Other lines set up a machine and are not
+  executed.
+- `toml`: read as a design; with `[[reach]]`, as requirements.
 - `text` right after one of these: what it printed. Numbers may differ by 0.1 %; `...` stands for
   anything up to the end of the line.
 - `bibtex`: data.
@@ -43,7 +44,11 @@ from softreach.cli.app import run
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-EXAMPLES = sorted((ROOT / "examples").glob("tentacle.*"))
+EXAMPLES = [
+    path
+    for pattern in ("tentacle.*", "five_places.toml", "three_fibers.toml")
+    for path in sorted((ROOT / "examples").glob(pattern))
+]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
 FEW = 5_000  # samples
@@ -173,7 +178,8 @@ def run_commands(example):
             if words[:2] == ["softreach", "studio"]:
                 serve_and_end(words[1:])
             elif words and words[0] == "softreach":
-                expected = 2 if line.rstrip().endswith("# exit code 2") else 0
+                told = re.search(r"# exit code ([12])$", line.rstrip())
+                expected = int(told[1]) if told else 0
                 assert run(_few(words[1:]) if small else words[1:]) == expected, line
             else:
                 assert not words or words[0] in SETUP, f"neither softreach nor set-up: {line}"
@@ -200,7 +206,15 @@ def _few(arguments):
 
 
 def read_design(example):
-    """Read a fence as a design file, and keep it as one for the commands that follow."""
+    """Read a fence as a design file, and keep it as one for the commands that follow.
+
+    One of requirements is `needs.toml` to them.
+    """
+    if "[[reach]]" in example.parsed:
+        sr.Requirements.from_toml(example.parsed)
+        Path("needs.toml").write_text(example.parsed, encoding="utf-8")
+        example.namespace["_printed"] = None
+        return
     sr.Manipulator.from_toml(example.parsed)
     Path("trunk.toml").write_text(example.parsed, encoding="utf-8")
     example.namespace["_printed"] = None

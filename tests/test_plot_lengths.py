@@ -222,6 +222,22 @@ def plot_arm(of):
 
 
 @case(may_not_know=False)
+def plot_check(of):
+    """At the tip of the arm at rest, inside a box around it."""
+    needs = sr.requirements
+    box = needs.Box(*(of.rest.min(axis=0) - 0.01, of.rest.max(axis=0) + 0.01))
+    check = sr.check(
+        of.arm,
+        sr.Requirements(
+            targets=[needs.Target([0.0, 0.0, LENGTH])],
+            keeps=[needs.Keep(box, True)],
+        ),
+    )
+    yield from plane(plot.plot_check(check, view="side"), box.bounds)
+    yield from space(plot.plot_check(check), box.bounds)
+
+
+@case(may_not_know=False)
 def plot_compliance(of):
     """Ellipsoids far smaller than the arm, which lies along one direction."""
     rest = rest_configuration(of.arm)

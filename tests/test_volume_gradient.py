@@ -22,10 +22,13 @@ from softreach.rod.rods import tip_map
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
+from softreach.workspace.boundary_samples import boundary_samples
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.reach import rasterized_set
+from softreach.workspace.tip_derivatives import TipDerivatives
 from tests.bodies import rubber
 from tests.cable import Cable
+from tests.test_redundant_set import five_bundles
 
 NARROW = designs.minimal_trunk().with_bounds((-0.9, -0.3))
 NAMES = ("taper", "revolution", "left.offset", "rings[0].inner_ratio", "lower", "right.upper")
@@ -37,24 +40,31 @@ def narrow() -> VolumeGradient:
     return volume_gradient(NARROW, NAMES)
 
 
-def difference(arm: Manipulator, name: str, step: float, volume) -> float:
-    """Derivative by differences of fourth order over steps relative to the parameter."""
-    value = find_parameter(arm, name).value(arm)
-    h = step * abs(value)
-    at = [volume(changed(arm, {name: value + k * h})) for k in (-2, -1, 1, 2)]
-    return (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h)
+def difference(arm: Manipulator, steps: dict[str, float], volume) -> float:
+    """Derivative by differences of fourth order, along steps of several parameters."""
+    start = {name: find_parameter(arm, name).value(arm) for name in steps}
+
+    def at(k):
+        return volume(changed(arm, {name: start[name] + k * h for name, h in steps.items()}))
+
+    return (at(-2) - 8 * at(-1) + 8 * at(1) - at(2)) / 12
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_where_the_flux_holds_it_is_exact_to_a_millionth(narrow, name):
+@pytest.mark.parametrize(
+    "names", [NAMES, *(pytest.param((name,), marks=pytest.mark.large) for name in NAMES)], ids=str
+)
+def test_where_the_flux_holds_it_is_exact_to_a_millionth(narrow, names):
+    """By each parameter, or along a direction in which all change the volume alike."""
+
     def raster(arm):
         return rasterized_set(tip_map(arm, 1e-9), 42, None, 3e-3).volume
 
-    row = narrow.parameters.index(name)
+    rows = [narrow.parameters.index(name) for name in names]
     assert narrow.route == "flux"
-    assert narrow.volume_error[row] < 1e-6 * abs(narrow.volume[row])
-    expected = difference(NARROW, name, 5e-3, raster)
-    assert narrow.volume[row] == pytest.approx(expected, rel=1e-6)
+    assert (narrow.volume_error < 1e-6 * np.abs(narrow.volume)).all()
+    steps = dict(zip(names, 1.5e-4 / narrow.volume[rows], strict=True))
+    expected = difference(NARROW, steps, raster)
+    assert 1.5e-4 * len(names) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +76,8 @@ def test_the_convex_volume_s_derivative_is_within_its_error(narrow, name):
         return reachable_set(arm, accuracy=5e-4).convex_volume
 
     row = narrow.parameters.index(name)
-    expected = difference(NARROW, name, 2e-2, convex)
+    h = 2e-2 * find_parameter(NARROW, name).value(NARROW)
+    expected = difference(NARROW, {name: h}, convex) / h
     error = narrow.convex_volume_error[row]
     assert abs(narrow.convex_volume[row] - expected) < error
     assert error < 0.02 * np.abs(narrow.convex_volume).max()
@@ -189,7 +200,8 @@ def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
     def raster(arm):
         return rasterized_set(tip_map(arm), 60, 0.01, 1e-2).volume
 
-    expected = difference(arm, name, 2e-2, raster)
+    h = 2e-2 * find_parameter(arm, name).value(arm)
+    expected = difference(arm, {name: h}, raster) / h
     assert abs(found.volume[0] - expected) < 2.0 * found.volume_error[0]
     assert found.volume_error[0] < 0.02 * abs(found.volume[0])
 
@@ -278,3 +290,114 @@ def test_loaded_arms_have_derivatives_too():
     at = [volume(changed(arm, {"upper": value + k * steps})) for k in (-1, 1)]
     expected = (at[1] - at[0]) / (2 * steps)
     assert found.volume[0] == pytest.approx(expected, rel=0.05)
+
+
+TRUNK = designs.minimal_trunk()
+FOLDED = changed(
+    designs.minimal_trunk(revolution=np.radians(54), taper=np.radians(2.7)),
+    {
+        "left.revolution": np.radians(-176),
+        "right.revolution": np.radians(181),
+        "longitudinal.revolution": np.radians(8),
+    },
+)
+FOUR = designs.redundant_trunk()
+
+
+@cache
+def rough(arm: Manipulator, *names: str) -> VolumeGradient:
+    return volume_gradient(arm, names, accuracy=0.03)
+
+
+of_some = pytest.mark.parametrize("arm", [FOLDED, FOUR], ids=["three", "four"])
+
+
+@of_some
+def test_rough_derivatives_grow_with_the_size_too(arm):
+    found = rough(arm, "length", "outer_radius")
+    sizes = np.array([arm.length, float(arm.profile.radius(0.0))])
+    solid = found.solid
+    assert found.route == ("raster" if arm is FOLDED else "search")
+    off = sizes @ found.volume - 3.0 * solid.volume
+    assert abs(off) < sizes @ found.volume_error + 3.0 * solid.volume_error
+    assert abs(off) < 0.01 * solid.volume
+    off = sizes @ found.convex_volume - 3.0 * solid.convex_volume
+    assert abs(off) < sizes @ found.convex_volume_error + 3.0 * solid.convex_volume_error
+
+
+@of_some
+def test_where_all_actuators_turn_the_volume_stays(arm):
+    found = rough(arm, *(f"{actuator.name}.offset" for actuator in arm.actuators))
+    assert abs(found.volume.sum()) < found.volume_error.sum()
+    assert found.volume_error.sum() < 0.4 * np.abs(found.volume).sum()
+    assert abs(found.convex_volume.sum()) < found.convex_volume_error.sum()
+
+
+@pytest.mark.parametrize("arm", [TRUNK, FOUR], ids=["three", "four"])
+def test_mirrored_actuators_have_mirrored_derivatives(arm):
+    found = rough(arm, "left.offset", "right.offset", "left.revolution", "right.revolution")
+    for k in (0, 2):
+        off = abs(found.volume[k] + found.volume[k + 1])
+        assert off < found.volume_error[k : k + 2].sum()
+
+
+@pytest.mark.parametrize(
+    ("arm", "name", "step"),
+    [
+        (FOLDED, "left.offset", 0.01),
+        (FOLDED, "taper", 0.02),
+        pytest.param(FOUR, "lower", 0.05, marks=pytest.mark.large),
+        pytest.param(FOUR, "left.extent", 0.05, marks=pytest.mark.large),
+    ],
+)
+def test_rough_derivatives_are_those_of_finer_volumes_within_their_errors(arm, name, step):
+    value = find_parameter(arm, name).value(arm)
+    h, found = step * abs(value), rough(arm, name)
+    ends = [reachable_set(changed(arm, {name: value + k * h}), accuracy=2e-3) for k in (-1, 1)]
+    expected = (ends[1].volume - ends[0].volume) / (2 * h)
+    assert abs(found.volume[0] - expected) < found.volume_error[0]
+    assert found.volume_error[0] < 0.15 * abs(expected)
+
+
+@pytest.mark.large
+def test_five_bundles_have_derivatives_of_finer_volumes():
+    arm = five_bundles()
+    found = volume_gradient(arm, ("length", "outer_radius", "lower"), accuracy=0.02)
+    assert abs(found.volume[:2] @ [1.0, 0.06] / 3.0 - found.solid.volume) < (
+        found.volume_error[:2] @ [1.0, 0.06] / 3.0 + found.solid.volume_error
+    )
+    ends = [reachable_set(changed(arm, {"lower": low}), accuracy=5e-3) for low in (-1.25, -1.15)]
+    assert found.volume[2] == pytest.approx(
+        (ends[1].volume - ends[0].volume) / 0.1, abs=found.volume_error[2]
+    )
+
+
+@of_some
+def test_what_moves_in_two_halves_of_space_is_what_moves(arm):
+    samples, parameter = boundary_samples(rough(arm, "taper").solid.image), "taper"
+    tips = TipDerivatives(tip_map(arm), [find_parameter(arm, parameter)])
+    slopes, right = tips.at(samples.cube), samples.places[:, 0] > 0.0
+    halves = [samples.derivative(slopes, weights)[0] for weights in (right, ~right)]
+    assert sum(halves) == pytest.approx(samples.derivative(slopes)[0], rel=1e-12)
+    assert samples.area.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-12)
+    volume = (samples.area * samples.places).sum() / 3.0
+    assert volume == pytest.approx(rough(arm, "taper").solid.volume, rel=0.05)
+    # A tip map takes each sample's activation to where the boundary is.
+    rod = tip_map(arm)
+    off = rod.tips(rod.box.from_free_cube(samples.cube)) - samples.places
+    assert np.median(np.linalg.norm(off, axis=1)) < 0.01
+
+
+def test_what_moves_in_one_half_is_the_volume_s_derivative_there():
+    """All actuators turned about the axis turn the set: what enters a half crosses its plane."""
+    arm = FOLDED
+    solid = rough(arm, "taper").solid
+    names = [f"{actuator.name}.offset" for actuator in arm.actuators]
+    samples = boundary_samples(solid.image)
+    tips = TipDerivatives(tip_map(arm), [find_parameter(arm, name) for name in names])
+    found = samples.derivative(tips.at(samples.cube), samples.places[:, 0] > 0.0).sum()
+    # ω × r = (-y, x, 0): through the plane x = 0 into x > 0 flows ∫ -y over the cut.
+    grid = solid.grid
+    cut = grid.occupied.astype(float).interp(x=0.0)
+    expected = float((-cut * grid.y).sum()) * grid.attrs["cell"] ** 2
+    assert found == pytest.approx(expected, rel=0.05, abs=0.005)

@@ -6,6 +6,7 @@ from . import exchange as exchange
 from . import export as export
 from . import forces as forces
 from . import inverse as inverse
+from . import optimization as optimization
 from . import plot as plot
 from . import requirements as requirements
 from . import rest as rest
@@ -44,6 +45,7 @@ from .export import cloud_table as cloud_table
 from .inverse import path as path
 from .inverse import solve_inverse as solve_inverse
 from .inverse.path import track_path as track_path
+from .optimization import search as search
 from .requirements import Requirements as Requirements
 from .requirements import check as check
 from .rod import configuration as configuration

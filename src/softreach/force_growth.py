@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -185,7 +185,9 @@ class Growth:
             fixed: The tip to begin with.
             reach: Largest change of each activation, of its range.
         """
-        from scipy.optimize import linprog
+        from scipy import optimize
+
+        linprog = cast(Any, optimize.linprog)  # without types, whose inference takes seconds
 
         box, length = self.box, self.pushing.rod.length
         columns = self._columns(fixed.response, self.unit)

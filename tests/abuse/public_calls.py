@@ -22,6 +22,7 @@ MATERIAL = sr.Material(young_modulus=1e6, density=1000.0)
 HEAVY = sr.designs.minimal_trunk(material=MATERIAL).replace(loads=sr.Loads())
 GAMMA = np.full((1, 3), -0.5)
 TIP = sr.tip_positions(ARM, GAMMA)
+BOX = sr.requirements.Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 
 
 @cache
@@ -80,6 +81,18 @@ def stored():
 def built():
     """That atlas, opened."""
     return sr.open_atlas(stored())
+
+
+@cache
+def needs():
+    """One place to reach."""
+    return sr.Requirements(targets=[sr.requirements.Target(TIP)])
+
+
+@cache
+def judged():
+    """That arm against them."""
+    return sr.check(ARM, needs())
 
 
 @cache
@@ -303,6 +316,9 @@ CALLS: dict[str, Call] = {
     "plot.plot_calibration": Call(
         lambda: dict(calibration=calibration()), kinds=dict(calibration="dataset")
     ),
+    "plot.plot_check": Call(
+        lambda: dict(check=judged()), kinds=dict(check="dataset", poses="whole number")
+    ),
     "plot.plot_cloud": Call(lambda: dict(cloud=cloud())),
     "plot.plot_compliance": Call(
         lambda: dict(arm=ARM, configuration=shape(), compliance=np.eye(3))
@@ -332,6 +348,24 @@ CALLS: dict[str, Call] = {
     "cloud.redundancy.distance_map": Call(lambda: dict(cloud=cloud(), distance=distance())),
     "cloud.redundancy.redundancy_summary": Call(lambda: dict(cloud=cloud(), distance=distance())),
     "cloud.redundancy.tip_density": Call(lambda: dict(cloud=cloud())),
+    "requirements.check": Call(
+        lambda: dict(arm=ARM, requirements=needs()), kinds=dict(requirements="dataset")
+    ),
+    "requirements.quick_excess": Call(
+        lambda: dict(arm=ARM, requirements=needs()), kinds=dict(requirements="dataset")
+    ),
+    "requirements.Box.distance": Call(lambda: dict(points=TIP), function=BOX.distance),
+    "requirements.Box.places": Call(lambda: dict(n=3), function=BOX.places),
+    "requirements.Mesh.load": Call(lambda: dict(path="missing.stl")),
+    "requirements.Requirements.load": Call(
+        lambda: dict(path="missing.toml"), kinds=dict(length="number")
+    ),
+    "requirements.Requirements.from_toml": Call(
+        lambda: dict(text=""), kinds=dict(folder="path", length="number")
+    ),
+    "requirements.Requirements.save": Call(
+        lambda: dict(path="missing/x.toml"), function=sr.Requirements().save
+    ),
     "rest.rest": Call(lambda: dict(arm=HEAVY)),
     "rod.configuration": Call(lambda: dict(arm=ARM, activation=GAMMA)),
     "rod.equilibria": Call(lambda: dict(arm=HEAVY, activations=GAMMA)),

@@ -33,14 +33,10 @@ def test_places_are_those_of_tips_pulled_by_length(loads):
     np.testing.assert_allclose(places[:, 0], sr.tip_positions(arm, inputs, 1e-9), atol=2e-7)
 
 
-def by_differences(model, values, k):
-    """Derivative of places of fourth order, and the scale of what it is of."""
-    step = 2e-3 * max(model.free.scale[k], 0.3 * abs(values[k]))
-    places = []
-    for shift in (-2, -1, 1, 2):
-        other = values.copy()
-        other[k] += shift * step
-        places.append(model.predict(other).places)
+def by_differences(model, values, way):
+    """Derivative of places along a direction of the values, of fourth order."""
+    step = 2e-3
+    places = [model.predict(values + k * step * way).places for k in (-2, -1, 1, 2)]
     return (places[0] - 8 * places[1] + 8 * places[2] - places[3]) / (12 * step)
 
 
@@ -74,23 +70,32 @@ WIRE = [
 
 
 @pytest.mark.parametrize(
-    ("arm", "free", "share"),
+    ("arm", "free", "share", "each"),
     [
-        (hanging_tentacle(), TENTACLE, 1.0),
-        (hanging_tentacle(HEAVY), TENTACLE, 1.0),
-        (pulled_wire(), WIRE, 0.3),
-        (pulled_wire(LIGHT), WIRE, 0.3),
+        pytest.param(hanging_tentacle(), TENTACLE, 1.0, True, id="tentacle"),
+        pytest.param(hanging_tentacle(HEAVY), TENTACLE, 1.0, False, id="heavy tentacle"),
+        pytest.param(pulled_wire(), WIRE, 0.3, True, id="wire"),
+        pytest.param(pulled_wire(LIGHT), WIRE, 0.3, False, id="heavy wire"),
+        *(
+            pytest.param(*case, id=name, marks=pytest.mark.large)
+            for name, case in {
+                "each of a heavy tentacle": (hanging_tentacle(HEAVY), TENTACLE, 1.0, True),
+                "each of a heavy wire": (pulled_wire(LIGHT), WIRE, 0.3, True),
+            }.items()
+        ),
     ],
-    ids=["tentacle", "heavy tentacle", "wire", "heavy wire"],
 )
-def test_derivatives_are_those_of_differences(arm, free, share):
+def test_derivatives_are_those_of_differences(arm, free, share, each, rng):
+    """By each number, or along two directions in which all of them change."""
     model = model_of(arm, free, share * random_inputs(arm, 2, seed=3))
     values = model.free.start
     slopes = model.predict(values, slopes=True).slopes
     assert slopes is not None
-    for k, name in enumerate(model.free.names):
-        change = by_differences(model, values, k)
-        worst = np.abs(slopes[..., k] - change).max()
-        reach = max(np.abs(change).max(), 1e-3 * arm.length / model.free.scale[k])
+    count = len(values)
+    ways = np.eye(count) if each else rng.choice([-1, 1], (2, count)) / np.sqrt(count)
+    for way in ways * np.maximum(model.free.scale, 0.3 * np.abs(values)):
+        change = by_differences(model, values, way)
+        worst = np.abs(slopes @ way - change).max()
+        reach = max(np.abs(change).max(), 1e-3 * arm.length)
         # Tensions under loads are found to 1e-11 L, over a step of 2e-3 of the scale.
-        assert worst <= 1e-7 * reach + (3e-7 * reach if arm.loads else 0.0), name
+        assert worst <= 1e-7 * reach + (3e-7 * reach if arm.loads else 0.0), way

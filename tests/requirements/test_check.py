@@ -274,3 +274,26 @@ def test_many_places_are_met_in_blocks_that_change_nothing(monkeypatch):
     other = sr.check(ARM, needs)
     np.testing.assert_array_equal(one.poses, other.poses)
     np.testing.assert_array_equal(one.gaps, other.gaps)
+
+
+@pytest.mark.parametrize(
+    "keep",
+    [
+        Keep(Sphere((0.1, 0.0, 0.4), 0.5), True),
+        Keep(Box((-0.4, -0.3, 0.0), (0.3, 0.2, 0.9)), True),
+        Keep(HalfSpace((0.0, 0.0, 0.7), (0.2, 0.1, 1.0)), False),
+        Keep(Sphere((0.35, 0.1, 0.4), 0.1), False),
+    ],
+    ids=lambda keep: f"{keep.kind} {type(keep.region).__name__}",
+)
+def test_what_lies_between_the_stations_is_within_the_stated_error(keep):
+    from softreach.requirements.poses import Body
+    from softreach.rod.rods import tip_map
+
+    rod, poses = tip_map(ARM), np.concatenate([GAMMA, [[-1.6, 0.0, 0.0], [-1.6, -1.6, -1.6]]])
+    rows = np.arange(len(poses))
+    fine = Body.of(rod, poses, 4800).missed(keep, rows)[0]
+    for parts in (16, 48):
+        seen, bound = Body.of(rod, poses, parts).missed(keep, rows)
+        assert (seen <= fine + 1e-6).all()  # the error of places
+        assert (fine <= bound + 1e-6).all()

@@ -86,7 +86,7 @@ def test_stable_ones_are_minima_and_signs_count_the_ways_to_fall(load, gravity):
             assert every.signs[k] == (-1) ** ways
 
 
-def softest_of(every, links=48):
+def softest_of(every, links=24):
     """The smallest eigenvalues of the energy of a chain at each equilibrium."""
     rod = every.rod
     chain = Chain(*oracle_rod(rod.arm, rod.body, every.activation, rod.arm.loads), links)

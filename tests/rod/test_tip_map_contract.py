@@ -13,7 +13,7 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softreach as sr
@@ -104,6 +104,7 @@ def differences(f: Callable[[np.ndarray], np.ndarray], gamma: np.ndarray, step: 
     return np.stack(columns, axis=-1)
 
 
+@settings(max_examples=8)
 @given(arm=arms())
 def test_tips_are_those_of_an_independent_integrator(make, arm):
     if make.__wrapped__ is not FreeRod:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.number import series_faults, stations
 from softreach.arm.part import Part
 from softreach.support.errors import Fault
+from softreach.support.lazy import lazy
 
 __all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic", "values_along"]
 
@@ -101,7 +101,7 @@ class Samples(AlongArm):
             return slopes[np.searchsorted(self.breaks, np.asarray(x, float), "right")]
         return self._curve.derivative()(np.asarray(x, float))
 
-    @cached_property
+    @lazy
     def _curve(self) -> Any:
         return monotone_cubic(self.stations_over_length, self.values)
 

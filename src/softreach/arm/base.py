@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -15,6 +14,7 @@ from softreach.arm.number import as_numbers, number
 from softreach.arm.part import Part
 from softreach.support.arrays import read_only
 from softreach.support.errors import Fault
+from softreach.support.lazy import lazy
 
 __all__ = ["POINTS", "UPRIGHT", "Base", "rotation_matrices"]
 
@@ -81,7 +81,7 @@ class Base(Part):
             faults.append(Fault("position", self.position, allowed))
         return super()._faults() + faults
 
-    @cached_property
+    @lazy
     def rotation(self) -> Array:
         """The axes of the base in the world as columns, shape (3, 3), read-only."""
         turned = np.array(_as_rotation(self.points).matrix)
@@ -93,7 +93,7 @@ class Base(Part):
             turned = turned @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return read_only(turned)
 
-    @cached_property
+    @lazy
     def is_identity(self) -> bool:
         """True if the frame of the base is that of the world."""
         return not any(self.position) and bool((self.rotation == np.eye(3)).all())

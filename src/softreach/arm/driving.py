@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +17,7 @@ from softreach.arm.rest_shape import STRAIGHT, RestStrains
 from softreach.arm.tables import ends_over, strain_stations, tables
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.support.errors import Fault, InvalidDesign
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -48,24 +48,24 @@ class Driving:
 
     arm: Manipulator
 
-    @cached_property
+    @lazy
     def law(self) -> LengthLaw:
         """Law of the tendons that are driven by length."""
         return LengthLaw(body_of(self.arm))
 
-    @cached_property
+    @lazy
     def has_length_tendons(self) -> bool:
         """True if tensions follow from displacements."""
         return any(isinstance(each, LengthTendon) for each in self.arm.actuators)
 
-    @cached_property
+    @lazy
     def is_affine(self) -> bool:
         """True if γ(x) has no kinks."""
         is_cut = self._pulls & (self._reached()[:, 0] < 0.0)
         has_dead_zones = any(drive.dead_zone for drive in self.arm.drives)
         return not (self.has_length_tendons or has_dead_zones or is_cut.any())
 
-    @cached_property
+    @lazy
     def ranges(self) -> Array:
         """Bounds of the bundles of the inner arm, displacements among them, shape (bundle, 2)."""
         reached = self._reached()
@@ -78,12 +78,12 @@ class Driving:
             bounds[k] = drive.effective(bounds[k])[0]
         return self._offsets[:, None] + ends_over(self.gains, bounds)
 
-    @cached_property
+    @lazy
     def widths(self) -> Array:
         """Largest |∂γ/∂x| of an affine map, shape (inner bundle, input)."""
         return np.abs(self.gains)
 
-    @cached_property
+    @lazy
     def gains(self) -> Array:
         """Activation of each bundle of the inner arm per effective input, (bundle, input)."""
         names = self.arm.bundle_names
@@ -95,7 +95,7 @@ class Driving:
             gains[bundle, k] = 1.0
         return gains
 
-    @cached_property
+    @lazy
     def _offsets(self) -> Array:
         """Activation of each bundle of the inner arm at inputs of 0; 1 of the rest shape."""
         offsets = np.zeros(self.law.arm.bundles)
@@ -105,7 +105,7 @@ class Driving:
                 offsets[self.arm.bundle_names.index(name)] += offset
         return offsets
 
-    @cached_property
+    @lazy
     def _pulls(self) -> NDArray[np.bool_]:
         """Bundles that drives cannot push: tendons driven by tension, shape (inner bundle,)."""
         pulls = np.zeros(self.law.arm.bundles, bool)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from os import PathLike
 from typing import Any, Self, TypeVar
 
@@ -44,6 +43,7 @@ from softreach.support.arguments import (
 from softreach.support.arrays import as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.atomic import writing
+from softreach.support.lazy import lazy
 from softreach.support.units import UNITS
 
 __all__ = ["Manipulator", "a_manipulator"]
@@ -235,7 +235,7 @@ class Manipulator:
         """
         return self._toml
 
-    @cached_property
+    @lazy
     def _toml(self) -> str:
         return design_file.render(
             self.profile,
@@ -299,28 +299,28 @@ class Manipulator:
         """m, number of independent activations."""
         return sum(actuator.bundles for actuator in self.actuators)
 
-    @cached_property
+    @lazy
     def bundle_names(self) -> tuple[str, ...]:
         """A readable name for each bundle."""
         return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
 
-    @cached_property
+    @lazy
     def bundle_actuators(self) -> tuple[Actuator, ...]:
         """The actuator of each bundle."""
         return tuple(actuator for actuator in self.actuators for _ in range(actuator.bundles))
 
-    @cached_property
+    @lazy
     def bundle_units(self) -> tuple[str, ...]:
         """The unit of the activation of each bundle."""
         return tuple(actuator.unit for actuator in self.bundle_actuators)
 
-    @cached_property
+    @lazy
     def bounds(self) -> Array:
         """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
         bounds = (actuator.bounds for actuator in self.actuators)
         return read_only(np.concatenate([np.empty((0, 2)), *bounds]))
 
-    @cached_property
+    @lazy
     def undriven(self) -> tuple[int, ...]:
         """Bundles that no drive names."""
         driven = {name for drive in self.drives for name in drive.gains}
@@ -334,19 +334,19 @@ class Manipulator:
         """
         return len(self.drives) + len(self.undriven)
 
-    @cached_property
+    @lazy
     def input_names(self) -> tuple[str, ...]:
         """A name for each input."""
         names = self.bundle_names
         return (*(drive.name for drive in self.drives), *(names[k] for k in self.undriven))
 
-    @cached_property
+    @lazy
     def input_units(self) -> tuple[str, ...]:
         """The unit of each input."""
         units = self.bundle_units
         return (*(drive.unit for drive in self.drives), *(units[k] for k in self.undriven))
 
-    @cached_property
+    @lazy
     def input_bounds(self) -> Array:
         """Lower and upper bound of each input [unit], shape (inputs, 2), read-only."""
         if not self.drives:
@@ -354,7 +354,7 @@ class Manipulator:
         of_drives = np.array([drive.bounds for drive in self.drives])
         return read_only(np.concatenate([of_drives, self.bounds[list(self.undriven)]]))
 
-    @cached_property
+    @lazy
     def breakpoints(self) -> tuple[float, ...]:
         """Stations inside (0, L) where profile, section or actuators are not smooth [m]."""
         places = {0.0, self.length, *self.profile.breakpoints}
@@ -380,7 +380,7 @@ class Manipulator:
         rigid = np.any(inside, axis=0)
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
-    @cached_property
+    @lazy
     def inner(self) -> Manipulator:
         """The arm as tables and kernels see it; itself where activations load its sections.
 

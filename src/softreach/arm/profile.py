@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -21,6 +20,7 @@ from softreach.arm.part import Part
 from softreach.support.arguments import plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support.lazy import lazy
 
 __all__ = ["LinearTaper", "PiecewiseTaper", "Profile", "SampledTaper"]
 
@@ -105,12 +105,12 @@ class Profile(Part, ABC):
         """S(L) [-]."""
         return float(self.slender_coordinate(self.length))
 
-    @cached_property
+    @lazy
     def _knots(self) -> Array:
         """Base, breakpoints and tip [m]."""
         return np.array([0.0, *self.breakpoints, self.length])
 
-    @cached_property
+    @lazy
     def _slender_knots(self) -> Array:
         """S at the knots [-]."""
         gaps = self._slender_gap(np.arange(len(self._knots) - 1), np.diff(self._knots))
@@ -275,7 +275,7 @@ class PiecewiseTaper(_RadiiAtStations):
         """tan φ(Z) [-]; at a station, that of the piece which begins there."""
         return self._slopes[self._piece(as_floats("z", z))]
 
-    @cached_property
+    @lazy
     def _slopes(self) -> Array:
         return -np.diff(self.radii) / np.diff(self._knots)
 
@@ -311,11 +311,11 @@ class SampledTaper(_RadiiAtStations):
         """tan φ(Z) = -R2'(Z) [-]."""
         return -self._curve_slope(as_floats("z", z) / self.length) / self.length
 
-    @cached_property
+    @lazy
     def _curve(self) -> Any:
         return monotone_cubic(self.stations_over_length, self.radii)
 
-    @cached_property
+    @lazy
     def _curve_slope(self) -> Any:
         return self._curve.derivative()
 

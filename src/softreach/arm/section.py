@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ from softreach.arm.measured import Measured
 from softreach.arm.number import number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault, InvalidDesign
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
@@ -177,7 +177,7 @@ class Section(Part):
             return self.core
         return min(self.rings, key=lambda ring: ring.inner_ratio).material
 
-    @cached_property
+    @lazy
     def layers(self) -> tuple[Layer, ...]:
         """The core, if there is room for one, and the rings."""
         rings = [Layer(ring.inner_ratio, ring.outer_ratio, ring.material) for ring in self.rings]
@@ -277,7 +277,7 @@ class Section(Part):
             for layer in self._merged
         )
 
-    @cached_property
+    @lazy
     def _merged(self) -> tuple[Layer, ...]:
         """The layers, those of one material that touch made one, so that no digit is lost."""
         merged: list[Layer] = []

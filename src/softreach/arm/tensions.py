@@ -11,7 +11,6 @@ solution for all displacements.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from softreach.arm.actuators import LengthTendon
 from softreach.arm.rest_shape import RestStrains
 from softreach.arm.tables import quadrature, tables
 from softreach.kernels.box.complementarity import complementary
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -50,28 +50,28 @@ class LengthLaw:
     arm: Manipulator
     """With its rest shape as a bundle: see `body_of`."""
 
-    @cached_property
+    @lazy
     def columns(self) -> NDArray[np.intp]:
         """Bundles of the arm that are tendons driven by length."""
         kinds = [isinstance(each, LengthTendon) for each in self.arm.bundle_actuators]
         return np.flatnonzero(kinds)
 
-    @cached_property
+    @lazy
     def compliance(self) -> Array:
         """1/k of each [m/N]."""
         return np.array([tendon.compliance for tendon in self._tendons])
 
-    @cached_property
+    @lazy
     def taut_from(self) -> Array:
         """Displacement from which each is taut while the arm keeps its shape [m]."""
         return np.array([tendon.taut_from for tendon in self._tendons])
 
-    @cached_property
+    @lazy
     def _tendons(self) -> list[LengthTendon]:
         each = (self.arm.bundle_actuators[k] for k in self.columns)
         return [tendon for tendon in each if isinstance(tendon, LengthTendon)]
 
-    @cached_property
+    @lazy
     def _growing(self) -> NDArray[np.intp]:
         """Bundles that change the length of matter at rest."""
         return np.flatnonzero([not each.is_force for each in self.arm.bundle_actuators])
@@ -89,7 +89,7 @@ class LengthLaw:
         moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]
         return force, moment
 
-    @cached_property
+    @lazy
     def _slopes(self) -> tuple[Array, Array]:
         """Work of one unit of tension on the strains of one unit of each activation.
 
@@ -109,7 +109,7 @@ class LengthLaw:
         """s of the path of each tendon [m] at activations with tensions, shape (n, tendon)."""
         return self._from_straight(inner) - self.at_rest
 
-    @cached_property
+    @lazy
     def at_rest(self) -> Array:
         """s of the arm at rest from the straight one [m], shape (1, tendon)."""
         shape = [[float(isinstance(each, RestStrains)) for each in self.arm.bundle_actuators]]

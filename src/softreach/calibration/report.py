@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from softreach.calibration.errors import Misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.support.errors import counted
-from softreach.support.quantity import quantity
-from softreach.support.units import LengthUnit, as_unit, handy_unit
+from softreach.support.quantity import columns, quantity
+from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ErrorRow",
-    "columns",
     "error_cells",
     "error_head",
     "error_rows",
@@ -29,7 +28,6 @@ __all__ = [
     "summary_text",
 ]
 
-_PRESSURES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}
 _MOST_ROWS = 10
 
 
@@ -74,7 +72,7 @@ def number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, st
     sigma = result.uncertainty.sigma.tolist()
     bound = result.fit.at_bound.tolist()
     for k, (number, value) in enumerate(zip(free, result.fit.values.tolist(), strict=True)):
-        name, size = _scale(number.unit, value, unit)
+        name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma[k] / size, digits=2)
         text += ", at its bound" if bound[k] else ", with its prior" if number.prior else ""
         yield number.name, text, f"{_of_design(result, k) / size:.4g}"
@@ -85,7 +83,7 @@ def sigma_rows(
 ) -> Iterator[tuple[str, str, str]]:
     """Name, value of the design ± a standard deviation, and their ratio, of each number."""
     for number, width in zip(free.numbers, sigma, strict=True):
-        name, size = _scale(number.unit, number.start, unit)
+        name, size = readable_unit(number.unit, number.start, unit)
         share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
         yield number.name, quantity(number.start / size, name, width / size, digits=2), share
 
@@ -96,17 +94,6 @@ def _of_design(result: Calibration, k: int) -> float:
     if number.name in POSE:
         return (*result.start.base.position, 0.0, 0.0, 0.0)[POSE.index(number.name)]
     return number.start
-
-
-def _scale(unit: str, value: float, length: LengthUnit) -> tuple[str, float]:
-    """The unit that people read a number in, and its size."""
-    if unit == "m":
-        return length.name, length.size
-    if unit == "rad":
-        return "°", math.pi / 180.0
-    if unit == "Pa":
-        return next((pair for pair in _PRESSURES.items() if abs(value) >= pair[1]), ("Pa", 1.0))
-    return ("" if unit == "1" else unit), 1.0
 
 
 def error_rows(result: Calibration) -> Iterator[ErrorRow]:
@@ -149,11 +136,3 @@ def remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
         rows = ", ".join(map(str, far[:_MOST_ROWS])) + (", ..." if len(far) > _MOST_ROWS else "")
         yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"
     yield result.verdict.sentence
-
-
-def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Cells below each other."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for cells in rows:
-        padded = (f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True))
-        yield "  ".join(padded).rstrip()

@@ -1,7 +1,7 @@
 """The `softreach` command and what its exit codes mean.
 
-0 done, 1 a requirement is missed (`check`), 2 wrong input or nowhere to write, 141 nobody reads the
-output any more, 128 + signal.
+0 done, 1 a requirement is missed (`check`, `search`), 2 wrong input or nowhere to write, 141 nobody
+reads the output any more, 128 + signal.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
 _COMMANDS = (
-    (Group("Design", sort_key=-6), ("design", "check", "list", "studio")),
+    (Group("Design", sort_key=-6), ("design", "check", "search", "list", "studio")),
     (Group("Bench", sort_key=-5.5), ("plan-poses", "calibrate")),
     (Group("Reach", sort_key=-5), ("reach", "cloud", "volume", "payload", "gradient")),
     (Group("Places", sort_key=-4), ("solve", "track", "equilibria")),

@@ -13,7 +13,7 @@ from softreach.cli.values import as_read
 
 listing = App(
     name="list",
-    help="""List designs, materials, actuators, metrics, or parameters of a design.
+    help="""List designs, materials, actuators, metrics, objectives, or parameters of a design.
 
 Example: softreach list parameters minimal_trunk
 """,
@@ -101,6 +101,29 @@ def metrics(*, json: AsJson = False) -> None:
         {"metric": metric.name, "group": group, "unit": metric.unit, "meaning": metric.meaning}
         for group, members in [*METRIC_GROUPS.items(), *own]
         for metric in members
+    ]
+    console.table(records, json)
+
+
+@listing.command
+def objectives(*, json: AsJson = False) -> None:
+    """List the objectives of a search with their units.
+
+    All metrics of an atlas that are single numbers can be objectives too.
+
+    Example: softreach list objectives
+    """
+    from softreach.optimization import OBJECTIVES
+
+    records = [
+        {
+            "objective": objective.name,
+            "unit": objective.unit,
+            "asks": objective.asks,
+            "derivatives": "yes" if objective.smooth else "no",
+            "meaning": objective.meaning,
+        }
+        for objective in OBJECTIVES.values()
     ]
     console.table(records, json)
 

@@ -48,7 +48,8 @@ def plan_poses(
     """
     from softreach import calibration
     from softreach.calibration.plan import PLAN
-    from softreach.calibration.report import columns, sigma_rows
+    from softreach.calibration.report import sigma_rows
+    from softreach.support.quantity import columns
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)

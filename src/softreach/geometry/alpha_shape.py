@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from softreach.geometry.surface import compact_surface, surface_area
 from softreach.kernels.points import alpha as kernels
 from softreach.kernels.points.expansions import scratch
 from softreach.support import parallel
+from softreach.support.lazy import lazy
 
 __all__ = ["AlphaComplex"]
 
@@ -41,7 +42,7 @@ class AlphaComplex:
         object.__setattr__(self, "radii", radii)
         object.__setattr__(self, "volumes", volumes)
 
-    @cached_property
+    @lazy
     def _curve(self) -> tuple[np.ndarray, np.ndarray]:
         """Radii in increasing order, and the volumes summed up to each."""
         order = np.argsort(self.radii)

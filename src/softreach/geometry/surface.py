@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -13,6 +12,7 @@ from softreach.geometry.delaunay import unit_scale
 from softreach.kernels.points.point_distances import distances_to_faces
 from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
@@ -67,13 +67,13 @@ class Surface:
         corners, triangles = len(self.vertices), len(self.faces)
         return f"Surface: {triangles:,} triangles, {corners:,} vertices, area {self.area:.6g} m²"
 
-    @cached_property
+    @lazy
     def _tree(self) -> KDTree:
         from scipy.spatial import KDTree
 
         return KDTree(self.vertices)
 
-    @cached_property
+    @lazy
     def _incidence(self) -> tuple[Index, Index]:
         """Faces around each vertex, one after the other, and where each vertex's begin."""
         corners = self.faces.ravel()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 
 __all__ = ["PreparedMap", "prepared_map"]
 
@@ -40,12 +41,12 @@ class PreparedMap:
     depth: int = 0
     """Most halvings of a cell where det ∂r/∂γ changes sign or is uneven."""
 
-    @cached_property
+    @lazy
     def measures(self) -> Array:
         """Size of one unit of each activation in the unit of its bundle, shape (bundles,)."""
         return self.whole.measures
 
-    @cached_property
+    @lazy
     def rod(self) -> TipMap:
         """The tip map of the free bundles; held ones are no variables of any search.
 
@@ -53,12 +54,12 @@ class PreparedMap:
         """
         return free_bundles(stable_tips(self.whole))
 
-    @cached_property
+    @lazy
     def branch_map(self) -> TipMap:
         """The same with unstable equilibria, to say which activations end in one."""
         return free_bundles(self.whole)
 
-    @cached_property
+    @lazy
     def proves(self) -> bool:
         """True if what a cell of activations reaches is bounded; of loaded arms it is not."""
         return bool(np.isfinite(self.whole.farthest()))
@@ -68,7 +69,7 @@ class PreparedMap:
         """Number of free bundles."""
         return self.whole.box.dimension
 
-    @cached_property
+    @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
         return activation_cells(self.branch_map, self.cells, self.depth)
 
@@ -87,22 +88,22 @@ class PreparedMap:
         """Starts of searches for roots in cells without an image."""
         return self._cut[1]
 
-    @cached_property
+    @lazy
     def tree(self) -> SpaceTree:
         """The tetrahedra of the cells whose images may cover a place."""
         return image_tree(self.mesh)
 
-    @cached_property
+    @lazy
     def seeds(self) -> Seeds:
         """Starts of searches for a minimum."""
         return seeds(self.rod)
 
-    @cached_property
+    @lazy
     def coarse_cells(self) -> CoarseCells:
         """Cells with which proofs that a target is out of reach begin."""
         return CoarseCells(self.rod)
 
-    @cached_property
+    @lazy
     def face_seeds(self) -> Seeds:
         """Starts of searches for places on the boundary of the reachable set."""
         return face_seeds(self.rod)

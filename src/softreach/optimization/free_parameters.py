@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,17 @@ from softreach.arm.tables import check_extension
 from softreach.support.arguments import as_given, as_mapping, plain
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 from softreach.support.quantity import read_quantity
 
-__all__ = ["FreeParameter", "FreeParameters", "Tie", "Values", "free_parameters"]
+__all__ = [
+    "FreeParameter",
+    "FreeParameters",
+    "Tie",
+    "Values",
+    "free_parameters",
+    "known_parameters",
+]
 
 Values = Mapping[str, float | str]
 """Free parameter -> its value [SI unit], or the chosen name."""
@@ -67,12 +74,13 @@ class FreeParameter:
         return self.low + place * (self.high - self.low)
 
     @property
-    def text(self) -> str:
-        """Range or choices in words."""
-        if self.choices:
-            return f"one of {', '.join(map(str, self.choices))}"
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.low:.6g} to {self.high:.6g}{unit}"
+    def ends(self) -> tuple[float | str, float | str]:
+        """Least and largest value; first and last choice."""
+        return (self.choices[0], self.choices[-1]) if self.choices else (self.low, self.high)
+
+    def number(self, value: float | str) -> float:
+        """A value as a number: that of a choice counts from 0."""
+        return float(self.choices.index(value)) if self.choices else float(value)
 
 
 @dataclass(frozen=True)
@@ -102,7 +110,7 @@ class FreeParameters:
         """Names of the free parameters."""
         return tuple(parameter.name for parameter in self.free)
 
-    @cached_property
+    @lazy
     def real(self) -> tuple[FreeParameter, ...]:
         """Those that can change a little, which a polish moves."""
         return tuple(parameter for parameter in self.free if parameter.is_real)
@@ -166,7 +174,7 @@ class FreeParameters:
     def _only(self) -> Manipulator:
         return next(iter(self.bases.values()))
 
-    @cached_property
+    @lazy
     def _whole(self) -> frozenset[str]:
         return frozenset(parameter.name for parameter in self.free if parameter.whole)
 
@@ -193,7 +201,7 @@ def free_parameters(
     bases = bases or {"": a_manipulator("base", base)}
     given = as_mapping("free", free, lambda _, value: value)
     picks = as_mapping("choices", choices or {}, lambda _, value: value)
-    known = _known_parameters(bases.values(), picks.get(BUNDLES, ()))
+    known = known_parameters(bases.values(), picks.get(BUNDLES, ()))
     texts = {name: text for name, text in given.items() if isinstance(text, str)}
     found = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]
     if len(bases) > 1:
@@ -208,8 +216,13 @@ def free_parameters(
     return FreeParameters(bases=bases, free=tuple(found), ties=ties)
 
 
-def _known_parameters(arms: Iterable[Manipulator], counts: Any) -> dict[str, Parameter]:
-    """Parameters that any of the designs has, also with other numbers of bundles."""
+def known_parameters(arms: Iterable[Manipulator], counts: Any) -> dict[str, Parameter]:
+    """Parameters that any of the designs has, also with other numbers of bundles.
+
+    Args:
+        arms: The designs.
+        counts: Numbers of bundles to choose from.
+    """
     known: dict[str, Parameter] = {}
     for arm in arms:
         counted = counts if isinstance(counts, list | tuple) else ()
@@ -314,3 +327,5 @@ def _of_material(arm: Manipulator, name: Any) -> Manipulator:
 
 _CHOICES = {BUNDLES: _with_bundles, MATERIAL: _of_material}
 _WORDS = (*_CHOICES, DESIGN)
+NAMED_CHOICES = tuple(_CHOICES)
+"""Choices that are no parameters."""

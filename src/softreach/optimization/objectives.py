@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,19 +16,29 @@ from softreach.atlas.design_task import Intermediates
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.metrics import chosen_metrics, known_metric
 from softreach.atlas.space import DesignSpace
-from softreach.requirements.checks import Check, check
+from softreach.requirements.checks import Check, check, quick_check
 from softreach.requirements.requirements import Requirements
 from softreach.rod.rods import tip_map
 from softreach.sampling import cube_blocks
 from softreach.support.arguments import as_given, as_names
 from softreach.support.errors import InvalidInput, did_you_mean, no_warnings
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.workspace import ReachableSet
 
-__all__ = ["OBJECTIVES", "SETS", "DesignCase", "Goal", "Objective", "Value", "goals"]
+__all__ = [
+    "OBJECTIVES",
+    "SETS",
+    "DesignCase",
+    "Goal",
+    "Objective",
+    "Value",
+    "goals",
+    "known_objective",
+]
 
 SETS = {
     "exact_volume": "volume",
@@ -61,7 +71,7 @@ class DesignCase:
     fine: bool = True
     """Clouds have as many samples as numbers that are reported need."""
 
-    @cached_property
+    @lazy
     @no_warnings()
     def reached(self) -> ReachableSet:
         """The reachable set."""
@@ -69,13 +79,15 @@ class DesignCase:
 
         return reachable_set(self.arm, accuracy=self.accuracy)
 
-    @cached_property
+    @lazy
     @no_warnings()
     def check(self) -> Check:
-        """What is met and what is missed."""
-        return check(self.arm, self.requirements, accuracy=self.accuracy)
+        """What is met and what is missed; on the way by poses that few descents find."""
+        if self.fine:
+            return check(self.arm, self.requirements, accuracy=self.accuracy)
+        return quick_check(self.arm, self.requirements, self.accuracy)
 
-    @cached_property
+    @lazy
     @no_warnings()
     def cloud(self) -> xr.Dataset:
         """Samples of the activation box."""
@@ -95,7 +107,7 @@ class DesignCase:
             return float(metric.value({Need.REACHABLE_SET: self.reached}, {}))
         return float(metric.value(self._intermediates, {}))
 
-    @cached_property
+    @lazy
     def _intermediates(self) -> Intermediates:
         (cube,) = cube_blocks("sobol", self.samples, tip_map(self.arm).box.bundles, 0, self.samples)
         command = Command(
@@ -167,7 +179,7 @@ def goals(
     result = []
     for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
         several = [given] if isinstance(given, Metric) else _each(word, given)
-        result += [Goal(_objective(word, each), sense) for each in several]
+        result += [Goal(known_objective(word, each), sense) for each in several]
     names = [goal.name for goal in result]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("objective", twice[0], "given once")
@@ -188,7 +200,16 @@ def _each(word: str, given: Any) -> Sequence[str | Metric]:
     return as_names(word, given)
 
 
-def _objective(word: str, given: str | Metric) -> Objective:
+def known_objective(word: str, given: str | Metric) -> Objective:
+    """The objective of a name, or of a metric.
+
+    Args:
+        word: What errors call it.
+        given: Its name, or a metric.
+
+    Raises:
+        InvalidInput: There is none.
+    """
     if isinstance(given, str) and given in OBJECTIVES:
         return OBJECTIVES[given]
     metric = given if isinstance(given, Metric) else known_metric(given)
@@ -300,7 +321,7 @@ _ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value], str, bool], ...
     ("payload", "kg", "payload under which 80 % of the volume is left", _payload, "", False),
     ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance, "", False),
     ("mass", "kg", "mass of the arm", _mass, "", True),
-    ("actuators", "1", "number of inputs", _actuators, "", False),
+    ("actuators", "1", "number of inputs", _actuators, "", True),
 )
 
 OBJECTIVES = {

@@ -10,8 +10,9 @@ import numpy as np
 
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import DesignPoint, Point
+from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
 from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
@@ -90,9 +91,9 @@ def _solved(program: _Program, first: Array, iterations: int) -> Array:
 
     point = program.point(first)
     constraints = []
-    for kind, given in (("eq", point.equations), ("ineq", point.rooms)):
-        if len(given[0]):
-            fun, jac = program.asked(kind, 0), program.asked(kind, 1)
+    for kind, parts in (("eq", point.equations), ("ineq", point.rooms)):
+        if parts:
+            fun, jac = program.asked(kind, stacked), program.asked(kind, stacked_slopes)
             constraints.append({"type": kind, "fun": fun, "jac": jac})
     result = minimize(
         program.cost,
@@ -123,6 +124,7 @@ class _Program:
         self._goal, self._floors = goal, floors
         self._shape, self._scale = (0, 0), 1.0
         self._points: dict[bytes, Point] = {}
+        self._like: Sequence[TipMap] = ()
 
     def begin(self) -> Array:
         """Unknowns of the start.
@@ -141,6 +143,8 @@ class _Program:
             poses = np.clip(box.to_cube(box.clip(gamma))[:, box.free], 0.0, 1.0)
         self._shape = poses.shape
         first = np.concatenate([np.clip(reals, 0.0, 1.0), poses.ravel()])
+        if len(poses):
+            self._like = self.point(first).design.rods
         self._scale = (abs(self.point(first).cost[0]) or 1.0) / _GENTLE
         return first
 
@@ -167,7 +171,8 @@ class _Program:
             )
             if design is None:
                 self.designs += 1
-                design = DesignPoint(self._problem, self.values_of(unknowns), self._accuracy)
+                values = self.values_of(unknowns)
+                design = DesignPoint(self._problem, values, self._accuracy, self._like)
             if len(self._points) > 3:
                 self._points.pop(next(iter(self._points)))
             self._points[key] = Point(design, reals, poses, self._goal, self._floors)
@@ -188,11 +193,11 @@ class _Program:
         except (InvalidDesign, InvalidInput):
             return np.zeros(len(unknowns))
 
-    def asked(self, kind: str, order: int) -> Callable[[Array], Array]:
-        """Equations ("eq") or rooms ("ineq"), or their derivatives (order 1)."""
+    def asked(self, kind: str, what: Callable[[Sequence[Part]], Array]) -> Callable[[Array], Array]:
+        """Function of unknowns: values or derivatives of equations ("eq") or rooms ("ineq")."""
 
         def values(unknowns: Array) -> Array:
             point = self.point(unknowns)
-            return (point.equations if kind == "eq" else point.rooms)[order]
+            return what(point.equations if kind == "eq" else point.rooms)
 
         return values

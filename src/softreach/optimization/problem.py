@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -87,6 +90,24 @@ class Problem:
     """Relative error of volumes that are reported."""
     coarse: float
     """Relative error of volumes on the way."""
+
+    @cached_property
+    def digest(self) -> str:
+        """Fingerprint of all that decides what a design is worth."""
+        parameters = self.parameters
+        record = {
+            "bases": {name: arm.to_toml() for name, arm in parameters.bases.items()},
+            "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
+            "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
+            "requirements": self.requirements.to_toml(),
+            "goals": [
+                [goal.name, goal.sense, *([dict(deviates)] if deviates else [])]
+                for goal in self.goals
+                for deviates in [goal.objective.sigmas]
+            ],
+        }
+        text = json.dumps(record, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()
 
     def case(self, values: Values, accuracy: float) -> DesignCase:
         """The design with these values, to be asked to a relative error of volumes.

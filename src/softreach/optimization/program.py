@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
+from functools import cache, partial
 
 import numpy as np
 
@@ -17,23 +16,29 @@ from softreach.optimization.free_parameters import Values
 from softreach.optimization.objectives import SETS, DesignCase, Goal
 from softreach.optimization.problem import Problem
 from softreach.optimization.robust import margin
+from softreach.requirements.checks import effort_scales
 from softreach.requirements.poses import PoseRules
-from softreach.rod.rods import refined, tip_map
+from softreach.rod.rods import in_steps, refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
+from softreach.support.lazy import lazy
 from softreach.workspace.gradient import VolumeGradient, volume_gradient
 from softreach.workspace.tip_derivatives import TipDerivatives
 
-__all__ = ["DesignPoint", "Point", "Requirement"]
+__all__ = ["DesignPoint", "Point"]
 
 EFFORTS = ("mean_effort", "worst_effort")
 _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
     "mass": lambda arm: mass(arm) or 0.0,
     "load_number": lambda arm: load_number(arm) or 0.0,
+    "actuators": lambda arm: float(arm.inputs),
 }
-_TOL = 1e-9  # of tips at the targets, in L
+_TOL = 1e-7  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
+_FAR = 0.25  # over L or relative: room beyond which a rule is not differentiated
+_ROOM = 0.98  # of the distance within which a tip must come to a place
+_SPARE = 1e-4  # over L or relative, by which limits are kept
 _WIDE_STEP = 0.02  # of a range, for what is rough
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
@@ -46,18 +51,24 @@ class DesignPoint:
     problem: Problem
     values: Values
     accuracy: float
+    like: Sequence[TipMap] = ()
+    """Tip maps of a design nearby, in as many steps."""
 
-    @cached_property
+    @lazy
     def case(self) -> DesignCase:
         """The design, to be asked."""
         return self.problem.case(self.values, self.accuracy)
 
-    @cached_property
+    @lazy
     def rods(self) -> tuple[TipMap, ...]:
         """Its tip map under each payload."""
-        return tuple(refined(tip_map(arm), _TOL) for arm in _laden(self.problem, self.case.arm))
+        arms = _laden(self.problem, self.case.arm)
+        if not self.like:
+            return tuple(refined(tip_map(arm), _TOL) for arm in arms)
+        pairs = zip(arms, self.like, strict=True)
+        return tuple(in_steps(arm, rod.steps, rod) for arm, rod in pairs)
 
-    @cached_property
+    @lazy
     def derivatives(self) -> tuple[TipDerivatives, ...]:
         """∂r/∂p of each of these, by parameters of the arm."""
         known = [find_parameters(rod.arm, self._paths[0]) for rod in self.rods]
@@ -66,12 +77,12 @@ class DesignPoint:
             for rod, each in zip(self.rods, known, strict=True)
         )
 
-    @cached_property
+    @lazy
     def chain(self) -> Array:
         """Change of parameters of the arm by unknowns: ranges and ties, shape (paths, reals)."""
         return self._paths[1]
 
-    @cached_property
+    @lazy
     def sets(self) -> VolumeGradient:
         """Derivatives of the reachable set."""
         return volume_gradient(self.case.arm, self._paths[0], accuracy=self.accuracy)
@@ -106,11 +117,11 @@ class DesignPoint:
             slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
         return np.array(slopes)
 
-    @cached_property
+    @lazy
     def _margins(self) -> dict[str, float]:
         return {}
 
-    @cached_property
+    @lazy
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:
         """Designs on both sides along each real parameter, and how far they are apart."""
         parameters, pairs = self.problem.parameters, []
@@ -125,7 +136,7 @@ class DesignPoint:
             pairs.append((float((ends[0] - ends[1]) / (high - low)[k]), *arms))
         return pairs
 
-    @cached_property
+    @lazy
     def _paths(self) -> tuple[tuple[str, ...], Array]:
         """Parameters of the arm that move, and the chain."""
         parameters = self.problem.parameters
@@ -152,16 +163,6 @@ def _laden(problem: Problem, arm: Manipulator) -> list[Manipulator]:
     ]
 
 
-class Requirement(NamedTuple):
-    """What an equation or a room of the program is about."""
-
-    name: str
-    unit: str
-    """Of what it allows; "" for that of the limit or measure."""
-    scale: float
-    """What it allows, per unit of the equation or the room."""
-
-
 @dataclass(eq=False)
 class Point:
     """A design with its poses: cost, equations and rooms, each with all derivatives.
@@ -177,7 +178,7 @@ class Point:
     goal: int
     floors: Sequence[float]
 
-    @cached_property
+    @lazy
     def cost_value(self) -> float:
         """Cost of the goal alone, for which sets need not be differentiated."""
         goals = self.design.problem.goals
@@ -187,77 +188,22 @@ class Point:
         cost = -goal.sense * float(getattr(self.design.case.reached, SETS[goal.name]))
         return cost + self.design.margin(goal) if goal.objective.sigmas else cost
 
-    @cached_property
+    @lazy
     def cost(self) -> tuple[float, Array]:
         """Cost of the goal and its derivatives."""
         goals = self.design.problem.goals
         return self._cost_of(goals[self.goal]) if goals else (0.0, np.zeros(self._size))
 
-    @cached_property
-    def equations(self) -> tuple[Array, Array]:
+    @lazy
+    def equations(self) -> tuple[Part, ...]:
         """Tips less the places that they must be at, over L."""
-        parts = self._tips
-        return _stacked([(gap, slope) for gap, slope, within in parts if within == 0.0], self._size)
+        return tuple(part for part in self._tips if part.within == 0.0)
 
-    @cached_property
-    def rooms(self) -> tuple[Array, Array]:
+    @lazy
+    def rooms(self) -> tuple[Part, ...]:
         """What must not fall below 0: limits, measures, regions, other goals."""
-        parts = [*self._near_places(), *self._rules(), *self._of_design(), *self._other_goals()]
-        return _stacked(parts, self._size)
-
-    @cached_property
-    def room_names(self) -> list[Requirement]:
-        """The requirement that each of the rooms is about."""
-        return [*self._place_names(0.0), *self._rule_names(), *self._design_names()]
-
-    @cached_property
-    def equation_names(self) -> list[Requirement]:
-        """The requirement that each of the equations is about."""
-        return [each for each in self._place_names(None) for _ in range(3)]
-
-    def _place_names(self, least: float | None) -> list[Requirement]:
-        """Places to be met within more than a distance, or, for None, exactly."""
-        needs, length = self.design.problem.requirements, self.design.case.arm.length
-        names = [t.name for t in needs.targets if t.places is not None for _ in t.places]
-        numbers = [
-            k + 1 for t in needs.targets if t.places is not None for k in range(len(t.places))
-        ]
-        each = zip(names, numbers, _within(needs.targets), strict=True)
-        kept = [
-            Requirement(f"{name} place {number}", "m", length)
-            for name, number, within in each
-            if (within == 0.0) == (least is None)
-        ]
-        return kept * len(self.design.rods)
-
-    def _rule_names(self) -> list[Requirement]:
-        needs, arm = self.design.problem.requirements, self.design.case.arm
-        if not len(self.poses):
-            return []
-        keeps = [keep for keep in needs.keeps if keep.when == "targets"]
-        rules = PoseRules.of(arm, keeps, needs.limits, np.inf)
-        each = [Requirement(keep.name, "m", arm.length) for keep in rules.keeps]
-        each += [Requirement(name, "", most or 1.0) for name, most in rules.limits.items()]
-        return each * len(self.poses)
-
-    def _design_names(self) -> list[Requirement]:
-        needs, result = self.design.problem.requirements, []
-        for name, ends in needs.measures.items():
-            if name in SETS:
-                for word, end in zip(("most", "least"), reversed(ends), strict=True):
-                    if end is not None:
-                        result.append(Requirement(f"{name} at {word}", "", abs(end) or 1.0))
-        for name in _OF_ARM:
-            most = needs.limits.given.get(name)
-            if most is not None:
-                result.append(Requirement(name, "", abs(most) or 1.0))
-        goals = zip(self.design.problem.goals, self.floors, strict=False)
-        result += [
-            Requirement(f"{goal.name} no worse", "", abs(floor) or 1.0)
-            for k, (goal, floor) in enumerate(goals)
-            if k != self.goal
-        ]
-        return result
+        near = (_near_place(part) for part in self._tips if part.within > 0.0)
+        return (*near, *self._rules(), *self._of_design(), *self._other_goals())
 
     @property
     def _size(self) -> int:
@@ -278,133 +224,205 @@ class Point:
         return cost, slope
 
     def _effort(self, name: str) -> tuple[float, Array]:
-        """Mean of |γ| over the largest bound, of a high power for the largest of them."""
+        """Mean of |γ|, each over its largest bound; of a high power for the largest of them."""
         box, count = self.design.rods[0].box, len(self.poses)
-        scales = np.abs(box.bounds).max()
+        scales = effort_scales(self.design.case.arm)
         gamma = box.from_free_cube(self.poses) / scales
         each = np.linalg.norm(gamma, axis=1).clip(1e-12)
         power = 1 if name == "mean_effort" else _POWER
         mean = float((each**power).mean() ** (1.0 / power))
         weight = (each / mean) ** (power - 1) / count
-        widths = box.widths[box.free] / scales
+        widths = (box.widths / scales)[box.free]
         slope = np.zeros(self._size)
         slope[len(self.reals) :] = (
             weight[:, None] * gamma[:, box.free] / each[:, None] * widths
         ).ravel()
         return mean, slope
 
-    @cached_property
-    def _tips(self) -> list[tuple[Array, Array, float]]:
-        """Tip less place over L, its derivatives, and how near it must come, of each pose."""
-        needs, result = self.design.problem.requirements, []
-        places, within = needs.places, _within(needs.targets)
-        if not len(places):
-            return []
-        poses = self.poses.reshape(len(self.design.rods), -1, self.poses.shape[-1])
-        count, start = len(self.reals), len(self.reals)
-        for rod, derivatives, cube in zip(
-            self.design.rods, self.design.derivatives, poses, strict=True
-        ):
-            box, length = rod.box, rod.length
-            tips, slopes = stable_tips(rod).tips_and_slopes(box.from_free_cube(cube))
-            by_pose = slopes[:, :, box.free] * box.widths[box.free] / length
-            by_real = derivatives.at(cube) @ self.design.chain / length
-            gaps = np.nan_to_num((tips - places) / length, nan=_NOWHERE)
-            for k in range(len(places)):
-                slope = np.zeros((3, self._size))
-                slope[:, :count] = np.nan_to_num(by_real[k])
-                slope[:, start : start + cube.shape[1]] = np.nan_to_num(by_pose[k])
-                start += cube.shape[1]
-                result.append((gaps[k], slope, within[k] / length))
-        return result
-
-    def _near_places(self) -> list[tuple[Array, Array]]:
-        """Places that need not be met exactly: how much nearer the tip is than it must be."""
-        return [
-            (np.array([(within**2 - gap @ gap) / within]), -2.0 / within * (gap @ slope)[None])
-            for gap, slope, within in self._tips
-            if within > 0.0
-        ]
-
-    def _rules(self) -> list[tuple[Array, Array]]:
-        """Regions to keep to and limits of poses, by differences."""
-        needs = self.design.problem.requirements
-        keeps = [keep for keep in needs.keeps if keep.when == "targets"]
-        if not len(self.poses):
-            return []
-        arms, parts = _laden(self.design.problem, self.design.case.arm), []
-        poses = self.poses.reshape(len(arms), -1, self.poses.shape[-1])
-        start = len(self.reals)
-        for number, (arm, cube) in enumerate(zip(arms, poses, strict=True)):
-            rules = PoseRules.of(arm, keeps, needs.limits, np.inf)
-            if not len(rules):
-                return []
-            value = _room(rules, cube)
-            slope = np.zeros((*value.shape, self._size))
-            for k, (apart, *pair) in enumerate(self.design.neighbors):
-                ahead, behind = (
-                    _room(
-                        PoseRules.of(
-                            _laden(self.design.problem, a)[number], keeps, needs.limits, np.inf
-                        ),
-                        cube,
-                    )
-                    for a in pair
-                )
-                slope[:, :, k] = (ahead - behind) / apart
-            for j in range(cube.shape[1]):
-                ends = []
-                for side in (1, -1):
-                    moved = cube.copy()
-                    moved[:, j] = np.clip(moved[:, j] + side * _STEP, 0.0, 1.0)
-                    ends.append((moved[:, j], _room(rules, moved)))
-                (high, ahead), (low, behind) = ends
-                column = start + np.arange(len(cube)) * cube.shape[1] + j
-                change = (ahead - behind) / (high - low)[:, None]
-                slope[np.arange(len(cube)), :, column] = change
-            start += cube.size
-            parts.append((value.ravel(), slope.reshape(-1, self._size)))
+    @lazy
+    def _tips(self) -> list[Part]:
+        """Tip less place over L of each pose."""
+        needs, parts = self.design.problem.requirements, []
+        within = _within(needs.targets)
+        for number, (rod, cube) in enumerate(self._by_payload()):
+            tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+            gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
+            slopes = lazily(partial(self._tip_slopes, number))
+            for k, gap in enumerate(gaps):
+                slope = partial(_row, slopes, k)
+                near = within[k] / rod.length
+                parts.append(Part(f"place {k + 1}", gap, slope, near, rod.length, "m"))
         return parts
 
-    def _of_design(self) -> list[tuple[Array, Array]]:
+    def _tip_slopes(self, number: int) -> Array:
+        """Derivatives of tips over L under one payload, shape (place, 3, unknowns)."""
+        rod, cube = self._by_payload()[number]
+        box, count = rod.box, len(self.reals)
+        _, slopes = stable_tips(rod).tips_and_slopes(box.from_free_cube(cube))
+        result = np.zeros((len(cube), 3, self._size))
+        result[:, :, :count] = self.design.derivatives[number].at(cube) @ self.design.chain
+        for j, column in enumerate(self._columns(number)):
+            result[np.arange(len(cube)), :, column] = (
+                slopes[:, :, box.free[j]] * box.widths[box.free[j]]
+            )
+        return np.nan_to_num(result / rod.length)
+
+    def _by_payload(self) -> list[tuple[TipMap, Array]]:
+        """Tip map and poses under each payload."""
+        if not len(self.poses):
+            return []
+        rods = self.design.rods
+        return list(zip(rods, self.poses.reshape(len(rods), -1, self.poses.shape[1]), strict=True))
+
+    def _columns(self, number: int) -> Array:
+        """Columns of the unknowns of poses under one payload, shape (free inputs, place)."""
+        rods, free = len(self.design.rods), self.poses.shape[1]
+        places = len(self.poses) // rods
+        first = len(self.reals) + number * places * free
+        return first + np.arange(places * free).reshape(places, free).T
+
+    def _rules(self) -> Iterator[Part]:
+        """Regions to keep to and limits of poses."""
+        needs = self.design.problem.requirements
+        keeps = [keep for keep in needs.keeps if keep.when == "targets"]
+
+        def rules_of(arm: Manipulator, number: int) -> PoseRules:
+            laden = _laden(self.design.problem, arm)[number]
+            like = self.design.rods[number]
+            rod = like if arm is self.design.case.arm else in_steps(laden, like.steps, like)
+            return PoseRules.of(laden, keeps, needs.limits, np.inf, rod)
+
+        for number, (_, cube) in enumerate(self._by_payload()):
+            rules = rules_of(self.design.case.arm, number)
+            if not len(rules):
+                return
+            value = _room(rules, cube)
+            slopes = lazily(partial(self._rule_slopes, rules_of, number, value))
+            scales = [(keep.name, rules.arm.length, "m") for keep in keeps]
+            scales += [(name, most or 1.0, "") for name, most in rules.limits.items()]
+            for column, (name, scale, unit) in enumerate(scales):
+                slope = partial(_column, slopes, column)
+                yield Part(name, value[:, column], slope, scale=scale, unit=unit)
+
+    def _rule_slopes(
+        self, rules_of: Callable[[Manipulator, int], PoseRules], number: int, value: Array
+    ) -> Array:
+        """Derivatives of rules by differences, shape (place, rule, unknowns); 0 far from them."""
+        slope = np.zeros((*value.shape, self._size))
+        if (value > _FAR).all():
+            return slope
+        rules, cube = rules_of(self.design.case.arm, number), self._by_payload()[number][1]
+        for k, (apart, *pair) in enumerate(self.design.neighbors):
+            ahead, behind = (_room(rules_of(arm, number), cube) for arm in pair)
+            slope[:, :, k] = (ahead - behind) / apart
+        for j, column in enumerate(self._columns(number)):
+            ends, rooms = np.repeat(cube[None], 2, axis=0), []
+            ends[:, :, j] = np.clip(cube[:, j] + np.array([[_STEP], [-_STEP]]), 0.0, 1.0)
+            rooms = [_room(rules, end) for end in ends]
+            apart = (ends[0, :, j] - ends[1, :, j])[:, None]
+            slope[np.arange(len(cube)), :, column] = (rooms[0] - rooms[1]) / apart
+        return slope
+
+    def _of_design(self) -> Iterator[Part]:
         """Limits and measures that follow from the design or its set."""
-        needs, parts = self.design.problem.requirements, []
+        needs = self.design.problem.requirements
         for name, (low, high) in needs.measures.items():
-            if name not in SETS:
-                continue
-            value, slope = self.design.of_set(name)
-            parts += [self._room_below(value, slope, high), self._room_above(value, slope, low)]
+            if name in SETS:
+                value = float(getattr(self.design.case.reached, SETS[name]))
+                slope = partial(self.design.of_set, name)
+                for sense, limit in ((1.0, high), (-1.0, low)):
+                    if limit is not None:
+                        yield self._limit(name, sense, value, limit, slope)
         for name in _OF_ARM:
             most = needs.limits.given.get(name)
             if most is not None:
-                parts.append(self._room_below(*self.design.of_arm(name), most))
-        return [part for part in parts if part is not None]
+                value = _OF_ARM[name](self.design.case.arm)
+                yield self._limit(name, 1.0, value, most, partial(self.design.of_arm, name))
 
-    def _other_goals(self) -> list[tuple[Array, Array]]:
+    def _limit(
+        self,
+        name: str,
+        sense: float,
+        value: float,
+        limit: float,
+        derived: Callable[[], tuple[float, Array]],
+    ) -> Part:
+        """Room below a limit (sense 1) or above it (-1), relative."""
+        scale = abs(limit) or 1.0
+
+        def slope() -> Array:
+            row = np.zeros((1, self._size))
+            row[0, : len(self.reals)] = -sense * derived()[1] / scale
+            return row
+
+        room = np.array([sense * (limit - value) / scale - _SPARE])
+        return Part(name, room, slope, scale=scale)
+
+    def _other_goals(self) -> Iterator[Part]:
         """Goals that must not become worse than given."""
-        parts = []
-        for k, (goal, floor) in enumerate(
-            zip(self.design.problem.goals, self.floors, strict=False)
-        ):
+        goals = self.design.problem.goals
+        for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
             if k != self.goal:
                 cost, slope = self._cost_of(goal)
                 scale = abs(floor) or 1.0
-                parts.append((np.array([(floor - cost) / scale]), -slope[None] / scale))
-        return parts
+                value = np.array([(floor - cost) / scale])
+                row = partial(np.multiply, -1.0 / scale, slope[None])
+                yield Part(goal.name, value, row, scale=scale)
 
-    def _room_below(
-        self, value: float, slope: Array, most: float | None
-    ) -> tuple[Array, Array] | None:
-        if most is None:
-            return None
-        scale, row = abs(most) or 1.0, np.zeros((1, self._size))
-        row[0, : len(self.reals)] = -slope / scale
-        return np.array([(most - value) / scale]), row
 
-    def _room_above(
-        self, value: float, slope: Array, least: float | None
-    ) -> tuple[Array, Array] | None:
-        return None if least is None else self._room_below(-value, -slope, -least)
+@dataclass(frozen=True)
+class Part:
+    """Equations or rooms of one requirement, whose derivatives are made when asked for."""
+
+    name: str
+    """Of the requirement."""
+    value: Array
+    """Shape (n,)."""
+    slope: Callable[[], Array]
+    """Makes the derivatives by all unknowns, shape (n, unknowns)."""
+    within: float = 0.0
+    """Distance to a place that is allowed, over L."""
+    scale: float = 1.0
+    """Of what the requirement allows, per unit of the value."""
+    unit: str = ""
+    """Unit of that; "" for that of the limit or measure."""
+
+
+def stacked(parts: Sequence[Part]) -> Array:
+    """All values, shape (n,)."""
+    return np.concatenate([np.empty(0), *(part.value for part in parts)])
+
+
+def stacked_slopes(parts: Sequence[Part]) -> Array:
+    """All derivatives, shape (n, unknowns)."""
+    return np.concatenate([part.slope() for part in parts])
+
+
+def _near_place(part: Part) -> Part:
+    """Room on both sides along each axis in a cube within the distance that is allowed."""
+    half = _ROOM * part.within / np.sqrt(3.0)
+    value = np.concatenate([half - part.value, half + part.value])
+    scale = part.scale * np.sqrt(3.0) / _ROOM
+    return Part(
+        part.name,
+        value,
+        lambda: np.concatenate([-part.slope(), part.slope()]),
+        scale=scale,
+        unit=part.unit,
+    )
+
+
+def _row(slopes: Callable[[], Array], k: int) -> Array:
+    return slopes()[k]
+
+
+def _column(slopes: Callable[[], Array], k: int) -> Array:
+    return slopes()[:, k]
+
+
+def lazily(make: Callable[[], Array]) -> Callable[[], Array]:
+    """A function that calls another once."""
+    return cache(make)
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:
@@ -414,7 +432,7 @@ def _room(rules: PoseRules, cube: Array) -> Array:
     scale = np.array(
         [rules.arm.length] * len(rules.keeps) + [x or 1.0 for x in most[len(rules.keeps) :]]
     )
-    return np.nan_to_num((most - value) / scale, nan=-1.0, neginf=-1.0, posinf=1.0)
+    return np.nan_to_num((most - value) / scale - _SPARE, nan=-1.0, neginf=-1.0, posinf=1.0)
 
 
 def _within(targets: Sequence[object]) -> Array:
@@ -425,9 +443,3 @@ def _within(targets: Sequence[object]) -> Array:
         if target.places is not None  # pyright: ignore
     ]
     return np.concatenate([np.empty(0), *each])
-
-
-def _stacked(parts: Sequence[tuple[Array, Array]], size: int) -> tuple[Array, Array]:
-    values = [value for value, _ in parts]
-    slopes = [slope for _, slope in parts]
-    return np.concatenate([np.empty(0), *values]), np.concatenate([np.empty((0, size)), *slopes])

@@ -14,7 +14,7 @@ from softreach.atlas.metric import MetricFailed
 from softreach.optimization.objectives import SETS, Goal
 from softreach.optimization.polish import point_of
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import Point
+from softreach.optimization.program import Point, stacked_slopes
 from softreach.optimization.result import Search
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer
@@ -236,7 +236,7 @@ def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
 def _with_poses(point: Point) -> Array:
     """Slope of the cost by the reals, while poses keep the tips where they are."""
     count, (_, slope) = len(point.reals), point.cost
-    _, equations = point.equations
+    equations = _equations(point)
     if not len(equations) or not np.any(slope[count:]):
         return slope[:count]
     forces = np.linalg.lstsq(equations[:, count:].T, -slope[count:], rcond=None)[0]
@@ -268,7 +268,7 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     if not problem.goals or not problem.goals[0].objective.smooth or not problem.parameters.real:
         return (), math.nan
     point = point_of(problem, candidate, problem.accuracy)
-    slope, equations = point.cost[1], point.equations[1]
+    slope, equations = point.cost[1], _equations(point)
     size = float(np.linalg.norm(slope))
     bounds = [*_rooms(point), *_ends(problem, point)]
     columns = [*equations, *-equations, *(each.slope for each in bounds)]
@@ -278,7 +278,7 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     there, back, others = np.split(weights, [len(equations), 2 * len(equations)])
     gains: dict[tuple[str, str], float] = {}
     pulls = np.linalg.norm((there - back).reshape(-1, 3), axis=1)
-    for pull, what in zip(pulls.tolist(), point.equation_names[::3], strict=True):
+    for pull, what in zip(pulls.tolist(), point.equations, strict=True):
         key = what.name, what.unit  # a place under several payloads counts with all of them
         gains[key] = gains.get(key, 0.0) + pull / what.scale
     for weight, each in zip(others.tolist(), bounds, strict=True):
@@ -292,12 +292,17 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
 
 def _rooms(point: Point) -> list[_Condition]:
     """Requirements that have no room left."""
-    each = zip(*point.rooms, point.room_names, strict=True)
     return [
-        _Condition(-row, what.name, what.unit, 1.0 / what.scale)
-        for room, row, what in each
-        if room <= _ACTIVE
+        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
+        for part in point.rooms
+        for k in np.flatnonzero(part.value <= _ACTIVE)
     ]
+
+
+def _equations(point: Point) -> Array:
+    """Derivatives of all equations, three for each place."""
+    parts = point.equations
+    return stacked_slopes(parts) if parts else np.empty((0, len(point.cost[1])))
 
 
 def _ends(problem: Problem, point: Point) -> list[_Condition]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -32,6 +30,8 @@ _MISSED = 1e12
 matters to the samplers."""
 _NEVER = 1e15
 """Cost of what cannot exist."""
+_WARM = 10
+"""Designs that CMA-ES begins from at least: the best tenth of them must be one or more."""
 _JUDGED, _PROBLEM = "judged", "problem"
 
 
@@ -57,11 +57,11 @@ class Study:
         """
         self.problem, self._first = problem, first
         self._sampler = as_one_of("sampler", sampler, SAMPLERS)
-        self._seed = seed
+        self.seed = seed
         self._optuna = _library()
         with _quiet():
             self._study = self._opened(storage)
-            self._begin()
+            self._begin(storage)
 
     def ask(self, count: int) -> list[tuple[Any, dict[str, float | str]]]:
         """Trials to be told, and their designs."""
@@ -107,13 +107,16 @@ class Study:
 
     def focus(self) -> None:
         """Let a sampler that begins at one place begin where the best of the known designs are."""
-        if self._kind() != "cma":
+        if self.kind != "cma":
             return
         with _quiet():
+            known = self._study.get_trials(states=self._complete)
+            if len(known) < _WARM:
+                return
             self._study.sampler = self._optuna.samplers.CmaEsSampler(
-                source_trials=self._study.get_trials(states=self._complete),
+                source_trials=known,
                 n_startup_trials=0,
-                seed=self._seed + 1,
+                seed=self.seed + 1,
                 warn_independent_sampling=False,
             )
 
@@ -128,7 +131,7 @@ class Study:
                 study_name=_NAME,
                 storage=None if place is None else _storage(optuna, place),
                 directions=["minimize"] * max(1, len(self.problem.goals)),
-                sampler=self._made_sampler(),
+                sampler=self._made_sampler(self.seed),
                 load_if_exists=True,
             )
         except InvalidInput:
@@ -137,20 +140,29 @@ class Study:
             allowed = "a file that can be written, of this kind of search"
             raise InvalidInput("storage", storage, allowed, in_short(error)) from error
 
-    def _begin(self) -> None:
-        """Note the problem and ask for the first designs; refuse the storage of another one."""
-        digest = _digest(self.problem)
-        known = self._study.user_attrs.get(_PROBLEM)
-        if known is not None:
-            if known != digest:
-                allowed = "one of the same designs, requirements and objectives"
-                raise InvalidInput("storage", "of another search", allowed, "choose another file")
-            return
-        for values in first_designs(self.problem, self._first, self._seed):
-            self._study.enqueue_trial(dict(values))
-        self._study.set_user_attr(_PROBLEM, digest)
+    def _begin(self, place: str | None) -> None:
+        """Note the problem and ask for the first designs; refuse the storage of another one.
 
-    def _kind(self) -> str:
+        What was killed in between goes on, and a second process asks for none again.
+        """
+        digest = self.problem.digest
+        noted = self._study.user_attrs.get(_PROBLEM, digest)
+        if noted != digest:
+            allowed = "that of the same designs, requirements and objectives"
+            hint = "it is of another search: remove it, or choose another file"
+            raise InvalidInput("storage", place, allowed, hint)
+        self._study.set_user_attr(_PROBLEM, digest)
+        known = self._study.get_trials(deepcopy=False)
+        if known:  # else another process would draw the same designs
+            self._study.sampler = self._made_sampler(self.seed + len(known))
+        names = self.problem.parameters.names
+        asked = {_values_of(trial, names) for trial in known}
+        for values in first_designs(self.problem, self._first, self.seed):
+            if tuple(values[name] for name in names) not in asked:
+                self._study.enqueue_trial(dict(values))
+
+    @property
+    def kind(self) -> str:
         """The sampler, chosen by what is free and how many goals there are."""
         if self._sampler != "auto":
             return self._sampler
@@ -159,8 +171,8 @@ class Study:
         real = all(each.is_real for each in self.problem.parameters.free)
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
-    def _made_sampler(self) -> Any:
-        samplers, seed = self._optuna.samplers, self._seed
+    def _made_sampler(self, seed: int) -> Any:
+        samplers = self._optuna.samplers
         population = max(8, min(self._first, 48))
         return {
             "cma": lambda: samplers.CmaEsSampler(seed=seed, warn_independent_sampling=False),
@@ -173,7 +185,7 @@ class Study:
                 seed=seed, scramble=True, warn_independent_sampling=False
             ),
             "random": lambda: samplers.RandomSampler(seed=seed),
-        }[self._kind()]()
+        }[self.kind]()
 
     def _distribution(self, parameter: FreeParameter) -> Any:
         kinds = self._optuna.distributions
@@ -193,6 +205,12 @@ class Study:
         return [missed] * max(1, len(self.problem.goals))
 
 
+def _values_of(trial: Any, names: Sequence[str]) -> tuple[Any, ...]:
+    """Values of a trial, or those that it is going to have."""
+    values = trial.params or trial.system_attrs.get("fixed_params", {})
+    return tuple(values.get(name) for name in names)
+
+
 def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
     """Designs evenly spread over all ranges and choices, after the one that the user has."""
     from scipy.stats import qmc
@@ -205,23 +223,6 @@ def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
     cube = sampler.random(1 << max(0, math.ceil(math.log2(max(count, 1)))))[:count]
     for place in cube:
         yield {each.name: each.at(float(x)) for each, x in zip(free, place, strict=True)}
-
-
-def _digest(problem: Problem) -> str:
-    """Fingerprint of all that decides what a design is worth."""
-    parameters = problem.parameters
-    record = {
-        "bases": {name: arm.to_toml() for name, arm in parameters.bases.items()},
-        "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
-        "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
-        "requirements": problem.requirements.to_toml(),
-        "goals": [
-            [goal.name, goal.sense, *([dict(sigmas)] if (sigmas := goal.objective.sigmas) else [])]
-            for goal in problem.goals
-        ],
-    }
-    text = json.dumps(record, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _storage(optuna: Any, place: str) -> Any:

@@ -16,6 +16,7 @@ from softreach.plot.hull import plot_hull, plot_volume_curve
 from softreach.plot.loads import plot_compliance, plot_equilibria, plot_payload_curve
 from softreach.plot.metric_map import SheetAxis, box_over_length, plot_metric_map, sheet_axes
 from softreach.plot.redundancy import plot_distance, plot_distance_histograms, plot_redundancy
+from softreach.plot.search import plot_search
 from softreach.plot.sheet import plot_cloud_sheet, plot_hull_sheet, plot_opposite_sides
 from softreach.plot.slice import plot_slice, plot_slices
 from softreach.plot.style import save_figure
@@ -44,6 +45,7 @@ __all__ = [
     "plot_opposite_sides",
     "plot_payload_curve",
     "plot_redundancy",
+    "plot_search",
     "plot_slab",
     "plot_slice",
     "plot_slices",

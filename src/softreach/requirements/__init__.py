@@ -2,8 +2,9 @@
 
 from softreach.requirements.checks import Check, Coverage, check
 from softreach.requirements.findings import Finding, quick_excess
+from softreach.requirements.parts import Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
-from softreach.requirements.requirements import Keep, Limits, Requirements, Target
+from softreach.requirements.requirements import Requirements
 
 __all__ = [
     "Box",

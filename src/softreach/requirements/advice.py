@@ -62,14 +62,14 @@ def _wider(arm: Manipulator, rod: TipMap, gamma: Array, place: Array) -> list[st
     for _ in range(_NEWTON_STEPS):
         tips, slopes = rod.tips_and_slopes(x)
         miss = place - tips[0]
-        if not np.isfinite(miss).all():
+        if not (np.isfinite(miss).all() and np.isfinite(slopes).all()):
             return []
         if np.linalg.norm(miss) <= _ARRIVED * rod.length:
             break
         scales = np.where(box.is_free, box.scales, 0.0)
         step = np.linalg.pinv(slopes[0] * scales, rcond=1e-3) @ miss
-        size = float(np.linalg.norm(step))
-        x = x + scales * step * min(1.0, _LONGEST_STEP / max(size, 1e-300))
+        size = float(np.abs(step).max(initial=0.0))
+        x = x + scales * (step * min(1.0, _LONGEST_STEP / max(size, 1e-300)))
         if box.excess(x).max() > _WIDEST or not rod.has_arm(x).all():
             return []
     else:

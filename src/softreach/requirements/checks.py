@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.inverse.prepared import prepared_map
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.advice import advice
@@ -22,19 +22,24 @@ from softreach.requirements.findings import (
     shown_unit,
     with_payload,
 )
-from softreach.requirements.poses import PoseRules, worst_pose
+from softreach.requirements.parts import Keep, Target
+from softreach.requirements.poses import PoseRules, some_corners, worst_pose
 from softreach.requirements.regions import Region
-from softreach.requirements.requirements import Keep, Requirements, Target
+from softreach.requirements.requirements import Requirements
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import tip_map
+from softreach.rod.view import stable_tips
+from softreach.sampling import sample_cube
 from softreach.schema import AXES, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidInput, Range, no_warnings
-from softreach.support.progress import Progress, as_progress
+from softreach.support.lazy import lazy
+from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace.search import nearest_tips
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,6 +52,9 @@ _MOST_TRIED = 4_096  # places for which they are
 _LEAST_PLACES = 64  # in a region to be covered
 _MOST_PLACES = 100_000
 _TOL = 1e-6
+_SEEDS, _NEIGHBORS = 256, 5
+"""Samples that quick descents start from, and how many of them for each place."""
+_CELLS = 16  # along each axis of three bundles: as many solutions as with 32, in half the time
 
 
 class Coverage(NamedTuple):
@@ -94,14 +102,31 @@ def check(
     arm = a_manipulator("arm", arm)
     needs = as_instance("requirements", requirements, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.2))
-    step = as_progress(progress)
+    return _checked(arm, needs, accuracy, as_progress(progress), _chosen)
+
+
+def quick_check(arm: Manipulator, requirements: Requirements, accuracy: float) -> Check:
+    """As `check`, with poses from a few descents to each place, for designs on the way of a search.
+
+    A place that these do not reach counts as missed, although another pose may reach it.
+    """
+    return _checked(arm, requirements, accuracy, silent, _descended)
+
+
+_Chooser = Callable[[PoseRules, Array, Array], "Posed"]
+
+
+def _checked(
+    arm: Manipulator, needs: Requirements, accuracy: float, step: Progress, choose: _Chooser
+) -> Check:
+    """A design against requirements, with poses that are chosen for blocks of places."""
     payloads = needs.payloads or (None,)
     arms = [with_payload(arm, payload) for payload in payloads]
     posed: list[Posed] = []
     coverages: list[Coverage] = []
     for payload, loaded in zip(payloads, arms, strict=True):
         rules = _rules(loaded, needs, accuracy)
-        posed.append(_solved(rules, needs.places, _within(needs), step))
+        posed.append(_solved(rules, needs.places, _within(needs), step, choose))
         for target in needs.targets:
             if target.region is not None:
                 coverages.append(_coverage(rules, target, payload, accuracy, step))
@@ -164,7 +189,7 @@ class Check:
         """The places [m], shape (place, 3)."""
         return self.requirements.places
 
-    @cached_property
+    @lazy
     def target_of(self) -> Index:
         """Index of the target that each place belongs to, shape (place,)."""
         counts = [0 if t.places is None else len(t.places) for t in self.requirements.targets]
@@ -275,13 +300,15 @@ def _rules(arm: Manipulator, needs: Requirements, accuracy: float) -> PoseRules:
     return PoseRules.of(arm, keeps, needs.limits, 0.1 * accuracy * arm.length)
 
 
-def _solved(rules: PoseRules, places: Array, within: Array, step: Progress) -> Posed:
+def _solved(
+    rules: PoseRules, places: Array, within: Array, step: Progress, choose: _Chooser
+) -> Posed:
     """The poses at places, in blocks."""
     count, inputs, k = len(places), rules.arm.inputs, len(rules)
     shapes = ((), (inputs,), (), (3,), (k,), (k,), (k,))
     room = Posed(*(np.zeros((count, *shape)) for shape in shapes))
     for block in parallel.blocks(count, _BLOCK):
-        for whole, part in zip(room, _chosen(rules, places[block], within[block]), strict=True):
+        for whole, part in zip(room, choose(rules, places[block], within[block]), strict=True):
             whole[block] = part
         step(len(places[block]))
     return room
@@ -291,7 +318,7 @@ def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     arm = rules.arm
     try:
         with no_warnings():
-            solutions = solve_inverse(arm, places, tol=_TOL)
+            solutions = solve_inverse(prepared_map(arm, _TOL, cells=_CELLS), places)
     except InvalidInput as error:
         if error.name != "loads":
             raise
@@ -301,7 +328,9 @@ def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     if (tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
         rows = np.flatnonzero(broken)
         with no_warnings():
-            family = solve_inverse(arm, places[rows], tol=_TOL, family=_FAMILY)
+            family = solve_inverse(
+                prepared_map(arm, _TOL, cells=_CELLS), places[rows], family=_FAMILY
+            )
         for all_places, some in zip(chosen, _best(rules, family), strict=True):
             all_places[rows] = some
     # A place that is reached to the error of the tips is reached.
@@ -310,28 +339,74 @@ def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     return chosen._replace(gaps=gaps)
 
 
+def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
+    """Poses at the ends of descents from the samples whose tips are nearest to each place."""
+    from scipy.spatial import KDTree
+
+    rod, count = rules.rod, len(places)
+    gamma = rod.box.from_cube(sample_cube("sobol", _SEEDS, rod.box.bundles))
+    gamma = np.concatenate([gamma, some_corners(rod)])
+    tips = stable_tips(rod).tips(gamma)
+    known = np.isfinite(tips).all(axis=1)
+    if not known.any():
+        return _fallen(rules, places)
+    gamma, tips = gamma[known], tips[known]
+    near = KDTree(tips).query(places, k=min(_NEIGHBORS, len(tips)))[1].reshape(count, -1)
+    owner = np.repeat(np.arange(count), near.shape[1])
+    enough = _TOL * rod.length
+    ends = nearest_tips(rod, gamma[near.ravel()], places[owner], enough)
+    least = np.full(count, np.inf)
+    np.minimum.at(least, owner, ends.distance)
+    # Local minima that are farther away than another are no poses at the place.
+    wanted = np.maximum(np.maximum(within, enough)[owner], least[owner] * (1.0 + 1e-9))
+    kept = ends.distance <= wanted
+    return _ranked(
+        rules, places, owner[kept], ends.gamma[kept], ends.distance[kept], ends.tips[kept]
+    )
+
+
 def _best(rules: PoseRules, solutions: Solutions) -> Posed:
-    """Of each target the activation that breaks the rules least, then that of least effort."""
-    count = len(solutions)
+    """Of each target the solution that breaks the rules least, then that of least effort."""
     missing = np.flatnonzero(solutions.counts == 0)
-    owner = np.concatenate([np.repeat(np.arange(count), solutions.counts), missing])
+    owner = np.concatenate([np.repeat(np.arange(len(solutions)), solutions.counts), missing])
     gamma = np.concatenate([solutions.activations, solutions.nearest_activations[missing]])
+    gaps = np.concatenate([solutions.residuals, solutions.gaps[missing]])
+    nearest = np.concatenate(
+        [np.repeat(solutions.targets, solutions.counts, axis=0), solutions.nearest[missing]]
+    )
+    return _ranked(rules, solutions.targets, owner, gamma, gaps, nearest)
+
+
+def _ranked(
+    rules: PoseRules, places: Array, owner: Index, gamma: Array, gaps: Array, nearest: Array
+) -> Posed:
+    """Of each place the pose that breaks the rules least, then that of least effort.
+
+    Args:
+        rules: Regions and limits of poses.
+        places: Shape (place, 3).
+        owner: Place of each pose; each place has one at least.
+        gamma: Inputs of the poses.
+        gaps: Distances from their tips to the places [m].
+        nearest: Their tips.
+    """
     lost = ~np.isfinite(gamma).all(axis=1)
     gamma[lost] = rules.rod.box.low
     judged = rules.judged(gamma)
-    largest = np.abs(rules.arm.input_bounds).max(axis=1, initial=0.0)
-    effort = np.linalg.norm(gamma / np.where(largest > 0.0, largest, 1.0), axis=1)
+    effort = np.linalg.norm(gamma / effort_scales(rules.arm), axis=1)
     broken = judged.excess.sum(axis=1)
     order = np.lexsort((effort, broken, owner))
-    best = order[np.searchsorted(owner[order], np.arange(count))]
-    gaps = np.concatenate([solutions.residuals, solutions.gaps[missing]])[best]
-    nearest = np.concatenate(
-        [np.repeat(solutions.targets, solutions.counts, axis=0), solutions.nearest[missing]]
-    )[best]
-    away = np.linalg.norm(solutions.targets - rules.arm.base.position, axis=1)
-    gaps = np.where(np.isfinite(gaps), gaps, away + rules.arm.length)
+    best = order[np.searchsorted(owner[order], np.arange(len(places)))]
+    away = np.linalg.norm(places - rules.arm.base.position, axis=1)
+    gaps = np.where(np.isfinite(gaps[best]), gaps[best], away + rules.arm.length)
     rest = (judged.excess[best], judged.value[best], judged.error[best])
-    return Posed(gaps, gamma[best], effort[best], np.nan_to_num(nearest), *rest)
+    return Posed(gaps, gamma[best], effort[best], np.nan_to_num(nearest[best]), *rest)
+
+
+def effort_scales(arm: Manipulator) -> Array:
+    """Largest bound of each input, which its effort counts in, shape (inputs,)."""
+    largest = np.abs(arm.input_bounds).max(axis=1, initial=0.0)
+    return np.where(largest > 0.0, largest, 1.0)
 
 
 def _fallen(rules: PoseRules, places: Array) -> Posed:
@@ -353,7 +428,7 @@ def _coverage(
     places = target.region.places(count)
     near = max(target.within, _TOL * rules.arm.length)
     if len(rules):
-        posed = _solved(rules, places, np.full(count, target.within), step)
+        posed = _solved(rules, places, np.full(count, target.within), step, _chosen)
         inside = (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
     else:
         inside = _reachable(rules.arm, places, target.within, accuracy)

@@ -13,20 +13,21 @@ from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import strain_stations
-from softreach.requirements.requirements import POSE_LIMITS, Keep, Limits
+from softreach.requirements.parts import POSE_LIMITS, Keep, Limits
+from softreach.requirements.regions import HalfSpace
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 from softreach.support import parallel
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, Index, Mask
 
 __all__ = ["PoseRules", "Worst", "worst_pose"]
 
-_LEVELS = (32, 128, 512, 2048)
+_LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""
 _BLOCK = 256  # poses at once
-_SAFETY = 1.05  # of the speed along the arm between stations
+_SAFETY = 1.2  # of speeds and turns between stations, which are known at these
 _MOST_CORNERS = 10  # bundles of which all corners are tried
 _SAMPLES = 2048
 _STARTS, _AROUND, _ROUNDS, _SHRINK = 4, 32, 12, 0.6
@@ -53,14 +54,21 @@ class PoseRules:
     limits: dict[str, float]
     tolerance: float
     """Error that is allowed in how far a region is missed [m]."""
+    known_rod: TipMap | None = None
+    """Tip map of the arm, if it is to be another than to the usual tolerance."""
 
     @classmethod
     def of(
-        cls, arm: Manipulator, keeps: Sequence[Keep], limits: Limits, tolerance: float
+        cls,
+        arm: Manipulator,
+        keeps: Sequence[Keep],
+        limits: Limits,
+        tolerance: float,
+        rod: TipMap | None = None,
     ) -> PoseRules:
         """The rules for single poses among regions and limits."""
         poses = {name: x for name, x in limits.given.items() if name in POSE_LIMITS}
-        return cls(arm, tuple(keeps), poses, tolerance)
+        return cls(arm, tuple(keeps), poses, tolerance, rod)
 
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
@@ -68,7 +76,7 @@ class PoseRules:
     @property
     def rod(self) -> TipMap:
         """The tip map of the arm, whose activations are its inputs."""
-        return tip_map(self.arm)
+        return tip_map(self.arm) if self.known_rod is None else self.known_rod
 
     def judged(self, gamma: Array) -> Judged:
         """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""
@@ -88,43 +96,25 @@ class PoseRules:
         return Judged(value, np.where(excess > 1e-9, excess, 0.0), np.nan_to_num(error))
 
     def _kept(self, gamma: Array) -> tuple[Array, Array]:
+        """How far every region is missed [m], and how much more it may be, (n, keep) each."""
         value = np.empty((len(gamma), len(self.keeps)))
         error = np.zeros_like(value)
+        left: dict[int, Index] = {}
         for column, keep in enumerate(self.keeps):
             if keep.of == "tip":
-                tips = self.rod.tips(gamma)
-                lost = np.isnan(tips).any(axis=1)
-                value[:, column] = keep.missed(np.where(np.isnan(tips), 0.0, tips))
-                value[lost, column] = np.nan
-                continue
-            left = np.arange(len(gamma))
-            for parts in _LEVELS:
-                seen, bound = self._body(keep, gamma[left], parts)
-                value[left, column], error[left, column] = seen, bound - seen
-                left = left[(bound > 0.0) & (bound - seen > self.tolerance)]
-                if not len(left):
-                    break
+                value[:, column] = _tips_missed(keep, self.rod.tips(gamma))
+            else:
+                left[column] = np.arange(len(gamma))
+        for parts in _LEVELS:
+            rows = np.unique(np.concatenate([np.empty(0, int), *left.values()]))
+            if not len(rows):
+                break
+            body = Body.of(self.rod, gamma[rows], parts)
+            for column, own in left.items():
+                seen, bound = body.missed(self.keeps[column], np.searchsorted(rows, own))
+                value[own, column], error[own, column] = seen, bound - seen
+                left[column] = own[(bound > 0.0) & (bound - seen > self.tolerance)]
         return value, error
-
-    def _body(self, keep: Keep, gamma: Array, parts: int) -> tuple[Array, Array]:
-        """How far the body misses a region at stations [m], and at most between them, (n,)."""
-        rod, z = self.rod, np.linspace(0.0, self.arm.length, parts + 1)
-        frames, strains, radius = rod.frames(gamma, z), rod.strains(gamma, z), rod.radius(z)
-        lost = np.isnan(frames.position).any(axis=(1, 2))
-        position = np.where(np.isnan(frames.position), 0.0, frames.position)
-        normal = np.nan_to_num(frames.directors[:, :, 2])
-        radii = np.broadcast_to(radius, position.shape[:2])
-        least, most = keep.region.section_distances(position, normal, radii)
-        missed = (most if keep.inside else -least) + keep.clearance
-        turn = np.linalg.norm(strains.curvature, axis=2) * np.maximum(strains.extension, 1.0)
-        step = self.arm.length / parts
-        speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z))
-        between = np.maximum(speed[:, 1:], speed[:, :-1]) * step * _SAFETY
-        bound = 0.5 * (missed[:, 1:] + missed[:, :-1] + between)
-        seen = missed.max(axis=1)
-        bound = np.maximum(bound.max(axis=1), seen)
-        seen[lost] = bound[lost] = np.nan
-        return seen, bound
 
     def _limited(self, name: str, gamma: Array) -> Array:
         """Value of a limit in poses, shape (n,)."""
@@ -160,6 +150,67 @@ class PoseRules:
             return sharpest_bending(self.arm).value
         corners = some_corners(self.rod)
         return float(np.nan_to_num(self._limited(name, corners)).max())
+
+
+class Body(NamedTuple):
+    """Sections of an arm in poses, at stations."""
+
+    center: Array
+    """Shape (n, station, 3) [m]."""
+    tangent: Array
+    """Shape (n, station, 3)."""
+    radius: Array
+    """Before activation, shape (n, station) [m]."""
+    between: Array
+    """Farthest that a point of the body is from those of the two sections that it lies between,
+    both ways together [m], shape (n, station - 1)."""
+    bulge: Array
+    """Farthest that the body bulges between two sections from the straight line between their
+    points [m], shape (n, station - 1)."""
+    lost: Mask
+    """Poses without an arm, shape (n,)."""
+
+    @classmethod
+    def of(cls, rod: TipMap, gamma: Array, parts: int) -> Body:
+        """The sections between so many parts."""
+        z = np.linspace(0.0, rod.length, parts + 1)
+        frames, strains, radius = rod.frames(gamma, z), rod.strains(gamma, z), rod.radius(z)
+        turn = np.linalg.norm(strains.curvature, axis=2) * np.maximum(strains.extension, 1.0)
+        speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z))
+        step = rod.length / parts
+        fastest = np.maximum(speed[:, 1:], speed[:, :-1])
+        turning = fastest * np.maximum(turn[:, 1:], turn[:, :-1])
+        change = np.abs(np.diff(speed, axis=1)) / step + turning
+        return cls(
+            center=np.where(np.isnan(frames.position), 0.0, frames.position),
+            tangent=np.nan_to_num(frames.directors[:, :, 2]),
+            radius=np.broadcast_to(radius, frames.position.shape[:2]),
+            between=_SAFETY * fastest * step,
+            bulge=_SAFETY * change * step**2 / 8.0,
+            lost=np.isnan(frames.position.sum(axis=(1, 2))),
+        )
+
+    def missed(self, keep: Keep, rows: Index) -> tuple[Array, Array]:
+        """How far some poses miss a region at the stations [m], and at most between them, (n,)."""
+        part = (self.center[rows], self.tangent[rows], self.radius[rows])
+        least, most = keep.region.section_distances(*part)
+        missed = (most if keep.inside else -least) + keep.clearance
+        seen = missed.max(axis=1)
+        if (keep.inside and keep.region.convex) or isinstance(keep.region, HalfSpace):
+            # Along a straight line the distance from such a region is largest at an end.
+            between = np.maximum(missed[:, 1:], missed[:, :-1]) + self.bulge[rows]
+        else:
+            between = 0.5 * (missed[:, 1:] + missed[:, :-1] + self.between[rows])
+        bound = np.maximum(between.max(axis=1), seen)
+        seen[self.lost[rows]] = bound[self.lost[rows]] = np.nan
+        return seen, bound
+
+
+def _tips_missed(keep: Keep, tips: Array) -> Array:
+    """How far tips miss a region [m], NaN where there is none, shape (n,)."""
+    missed = keep.missed(np.where(np.isnan(tips), 0.0, tips))
+    missed[np.isnan(tips).any(axis=1)] = np.nan
+    return missed
 
 
 class Worst(NamedTuple):
@@ -204,14 +255,13 @@ def _coarse(rules: PoseRules, gamma: Array) -> Array:
     """How far poses miss the one region, at few stations [m], shape (n,)."""
     (keep,) = rules.keeps
     if keep.of == "tip":
-        tips = np.nan_to_num(rules.rod.tips(gamma), nan=np.inf)
-        known = np.isfinite(tips).all(axis=1)
-        out = np.full(len(gamma), -np.inf)
-        out[known] = keep.missed(tips[known])
-        return out
-    blocks = parallel.blocks(len(gamma), _BLOCK)
-    values = [rules._body(keep, gamma[block], _LEVELS[0])[0] for block in blocks]
-    return np.nan_to_num(np.concatenate(values), nan=-np.inf)
+        values = _tips_missed(keep, rules.rod.tips(gamma))
+    else:
+        blocks = parallel.blocks(len(gamma), _BLOCK)
+        bodies = (Body.of(rules.rod, gamma[block], _LEVELS[0]) for block in blocks)
+        values = [body.missed(keep, np.arange(len(body.lost)))[0] for body in bodies]
+        values = np.concatenate(values)
+    return np.nan_to_num(values, nan=-np.inf)
 
 
 def some_corners(rod: TipMap) -> Array:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,7 @@ from softreach.support.arrays import (
     read_only,
 )
 from softreach.support.errors import InvalidInput, counted
+from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
 __all__ = ["Box", "HalfSpace", "Mesh", "Region", "Sphere"]
@@ -45,6 +46,9 @@ _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
 
 class Region(ABC):
     """A part of space; lengths in m, in the world."""
+
+    convex: ClassVar[bool] = True
+    """With two points it holds all between them."""
 
     @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
@@ -92,7 +96,9 @@ class Region(ABC):
                 raise InvalidInput("region", self, "thick enough for places inside it")
         return np.concatenate(kept)[:n]
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """Least and largest distance of the points of circular sections, negative inside.
 
         Exact for half-spaces and for spheres; of boxes the largest is exact by faces. Otherwise a
@@ -100,10 +106,10 @@ class Region(ABC):
 
         Args:
             center: Centers [m], shape (..., 3).
-            normal: Normals [-], shape (..., 3).
+            tangent: Unit vectors across the sections, d3 [-], shape (..., 3).
             radius: Radii [m], shape (...).
         """
-        del normal
+        del tangent
         distance = self._distances(center)
         return distance - radius, distance + radius
 
@@ -150,9 +156,11 @@ class Box(Region):
         beyond = np.maximum(self.low - x, x - self.high)
         return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """As `Region.section_distances`; the least by faces where they tell more than a ball."""
-        reach = radius[..., None] * np.sqrt(np.maximum(1.0 - normal**2, 0.0))
+        reach = radius[..., None] * np.sqrt(np.maximum(1.0 - tangent**2, 0.0))
         beyond = np.maximum(self.low - center, center - self.high)
         ball = self._distances(center) - radius
         return np.maximum(ball, (beyond - reach).max(axis=-1)), (beyond + reach).max(axis=-1)
@@ -198,10 +206,12 @@ class Sphere(Region):
         """Distance of points (n, 3) to its surface [m], negative inside, shape (n,)."""
         return np.linalg.norm(as_points("points", points) - self.center, axis=1) - self.radius
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """As `Region.section_distances`, exact."""
         apart = center - self.center
-        height = (apart * normal).sum(axis=-1)
+        height = (apart * tangent).sum(axis=-1)
         across = np.sqrt(np.maximum((apart**2).sum(axis=-1) - height**2, 0.0))
         least, most = np.maximum(across - radius, 0.0), across + radius
         return np.hypot(height, least) - self.radius, np.hypot(height, most) - self.radius
@@ -245,10 +255,12 @@ class HalfSpace(Region):
         """Distance of points (n, 3) to the plane [m], negative behind it, shape (n,)."""
         return (as_points("points", points) - self.point) @ np.array(self.normal)
 
-    def section_distances(self, center: Array, normal: Array, radius: Array) -> tuple[Array, Array]:
+    def section_distances(
+        self, center: Array, tangent: Array, radius: Array
+    ) -> tuple[Array, Array]:
         """As `Region.section_distances`, exact."""
         distance = (center - self.point) @ np.array(self.normal)
-        along = normal @ np.array(self.normal)
+        along = tangent @ np.array(self.normal)
         reach = radius * np.sqrt(np.maximum(1.0 - along**2, 0.0))
         return distance - reach, distance + reach
 
@@ -272,6 +284,8 @@ class Mesh(Region):
         InvalidInput: Triangles that leave an edge open, share one by more than two, or do not face
             the same way; or nothing inside.
     """
+
+    convex: ClassVar[bool] = False
 
     vertices: Array
     """Corners [m], shape (v, 3)."""
@@ -329,7 +343,7 @@ class Mesh(Region):
         """Volume inside [m³]."""
         return self._volume
 
-    @cached_property
+    @lazy
     def _volume(self) -> float:
         return enclosed_volume(self.vertices, self.faces)
 
@@ -364,24 +378,24 @@ class Mesh(Region):
         sharp = (first * second).sum(axis=1) < _CREASE
         return list(self.vertices[edges[sharp]])
 
-    @cached_property
+    @lazy
     def _corners(self) -> Array:
         return self.vertices[self.faces]
 
-    @cached_property
+    @lazy
     def _spheres(self) -> tuple[Array, Array]:
         center = self._corners.mean(axis=1)
         radius = np.linalg.norm(self._corners - center[:, None], axis=2).max(axis=1)
         return np.ascontiguousarray(center), radius
 
-    @cached_property
+    @lazy
     def _face_normals(self) -> Array:
         a, b, c = self._corners.swapaxes(0, 1)
         normal = np.cross(b - a, c - a)
         size = np.linalg.norm(normal, axis=1, keepdims=True)
         return np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
 
-    @cached_property
+    @lazy
     def _edges(self) -> tuple[Index, Index, Index]:
         """Edges as vertices (e, 2), the faces beside each (e, 2), and edges of each face (f, 3)."""
         pairs = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2), axis=2)
@@ -390,11 +404,11 @@ class Mesh(Region):
         beside = np.argsort(number, kind="stable").reshape(-1, 2) // 3
         return edges, beside, number.reshape(-1, 3)
 
-    @cached_property
+    @lazy
     def _edge_normals(self) -> Array:
         return self._face_normals[self._edges[1]].sum(axis=1)
 
-    @cached_property
+    @lazy
     def _vertex_normals(self) -> Array:
         normals = np.zeros_like(self.vertices)
         for k in range(3):

@@ -1,4 +1,4 @@
-"""Requirements of an arm as frozen values: places to reach, room to keep, limits, measures."""
+"""Requirements of an arm: what it is for, as a frozen value and a file."""
 
 from __future__ import annotations
 
@@ -8,175 +8,34 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
-from softreach.requirements.regions import Region
+from softreach.requirements.parts import LONGEST, MOST_PLACES, Keep, Limits, Target
+from softreach.requirements.requirements_file import read, written
 from softreach.support.arguments import (
     POSITIVE,
     as_flag,
     as_given,
     as_instance,
-    as_integer,
     as_number,
-    as_one_of,
     as_path,
     as_text,
 )
-from softreach.support.arrays import Array, as_floats, as_points, read_only
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.kinds import FileKind, Formats, text_with
-from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.files.text import read_text
 
-__all__ = ["Keep", "Limits", "Requirements", "Target"]
-
-MOST_PLACES = 1_000_000
-"""Places that all targets may have together."""
-LONGEST = 64 * MEGABYTE
-"""Bytes that a file of requirements may have."""
-
-_NOT_NEGATIVE = Range(0.0)
-_LENGTH = Range(0.0, unit="m")
-_SHARE = Range(0.0, 1.0, open_low=True)
-_REGION = "a region: Box, Sphere, HalfSpace or Mesh"
+__all__ = ["Requirements"]
 
 REQUIREMENTS_FILE: Formats = {
     ".toml": FileKind("a file of requirements", text_with("softreach requirements"))
 }
 """Kind of file that requirements are saved as, and replace."""
-
-
-@dataclass(frozen=True, eq=False)
-class Target:
-    """Places that the tip must reach, or a region of which it must reach a share.
-
-    Raises:
-        InvalidInput: Neither places nor a region, both, or numbers out of range.
-    """
-
-    places: Array | None = None
-    """A place, the places of a path, or a cloud of places [m], shape (n, 3)."""
-    _: dataclasses.KW_ONLY
-    region: Region | None = None
-    """A region to be covered instead."""
-    share: float = 1.0
-    """Share of the region that must be reached [-]."""
-    within: float = 0.0
-    """Distance to which the tip must come to a place [m]; 0 for the error of the tips."""
-    name: str = ""
-    """What it is called in results."""
-
-    def __post_init__(self) -> None:
-        if (self.places is None) == (self.region is None):
-            raise InvalidInput("places", as_given(self.places), "given, or a region, and not both")
-        if self.places is not None:
-            places = as_points("places", self.places)
-            if not 0 < len(places) <= MOST_PLACES:
-                raise InvalidInput("places", f"{len(places):,}", f"from 1 to {MOST_PLACES:,}")
-            object.__setattr__(self, "places", read_only(places.copy()))
-        else:
-            region = as_instance("region", self.region, Region, _REGION)
-            if not np.isfinite(region.volume):
-                raise InvalidInput("region", region, "bounded: a half-space has no end")
-        object.__setattr__(self, "share", as_number("share", self.share, _SHARE))
-        if self.region is None and self.share != 1.0:
-            raise InvalidInput("share", self.share, "left out where there is no region")
-        object.__setattr__(self, "within", as_number("within", self.within, _LENGTH))
-        as_text("name", self.name)
-
-
-@dataclass(frozen=True, eq=False)
-class Keep:
-    """A region that the arm must stay in, or must avoid.
-
-    Raises:
-        InvalidInput: No region, or a value that is not one of those listed.
-    """
-
-    region: Region
-    """The region."""
-    inside: bool
-    """True to stay inside, False to avoid it."""
-    _: dataclasses.KW_ONLY
-    of: Literal["tip", "arm"] = "arm"
-    """The tip alone, or the body from base to tip with its radius before activation."""
-    when: Literal["targets", "always"] = "targets"
-    """In the poses that are used at the targets, or in every pose within the bounds, among which
-    the worst is searched for: samples and a polish, no proof."""
-    clearance: float = 0.0
-    """Distance to keep from the boundary [m]."""
-    name: str = ""
-    """What it is called in results."""
-
-    def __post_init__(self) -> None:
-        as_instance("region", self.region, Region, _REGION)
-        as_flag("inside", self.inside)
-        as_one_of("of", self.of, ("tip", "arm"))
-        as_one_of("when", self.when, ("targets", "always"))
-        object.__setattr__(self, "clearance", as_number("clearance", self.clearance, _LENGTH))
-        as_text("name", self.name)
-
-    @property
-    def kind(self) -> str:
-        """Table of a file that it stands in: "stay_inside" or "avoid"."""
-        return "stay_inside" if self.inside else "avoid"
-
-    def missed(self, points: Array) -> Array:
-        """How far points (n, 3) are from where they may be [m], negative where they are well."""
-        distance = self.region.distance(points)
-        return (distance if self.inside else -distance) + self.clearance
-
-
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """Upper limits of an arm; None for no limit.
-
-    Those of poses (shortening, force, pressure, stroke, bending) are judged in the poses that are
-    used at the targets; where there are no targets, over all of the bounds. The others follow from
-    the design alone.
-
-    Raises:
-        InvalidInput: A number out of range.
-    """
-
-    actuators: int | None = None
-    """Number of inputs that can move."""
-    shortening: float | None = None
-    """Share of its length before activation by which the line of a bundle shortens [-]; without
-    targets at all corners of the bounds."""
-    force: float | None = None
-    """Pull or push of a bundle that is driven by force, and tension of a tendon driven by length
-    [N]."""
-    pressure: float | None = None
-    """Pressure of a chamber, above or below that around it [Pa]."""
-    stroke: float | None = None
-    """Displacement of a tendon that is driven by length [m]."""
-    mass: float | None = None
-    """Mass of the arm [kg]."""
-    load_number: float | None = None
-    """Λ, theory (79), under the largest payload [-]."""
-    bending: float | None = None
-    """κ R2 anywhere along the arm [-]; its inner side folds at 1."""
-
-    def __post_init__(self) -> None:
-        for name, value in self.given.items():
-            if name == "actuators":
-                as_integer(name, value, 0)
-                continue
-            allowed = Range(0.0, 1.0) if name == "shortening" else _NOT_NEGATIVE
-            object.__setattr__(self, name, as_number(name, value, allowed))
-
-    @property
-    def given(self) -> dict[str, float]:
-        """Those that there are, by name."""
-        return {name: value for name, value in vars(self).items() if value is not None}
-
-
-POSE_LIMITS = ("shortening", "force", "pressure", "stroke", "bending")
-"""Limits of poses."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -192,7 +51,7 @@ class Requirements:
     """Places to reach."""
     keeps: tuple[Keep, ...] = ()
     """Regions to stay in or to avoid."""
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
     """Upper limits."""
     payloads: tuple[float, ...] = ()
     """Masses at the tip under each of which every target must be reached [kg]; none for the loads
@@ -230,7 +89,7 @@ class Requirements:
         return dataclasses.replace(self, **changes)
 
     @classmethod
-    def load(cls, path: str | PathLike[str], *, length: float | None = None) -> Requirements:
+    def load(cls, path: str | PathLike[str], *, length: float | None = None) -> Self:
         """The requirements of a TOML file.
 
         Args:
@@ -242,6 +101,7 @@ class Requirements:
             InvalidInput: No file that can be read, or no text in UTF-8.
         """
         name = as_path("path", path)
+        length = None if length is None else as_number("length", length, POSITIVE)
         text = read_text("requirements", name, LONGEST)
         return cls.from_toml(text, folder=Path(name).parent, length=length, source=name)
 
@@ -253,7 +113,7 @@ class Requirements:
         folder: str | PathLike[str] = ".",
         length: float | None = None,
         source: str = "",
-    ) -> Requirements:
+    ) -> Self:
         """The requirements of a TOML text.
 
         Args:
@@ -265,16 +125,20 @@ class Requirements:
         Raises:
             InvalidDesign: As for `load`.
         """
-        from softreach.requirements.requirements_file import read
-
         text, folder = as_text("text", text), as_path("folder", folder)
         size = None if length is None else as_number("length", length, POSITIVE)
-        return read(text, Path(folder), size, as_text("source", source))
+        source = as_text("source", source)
+        parts = read(text, Path(folder), size, source)
+        try:
+            return cls(**parts)
+        except InvalidInput as error:
+            fault = Fault(error.name, error.value, f"must be {error.allowed}")
+            raise InvalidDesign([fault], source) from None
+        except InvalidDesign as error:
+            raise InvalidDesign(error.faults, source) from None
 
     def to_toml(self) -> str:
         """The text of a file, from which `from_toml` makes the same."""
-        from softreach.requirements.requirements_file import written
-
         return written(self)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,18 +13,15 @@ from softreach.arm.design_file.keys import inline_table, key_text, value_text
 from softreach.arm.design_file.tables import unknown_key
 from softreach.atlas.metrics import known_metric
 from softreach.inverse.request import positions_in
+from softreach.requirements.parts import LONGEST, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
-from softreach.requirements.requirements import (
-    LONGEST,
-    Keep,
-    Limits,
-    Requirements,
-    Target,
-)
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 from softreach.support.files.text import read_text
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
+
+if TYPE_CHECKING:
+    from softreach.requirements.requirements import Requirements
 
 __all__ = ["read", "written"]
 
@@ -64,8 +61,8 @@ _EXAMPLE = {kind: {"region": Sphere((0.0, 0.0, 0.0), 1.0)} for kind in (Target, 
 }
 
 
-def read(text: str, folder: Path, length: float | None, source: str) -> Requirements:
-    """The requirements of a text, or all of its faults at once.
+def read(text: str, folder: Path, length: float | None, source: str) -> dict[str, Any]:
+    """Fields of the requirements of a text, or all of its faults at once.
 
     Args:
         text: TOML.
@@ -86,13 +83,7 @@ def read(text: str, folder: Path, length: float | None, source: str) -> Requirem
     parts = reader.parts(document)
     if reader.faults:
         raise InvalidDesign(reader.faults, source)
-    try:
-        return Requirements(**parts)
-    except InvalidInput as error:
-        fault = Fault(error.name, error.value, f"must be {error.allowed}")
-        raise InvalidDesign([fault], source) from None
-    except InvalidDesign as error:
-        raise InvalidDesign(error.faults, source) from None
+    return parts
 
 
 class _Reader:
@@ -104,7 +95,8 @@ class _Reader:
 
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""
-        self._check_keys(document, {key: key for key in _KEYS}, "", ("payloads",))
+        keys = (*_KEYS, "search")  # which the search of designs reads
+        self._check_keys(document, {key: key for key in keys}, "", ("payloads",))
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
         payloads = self._value(document, "", "payloads", "kg", several=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.kernels.box.box_projection import project
 from softreach.support.arrays import as_rows, read_only
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 
@@ -48,32 +48,32 @@ class ActivationBox:
         """Number of bundles, free or fixed."""
         return len(self.bounds)
 
-    @cached_property
+    @lazy
     def low(self) -> Array:
         """Lower bounds, shape (bundles,)."""
         return read_only(np.array([low for low, _ in self.bounds]))
 
-    @cached_property
+    @lazy
     def high(self) -> Array:
         """Upper bounds, shape (bundles,)."""
         return read_only(np.array([high for _, high in self.bounds]))
 
-    @cached_property
+    @lazy
     def widths(self) -> Array:
         """Upper minus lower bounds, shape (bundles,)."""
         return read_only(self.high - self.low)
 
-    @cached_property
+    @lazy
     def scales(self) -> Array:
         """`widths`, with 1 for fixed bundles: the measure of changes of activation."""
         return read_only(np.where(self.widths > 0, self.widths, 1.0))
 
-    @cached_property
+    @lazy
     def is_free(self) -> NDArray[np.bool_]:
         """Mask of the bundles that can move, shape (bundles,)."""
         return self.widths > 0
 
-    @cached_property
+    @lazy
     def free(self) -> NDArray[np.intp]:
         """Indices of the bundles that can move, shape (dimension,)."""
         return np.flatnonzero(self.is_free)
@@ -102,7 +102,7 @@ class ActivationBox:
         gamma += self.low
         return np.minimum(gamma, self.high, out=gamma) if self._overshoots else gamma
 
-    @cached_property
+    @lazy
     def _overshoots(self) -> bool:
         """True if rounding carries some low + width past its bound, where 1 would then lie."""
         return bool((self.low + self.widths > self.high).any())

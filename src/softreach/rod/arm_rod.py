@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from threading import RLock
 from typing import Any, Self
 
@@ -15,6 +14,7 @@ from softreach.arm.tables import Tables, check_extension, strain_stations, table
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import Array, Frame, TipMap, check_tol
 from softreach.support import parallel
+from softreach.support.lazy import lazy
 
 __all__ = ["ArmRod"]
 
@@ -42,12 +42,12 @@ class ArmRod(TipMap):
         """That of the base, which is the world's where the arm stands upright at its origin."""
         return "world" if self.arm.base.is_identity else "base"
 
-    @cached_property
+    @lazy
     def box(self) -> ActivationBox:
         """The activations within bounds."""
         return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
 
-    @cached_property
+    @lazy
     def _strain_table(self) -> Tables:
         return tables(self.arm, strain_stations(self.arm))
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +28,7 @@ from softreach.rod.tip_map import (
     sampled_range,
 )
 from softreach.rod.view import DerivedMap, PlacedRod
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     from softreach.rod.loaded.pulled import LoadedLengths
@@ -57,17 +57,17 @@ class DrivenRod(DerivedMap):
         """Steps that the integrator makes along the arm."""
         return self.base.steps
 
-    @cached_property
+    @lazy
     def box(self) -> ActivationBox:
         """Bounds of x."""
         return ActivationBox.between(self.outer.input_bounds, self.outer.input_names)
 
-    @cached_property
+    @lazy
     def driving(self) -> Driving:
         """The map γ(x) of the arm without loads."""
         return Driving(self.outer)
 
-    @cached_property
+    @lazy
     def lengths(self) -> LoadedLengths | None:
         """Tensions under loads; None without loads or tendons driven by length."""
         if self.outer.loads is None or not self.driving.has_length_tendons:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -27,6 +27,7 @@ from softreach.rod.tip_map import (
     position_slopes,
 )
 from softreach.support import parallel
+from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ _HEADINGS = 720
 class FreeRod(ArmRod):
     """r' = ζ d3, dᵢ' = η Uγ × dᵢ with ζ = 1 + z·γ, in Magnus steps of order 6: (18)."""
 
-    @cached_property
+    @lazy
     def rule(self) -> StepRule:
         """Rule by which the arm is cut into steps."""
         return StepRule(self.arm, self.box)
@@ -47,17 +48,17 @@ class FreeRod(ArmRod):
         """The number of steps that `tol` needs, those that end at breakpoints included."""
         return len(self.rule.edges(self._fineness)) - 1
 
-    @cached_property
+    @lazy
     def _fineness(self) -> int:
         """Uniform steps in S, of which none may be longer."""
         return self.rule.steps_for(self.tol)
 
-    @cached_property
+    @lazy
     def _shape_steps(self) -> int:
         """Steps with which `tol` holds all along the arm, and directors lose no digits."""
         return max(self._fineness, self.rule.steps_for_shapes(self.tol))
 
-    @cached_property
+    @lazy
     def _table(self) -> Array:
         return self.rule.packed_nodes(self._fineness)
 
@@ -106,7 +107,7 @@ class FreeRod(ArmRod):
         """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
         return self._linearization.errors(centers, half_widths)
 
-    @cached_property
+    @lazy
     def _linearization(self) -> Linearization:
         return Linearization(self.arm, self.box)
 
@@ -152,7 +153,7 @@ class FreeRod(ArmRod):
             return self._tip_table
         return self.rule.packed_stations(z, self._shape_steps)
 
-    @cached_property
+    @lazy
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
         steps = max(self._fineness, self.rule.fewest_for_frames)
         return self.rule.packed_stations(np.array([self.length]), steps)

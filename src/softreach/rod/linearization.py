@@ -17,7 +17,6 @@ integrals are then those of the box times powers of the largest parts, and are c
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, tables
 from softreach.kernels.rod.relative_strains import relative_strains
 from softreach.rod.activation_box import ActivationBox
+from softreach.support.lazy import lazy
 
 __all__ = ["Linearization"]
 
@@ -106,12 +106,12 @@ class Linearization:
         grown = 1.0 if self.has_forces else longest
         return square * np.asarray(terms.sum(longest, grown, np.minimum(bending, 1.0)))
 
-    @cached_property
+    @lazy
     def _bending_inverse(self) -> Array:
         """1/bending at every station [m], 0 where nothing bends."""
         return np.divide(1.0, self.bending, where=self.bending > 0, out=0 * self.bending)
 
-    @cached_property
+    @lazy
     def _relative(self) -> tuple[Array, Array]:
         """Extension and curvature of each bundle as parts of the largest ones."""
         stretch = self.extension / self.longest[:, None]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
 from softreach.support import parallel
 from softreach.support.arrays import read_only
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 Differences = Callable[[Array], Array]
@@ -70,7 +70,7 @@ class StepRule:
         """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones."""
         return edges_between(self.arm.profile, self._breaks, steps)
 
-    @cached_property
+    @lazy
     def _breaks(self) -> Array:
         """S at the base, at every breakpoint and at the tip."""
         profile = self.arm.profile
@@ -176,7 +176,7 @@ class StepRule:
         """Steps short enough for directors to stay orthonormal to rounding."""
         return self._fewest_steps(_FRAME_TURN)
 
-    @cached_property
+    @lazy
     def _largest_turn(self) -> float:
         """Largest η |u| R2 over the pilot samples and the arm, times S(L) [rad]."""
         profile, gamma = self.arm.profile, self.pilot
@@ -186,7 +186,7 @@ class StepRule:
         rate = (1.0 + gamma @ table.growth.T) * bend * profile.radius(z)
         return float(rate.max() * profile.slender_length)
 
-    @cached_property
+    @lazy
     def pilot(self) -> Array:
         """Activations on which steps are judged, shape (n, bundles)."""
         return pilot_activations(self.arm, self.box)

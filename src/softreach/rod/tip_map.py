@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from softreach.support import parallel
 from softreach.support.arguments import as_number
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, Range, counted
+from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 Status = NDArray[np.int8]
@@ -68,7 +69,7 @@ class TipMap(ABC):
     tol: float
     """Largest tip error, in L."""
 
-    @cached_property
+    @lazy
     @abstractmethod
     def box(self) -> ActivationBox:
         """The activations within bounds."""
@@ -140,7 +141,7 @@ class TipMap(ABC):
         """Steps that an integrator makes along the arm; 0 for a map that has none of its own."""
         return 0
 
-    @cached_property
+    @lazy
     def measures(self) -> Array:
         """Size of one unit of each activation in the unit of its bundle, shape (bundles,)."""
         return np.ones(self.box.bundles)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +29,7 @@ from softreach.rod.tip_map import (
     drop,
 )
 from softreach.support.arguments import as_instance
+from softreach.support.lazy import lazy
 
 __all__ = [
     "DerivedMap",
@@ -115,7 +115,7 @@ class DerivedMap(TipMap):
         """True if a tip can have another status than stable."""
         return self.base.supports_unstable
 
-    @cached_property
+    @lazy
     def box(self) -> ActivationBox:
         """The activations within bounds."""
         return self.base.box
@@ -199,7 +199,7 @@ class PlacedRod(DerivedMap):
                 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                     v[:, i] += position[j] * w[:, k] - position[k] * w[:, j]
 
-    @cached_property
+    @lazy
     def _pose(self) -> tuple[Array, Array]:
         """Rotation and position as the kernels take them."""
         return np.array(self.pose.rotation), np.array(self.pose.position)
@@ -233,7 +233,7 @@ class View(DerivedMap):
     only_stable: bool = False
     """True if unstable equilibria count as none."""
 
-    @cached_property
+    @lazy
     def box(self) -> ActivationBox:
         """Bounds of x."""
         base = self.base.box
@@ -242,16 +242,16 @@ class View(DerivedMap):
         ends = np.stack([base.low, base.high], axis=1)[self._columns] / self.measures[:, None]
         return ActivationBox.between(ends, [base.names[j] for j in self.free])
 
-    @cached_property
+    @lazy
     def measures(self) -> Array:
         """Size of one unit of each x in the unit of its activation, shape (bundles,)."""
         return np.array(self.scale, float)[self._columns]
 
-    @cached_property
+    @lazy
     def _columns(self) -> NDArray[np.intp]:
         return np.array(self.free, np.intp)
 
-    @cached_property
+    @lazy
     def _is_plain(self) -> bool:
         """True if x are the activations of the base."""
         return len(self.free) == len(self.scale) and all(factor == 1.0 for factor in self.scale)

@@ -36,20 +36,21 @@ def as_progress(progress: object) -> Progress:
 
 
 @contextmanager
-def bar(label: str, total: int | None) -> Iterator[Progress]:
+def bar(label: str | Callable[[], str], total: int | None) -> Iterator[Progress]:
     """A progress bar with rate and time left on standard error, if that is a terminal.
 
     In a pipe, a file or a notebook a line every half minute says how far it is.
 
     Args:
-        label: What is going on.
+        label: What is going on, or a function that says it anew each time.
         total: Number of items; None if it is known only in the end, for a bar that moves on.
     """
     if hidden:
         yield silent
         return
+    said = (lambda: label) if isinstance(label, str) else label
     if not sys.stderr.isatty():
-        yield _Lines(label, total)
+        yield _Lines(said, total)
         return
     from rich.console import Console
     from rich.progress import (
@@ -67,14 +68,14 @@ def bar(label: str, total: int | None) -> Iterator[Progress]:
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as display:
-        task = display.add_task(label, total=total)
-        yield lambda done: display.update(task, advance=done)
+        task = display.add_task(said(), total=total)
+        yield lambda done: display.update(task, advance=done, description=said())
 
 
 class _Lines:
     """Writes a line on standard error now and then, when it is told of progress."""
 
-    def __init__(self, label: str, total: int | None) -> None:
+    def __init__(self, label: Callable[[], str], total: int | None) -> None:
         self._label, self._total, self._done = label, total, 0
         self._begun = self._told = time.monotonic()
         self._lock = threading.Lock()
@@ -89,5 +90,5 @@ class _Lines:
             of_total = "" if self._total is None else f": {self._done:,} of {self._total:,}"
             minutes, seconds = divmod(round(now - self._begun), 60)
             with suppress(OSError, ValueError):  # nobody reads it
-                sys.stderr.write(f"{self._label}{of_total}, {minutes}:{seconds:02} so far\n")
+                sys.stderr.write(f"{self._label()}{of_total}, {minutes}:{seconds:02} so far\n")
                 sys.stderr.flush()

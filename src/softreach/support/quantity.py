@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Sequence
 from decimal import Decimal
 
 __all__ = [
+    "columns",
     "numbers_in",
     "quantity",
     "read_number",
@@ -134,3 +136,11 @@ def read_quantity(text: str, unit: str) -> float:
     if not math.isfinite(value):
         raise ValueError(text)
     return value
+
+
+def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Cells below each other, a line for each row."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for cells in rows:
+        padded = (f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True))
+        yield "  ".join(padded).rstrip()

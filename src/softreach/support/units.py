@@ -24,6 +24,7 @@ __all__ = [
     "in_lengths",
     "lengths_in",
     "read_length",
+    "readable_unit",
 ]
 
 UNITS = ("m", "cm", "mm", "L")
@@ -35,6 +36,10 @@ TYPED = ", ".join(unit_names("m"))
 _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6)}
 """Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
+
+_POWERS = {"m": 1, "m2": 2, "m3": 3}
+
+_PRESSURES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}
 
 _SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
 
@@ -123,6 +128,24 @@ def as_unit(unit: object, length: float | None = None) -> LengthUnit:
 def handy_unit(length: float) -> str:
     """The unit for an arm of that length [m]: mm below a meter, m from there."""
     return "mm" if length < 1.0 else "m"
+
+
+def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, float]:
+    """The unit that people read a number in, and its size.
+
+    Args:
+        unit: SI unit of the number; "1" for none.
+        value: The number, for a unit of pressure of its size.
+        length: Unit of lengths, areas and volumes.
+    """
+    if unit in _POWERS:
+        power = _POWERS[unit]
+        return length.symbol(power), length.scale(power)
+    if unit == "rad":
+        return "°", math.pi / 180.0
+    if unit == "Pa":
+        return next((pair for pair in _PRESSURES.items() if abs(value) >= pair[1]), ("Pa", 1.0))
+    return ("" if unit == "1" else unit), 1.0
 
 
 def read_length(text: str, length: float | None = None) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import MissingExtra
+from softreach.support.lazy import lazy
 from softreach.workspace.crossings import Crossings, Edges, boundary_edges
 from softreach.workspace.image import Image, Lattice
 from softreach.workspace.search import ENOUGH, nearest_tips
@@ -121,7 +121,7 @@ class ReachedCells:
         """1 at centers that are reached and 0 elsewhere; no orientation, 0."""
         return self.reached.astype(np.int32), np.zeros(self.reached.shape, np.int32)
 
-    @cached_property
+    @lazy
     def resolved(self) -> Mask:
         """Cells inside of a surface that can be drawn and printed.
 
@@ -189,7 +189,7 @@ class ReachedCells:
         index[axis] = np.where(up, index[axis], index[axis] - 1)
         return (index[0], index[1], index[2]), np.where(up, place, 1.0 - place)
 
-    @cached_property
+    @lazy
     def _resolved_edges(self) -> tuple[Edges, Array]:
         """Edges around what is resolved, and where each is cut, in cells from the center inside.
 
@@ -214,7 +214,7 @@ class ReachedCells:
         _, rows, columns = self.reached.shape
         return rows * columns, columns, 1
 
-    @cached_property
+    @lazy
     def _tree(self) -> KDTree:
         from scipy.spatial import KDTree
 

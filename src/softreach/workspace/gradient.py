@@ -1,4 +1,4 @@
-"""Derivatives of the reachable volume by parameters of the design: theory (83) and (84)."""
+"""Derivatives of the reachable volume by parameters of the design: theory (83), (84) and (98)."""
 
 from __future__ import annotations
 
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 _LINES = 2  # times as many lines of sight along each direction as for the volume itself
 _TOL = 3e-10  # in L, of what the flux alone tells
 _HULL_CELLS = 28  # along each edge of the box, of which corners of a hull are at least
+_MISSING = 0.4  # of the share of the volume that may be missing: of the boundary
 _AROUND = np.indices((3, 3, 3)).reshape(3, -1).T - 1
 _RASTER_STEP = 2e-2  # of a parameter, where neighbors are rasterized, which is rough
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
@@ -60,14 +61,15 @@ def volume_gradient(
     accuracy: float = 3e-3,
     progress: Progress | None = None,
 ) -> VolumeGradient:
-    """Derivatives of the reachable volume by design parameters, for three free bundles.
+    """Derivatives of the reachable volume by design parameters, for three free bundles or more.
 
     The images of the six faces of the activation box move with the design: what they sweep is the
     change of the signed volume, theory (83), and is exact to seven digits or so. That is all where
-    the map is one to one. Where the image folds or overlaps, the derivative of the rest that is
-    rasterized is added, from differences between neighboring designs; it is by far the larger part
-    of the error stated. Where cells are left out of the box, for lack of a stable equilibrium,
-    everything is from such differences.
+    the map is one to one. Where the image of three bundles folds or overlaps, what folds and hidden
+    faces sweep is added, and for more bundles everything is what the boundary sweeps, theory (98):
+    how lines of sight meet it is most of the error stated. Where cells are left out of the box, for
+    lack of a stable equilibrium, nobody knows how the boundary moves: derivatives are differences
+    between neighboring designs, which takes much longer and is rougher.
 
     The convex hull changes with its corners, theory (84). Its volume, as that of the reachable set,
     has kinks where the touched places jump; there the derivative is that of one side.
@@ -79,11 +81,11 @@ def volume_gradient(
         arm: The design.
         parameters: Names as in atlases: `taper`, `revolution`, `rings[0].inner_ratio`,
             `left.offset`, and the bounds of activations, `lower`, `upper` or `left.lower[1]`.
-        accuracy: As for `reachable_set`: of the convex hull, and of what is rasterized.
-        progress: Called with 1 for each parameter done.
+        accuracy: As for `reachable_set`: of the convex hull, and of what lines of sight tell.
+        progress: Called with the number of parameters done since its last call.
 
     Raises:
-        InvalidInput: Other than three free bundles, no parameters, one that the design lacks or
+        InvalidInput: Fewer than three free bundles, no parameters, one that the design lacks or
             that counts something, or one whose change holds or frees a bundle.
         InvalidDesign: The design has no neighbors with other values of a parameter.
     """
@@ -190,38 +192,28 @@ def _swept(
 ) -> tuple[_Swept, _Swept]:
     """Derivatives of volume and convex volume by what boundary and corners of the hull sweep."""
     rod = solid.tip_map
-    flux = _flux(solid, accuracy)
     if solid.route == "flux" or rod.supports_unstable:
         rod = refined(rod, flux_tol(rod))
     tips = TipDerivatives(rod, parameters, _TOL)
-    volume = _volume(solid, flux, tips)
-    return volume, _limit(*(_sum(each, tips) for each in hull_corners(solid)))
+    volume = _searched(solid, tips) if solid.route == "search" else _flowing(solid, tips, accuracy)
+    return volume, _dragged(solid, tips)
 
 
-def _flux(solid: ReachableSolid, accuracy: float) -> Flux | None:
-    """What flows through the faces of three bundles' box, as exactly as the route asks for."""
-    if solid.route == "search":
-        return None
+def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
+    """Derivatives of the volume of more than three bundles."""
+    swept = _sum(boundary_samples(solid.image), tips)
+    # What no search meets is at rims of either sign.
+    missing = _MISSING * solid.volume_error / solid.volume * swept.size
+    return _Swept(swept.value, swept.error + missing)
+
+
+def _flowing(solid: ReachableSolid, tips: TipDerivatives, accuracy: float) -> _Swept:
+    """Derivatives of the volume of three: of the flux, and of what lines of sight add to it."""
     enough = 0.0 if solid.route == "flux" else FLUX_PART * accuracy
-    return signed_volume(solid.tip_map, enough=enough)
-
-
-def _volume(solid: ReachableSolid, flux: Flux | None, tips: TipDerivatives) -> _Swept:
-    """Derivatives of the volume: what is told by the flux, and what lines of sight add to it."""
-    if flux is None:
-        nodes = boundary_samples(solid.image)
-        slopes = tips.at(nodes.cube)
-        swept = np.abs(np.einsum("ni,nip->np", nodes.area, slopes)).sum(axis=0)
-        # What no search meets may have as much of the boundary as of the volume.
-        missing = solid.volume_error / solid.volume * swept
-        error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())
-        return _Swept(nodes.derivative(slopes), nodes.noise(slopes) + missing + error)
+    flux = signed_volume(solid.tip_map, enough=enough)
     sense = 1 if flux.value >= 0 else -1
-    slopes = tips.at(flux.faces.cube)
-    through = sense * np.einsum("ni,nip->np", flux.area, slopes)
-    value = through.sum(axis=0)
-    error = flux.error / abs(flux.value) * np.abs(through).sum(axis=0)
-    error += tips.error * float(np.linalg.norm(flux.area, axis=1).sum())
+    whole = _sum(flux, tips)
+    value, error = sense * whole.value, whole.error + flux.error / abs(flux.value) * whole.size
     if solid.route == "flux":
         return _Swept(value, error)
     assert isinstance(solid.image, Image)
@@ -232,22 +224,41 @@ def _volume(solid: ReachableSolid, flux: Flux | None, tips: TipDerivatives) -> _
     return _Swept(value + fine.value + removed, error + fine.error + np.abs(removed))
 
 
-def _sum(nodes: BoundarySamples | HullCorners, tips: TipDerivatives) -> _Swept:
-    """What nodes sweep, with the errors of ∂r/∂p and of where lines of sight lie."""
-    slopes = tips.at(nodes.cube)
+def _dragged(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
+    """Derivatives of the convex volume, by what the corners drag along, for infinitely fine grids.
+
+    Errors fall as 1/n² or a little slower, and corners jump from vertex to vertex: the largest part
+    that is removed of the derivative by any parameter, of all that corners sweep, may be wrong of
+    each, and so may the part that hulls of corners lack of the convex volume.
+    """
+    corners = hull_corners(solid)
+    fine, coarse = (_sum(each, tips) for each in corners)
+    removed = (fine.value - coarse.value) / 3.0
+    hull, rough = (each.volume for each in corners)
+    missing = abs(hull + (hull - rough) / 3.0 - solid.convex_volume) / hull
+    share = np.max(np.abs(removed) / np.maximum(fine.size, np.finfo(float).tiny))
+    error = fine.error + np.abs(removed) + (share + missing) * fine.size
+    return _Swept(fine.value + removed, error)
+
+
+class _Sum(NamedTuple):
+    """Sums over nodes, by all parameters, shape (parameters,) each."""
+
+    value: Array
+    size: Array
+    """Of the terms without their signs."""
+    error: Array
+    """By ∂r/∂p, and by where lines of sight lie."""
+
+
+def _sum(nodes: BoundarySamples | HullCorners | Flux, tips: TipDerivatives) -> _Sum:
+    """What nodes with area vectors sweep."""
+    slopes = tips.at(nodes.faces.cube if isinstance(nodes, Flux) else nodes.cube)
+    swept = np.einsum("ni,nip->np", nodes.area, slopes)
     error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())
     if isinstance(nodes, BoundarySamples):
-        return _Swept(nodes.derivative(slopes), error + nodes.noise(slopes))
-    return _Swept(np.einsum("ni,nip->p", nodes.area, slopes), error)
-
-
-def _limit(fine: _Swept, coarse: _Swept) -> _Swept:
-    """For infinitely fine grids, whose error falls as 1/n² or a little slower.
-
-    Corners jump from vertex to vertex: all that is removed is the error.
-    """
-    removed = (fine.value - coarse.value) / 3.0
-    return _Swept(fine.value + removed, fine.error + np.abs(removed))
+        error += nodes.noise(slopes)
+    return _Sum(swept.sum(axis=0), np.abs(swept).sum(axis=0), error)
 
 
 def _by_differences(
@@ -292,6 +303,8 @@ class HullCorners:
     """In the unit cube of the free bundles, shape (n, dimension)."""
     area: Array
     """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
+    volume: float
+    """Of the hull [m³]."""
 
     @classmethod
     def of(cls, tips: Array, cube: Array) -> HullCorners:
@@ -303,7 +316,7 @@ class HullCorners:
             # The volume is a sum of triple products over 6: linear in each corner.
             share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
             np.add.at(area, hull.faces[:, k], share)
-        return cls(cube[_rows_of(hull.vertices, tips)], area)
+        return cls(cube[_rows_of(hull.vertices, tips)], area, hull.volume)
 
 
 def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:

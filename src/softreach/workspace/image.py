@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from softreach.kernels.image import contour, point_cover, raster
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
+from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
 
@@ -93,7 +94,7 @@ class Image:
     triangles: Index
     """Critical triangles, as `kernels.contour.critical_triangles` lists them."""
 
-    @cached_property
+    @lazy
     def spans(self) -> tuple[Spans, Spans, Spans]:
         """Cover of the lines through the cell centers along each axis, to rounding."""
         return self._spans(0), self._spans(1), self._spans(2)
@@ -139,7 +140,7 @@ class Image:
         n = round(len(self.vertices) ** (1 / 3)) - 1
         return np.stack(np.unravel_index(which, (n + 1,) * 3), axis=-1) / n
 
-    @cached_property
+    @lazy
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Cover counts and degrees at the cell centers, exactly; both of the lattice's shape.
 
@@ -173,7 +174,7 @@ class Image:
         )
         return np.maximum(out, 0)
 
-    @cached_property
+    @lazy
     def _bins(self) -> tuple[Index, Index]:
         shape = self.lattice.shape[:2]
         return point_cover.bin_triangles(self.vertices, self.triangles, self.unit, shape)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from softreach.arm.parameters.draft import Draft
 from softreach.arm.tables import check_extension
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.lazy import lazy
 
 __all__ = ["Shifts", "shifts_along"]
 
@@ -32,12 +32,12 @@ class Shifts:
     arms: tuple[Manipulator, ...]
     """The designs, in the same order; the design itself at 0."""
 
-    @cached_property
+    @lazy
     def weights(self) -> Array:
         """The derivative is the sum of these times the values, to the highest order."""
         return _weights(self.offsets) / self.step
 
-    @cached_property
+    @lazy
     def rough_weights(self) -> Array:
         """The same without the two offsets that are farthest, two orders lower."""
         kept = np.sort(np.argsort(np.abs(self.offsets), kind="stable")[:-2])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -15,6 +14,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra
+from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
 from softreach.workspace.boundary import (
@@ -80,7 +80,7 @@ class ReachableSolid(ReachableSet):
     coarse_image: Image | None = field(default=None, repr=False)
     """The image of half as fine a grid, for the route "raster"."""
 
-    @cached_property
+    @lazy
     def image(self) -> Image | ReachedCells:
         """The mapped activation grid, rasterized; of more than three bundles what was found.
 
@@ -88,7 +88,7 @@ class ReachableSolid(ReachableSet):
         """
         return self.rasterize()
 
-    @cached_property
+    @lazy
     def grid(self) -> xr.Dataset:
         """The cells: `occupied`, and for three free bundles `count` and `degree`, at centers [m].
 
@@ -204,25 +204,25 @@ class ReachableSolid(ReachableSet):
             multiplicity=volumes
         )
 
-    @cached_property
+    @lazy
     def _field(self) -> Array:
         return signed_field(self.image)
 
-    @cached_property
+    @lazy
     def _boundary(self) -> Surface:
         return boundary_surface(self.image, self._field, self.volume)
 
-    @cached_property
+    @lazy
     def _sheets(self) -> Surface:
         if self.route == "raster" and isinstance(self.image, Image):
             return outer_sheets(self.tip_map, self.image)
         return self.surface()
 
-    @cached_property
+    @lazy
     def _face_image(self) -> Surface | None:
         return face_image(self.tip_map)
 
-    @cached_property
+    @lazy
     def _critical(self) -> Surface:
         assert isinstance(self.image, Image)
         return critical_surface(self.image)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
@@ -14,6 +13,7 @@ from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.box.simplices import chains, corner_steps
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Mask, as_points
+from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
 from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
@@ -143,7 +143,7 @@ class ReachableCurve(ReachableSet):
         """Distance of points to the chords of `path` [m], never negative."""
         return self._chords.distance(as_points("points", points))
 
-    @cached_property
+    @lazy
     def _chords(self) -> Surface:
         """The chords as triangles that repeat a corner."""
         start = np.flatnonzero(~self.left_out)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ from softreach.rod.response import (
 )
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 
 __all__ = ["LoadedLengths"]
 
@@ -61,7 +61,7 @@ class LoadedLengths:
     rod: ArmRod
     """The map of the inner arm under loads, accurate enough for s."""
 
-    @cached_property
+    @lazy
     def shortening(self) -> Callable[[Array], Array]:
         """s [m] as a function of activations with tensions; NaN without an equilibrium."""
         turns = [abs(getattr(each, "revolution", 0.0)) for each in self.law.arm.actuators]
@@ -187,7 +187,7 @@ class LoadedLengths:
             slopes[..., k] = (s[1] - s[0]) / (2.0 * widths[k])
         return slopes
 
-    @cached_property
+    @lazy
     def _measures(self) -> tuple[NodeTables, Array] | None:
         """Tables for the linear response, and N and M of the tendons at their nodes."""
         arm, nowhere = self.rod.arm, np.empty(0)

@@ -6,7 +6,6 @@ Every force has tables of its own, but only a column of them is new.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import TipForceTables
 from softreach.rod.tip_map import TipStatus, position_slopes
+from softreach.support.lazy import lazy
 
 __all__ = ["PushingTip", "TipResponse"]
 
@@ -63,7 +63,7 @@ class PushingTip:
         """The activations within bounds."""
         return self.rod.box
 
-    @cached_property
+    @lazy
     def _tables(self) -> TipForceTables:
         return TipForceTables(self.rod.arm, self.rod.loads, self.rod.body, -self.direction)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -44,6 +44,7 @@ from softreach.rod.tip_map import (
     sampled_range,
 )
 from softreach.support import parallel
+from softreach.support.lazy import lazy
 
 __all__ = ["LoadedRod"]
 
@@ -65,7 +66,7 @@ class LoadedRod(ArmRod):
         """True if a tip can have another status than stable."""
         return True
 
-    @cached_property
+    @lazy
     def loads(self) -> Loads:
         """Loads on the arm beside its actuators, in the frame of the base."""
         loads = self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
@@ -76,7 +77,7 @@ class LoadedRod(ArmRod):
         """Compliance and weight of the arm."""
         return ArmBody(self.arm)
 
-    @cached_property
+    @lazy
     def tables(self) -> LoadTables:
         """Tables for the kernels.
 
@@ -96,12 +97,12 @@ class LoadedRod(ArmRod):
         """
         return checked(self._tip_steps, self.tol)
 
-    @cached_property
+    @lazy
     def _tip_steps(self) -> int | None:
         """Steps with which `tol` holds for tips, if any are enough, theory (72)."""
         return self._fewest(self.tables.phase.fewest_steps, tip_differences)
 
-    @cached_property
+    @lazy
     def _shape_steps(self) -> int | None:
         """Steps with which `tol` holds all along the arm, if any are enough."""
         return self._fewest(self.steps, shape_differences)
@@ -114,12 +115,12 @@ class LoadedRod(ArmRod):
     def _solver_of(self, steps: int) -> Solver:
         return Solver(self.tables, steps, self.tol)
 
-    @cached_property
+    @lazy
     def solver(self) -> Solver:
         """Solver with the steps that `tol` needs for tips."""
         return self._solver_of(self.steps).with_starts(self.box)
 
-    @cached_property
+    @lazy
     def _shape_solver(self) -> Solver:
         """Solver with the steps that `tol` needs all along the arm."""
         return self._solver_of(checked(self._shape_steps, self.tol))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from softreach.rod.loaded.shooting import (
 from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
 from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support import parallel
+from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 
@@ -78,16 +79,16 @@ class Solver:
         grid = StartGrid.over(box, sizes, lambda gamma: self.find(gamma).frame)
         return Solver(self.tables, self.steps, self.tol, grid)
 
-    @cached_property
+    @lazy
     def _fine(self) -> StepTables:
         return self.tables.uniform(self.steps)
 
-    @cached_property
+    @lazy
     def _coarse(self) -> StepTables:
         fewest = self.tables.phase.fewest_steps
         return self.tables.uniform(max(fewest, (self.steps + 1) // 2))
 
-    @cached_property
+    @lazy
     def _along_one(self) -> tuple[OneDirection, OneDirection]:
         """Coarse and fine tables for the kernel of loads along one direction."""
         return self._coarse.for_one_direction, self._fine.for_one_direction

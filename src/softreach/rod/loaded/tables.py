@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -18,6 +17,7 @@ from softreach.kernels.rod import magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.loaded.phase import LoadPhase, load_phase, phase_stations
 from softreach.rod.steps import edges_between
+from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class LoadTables:
     loads: Loads
     body: Body
 
-    @cached_property
+    @lazy
     def axes(self) -> Array:
         """Orthonormal directions of the world in the base frame, as rows, the first of gravity.
 
@@ -101,7 +101,7 @@ class LoadTables:
         second = second / np.linalg.norm(second)
         return np.array([first, second, np.cross(first, second)], float)
 
-    @cached_property
+    @lazy
     def one_direction(self) -> bool:
         """True if all forces are dead and along the first axis, so that two unknowns are enough."""
         loads = self.loads
@@ -113,7 +113,7 @@ class LoadTables:
         moments += [load.moment for load in loads.point_loads]
         return bool((np.abs(across) <= 1e-14 * size).all()) and not np.any(moments)
 
-    @cached_property
+    @lazy
     def at_tip(self) -> Array:
         """Lever of the payload times its weight along the first axis, then the moment, (6,)."""
         lever = np.array(self.loads.payload_arm) * float(self._weight @ self.axes[0])
@@ -128,7 +128,7 @@ class LoadTables:
     def _at_tip(self) -> Array:
         return self._weight + np.array(self.loads.tip_force)
 
-    @cached_property
+    @lazy
     def phase(self) -> LoadPhase:
         """Phase that the loads give the tangents."""
         z = phase_stations(self.arm)
@@ -261,11 +261,11 @@ class TipForceTables(LoadTables):
             self.arm, self.loads, self.body, self.direction, force, origin=kept, steps_made=made
         )
 
-    @cached_property
+    @lazy
     def _given(self) -> LoadTables:
         return LoadTables(self.arm, self.loads, self.body)
 
-    @cached_property
+    @lazy
     def axes(self) -> Array:
         """Those of the loads; where no force acts otherwise, the first is along this one."""
         if self.origin is not None:
@@ -277,7 +277,7 @@ class TipForceTables(LoadTables):
         alone = loads.replace(tip_force=tuple(self.direction))
         return LoadTables(self.arm, alone, self.body).axes
 
-    @cached_property
+    @lazy
     def one_direction(self) -> bool:
         """True if all forces, this one included, are dead and along the first axis."""
         if self.origin is not None:

@@ -98,7 +98,7 @@ def search(
         tolerances: Parameter -> standard deviation of arms as they are made [SI unit]; the result
             then says how the goals of arms made after the best design spread.
         robust: Whether an objective is what 5 % of these arms are worse than instead of that of the
-            design itself, to first order: f - 1.645 ‖σ ∇f‖, and f + ... to minimize. Requirements
+            design itself, to first order: f - 1.645 ‖σ ∇f‖, or f + ... to minimize. Requirements
             are those of the design itself.
         seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
             number of threads.
@@ -131,6 +131,7 @@ def search(
         accuracy=accuracy,
         coarse=min(_COARSER * accuracy, max(accuracy, _COARSEST)),
     )
+    seed = as_integer("seed", seed, 0, 2**31)
     run = _Run(
         problem,
         as_integer("designs", designs, 1, 1_000_000),
@@ -142,12 +143,12 @@ def search(
         problem,
         storage=None if storage is None else as_path("storage", storage),
         sampler=as_one_of("sampler", sampler, SAMPLERS),
-        seed=(study_seed := as_integer("seed", seed, 0, 2**31)),
+        seed=seed,
         first=run.first,
     )
     result = run.result(study)
     if sigmas and result.best.is_feasible:
-        spreads = spreads_of(targets, result.arm, needs, accuracy, sigmas, study_seed)
+        spreads = spreads_of(targets, result.arm, needs, accuracy, sigmas, seed)
         result = replace(result, spreads=spreads, robust=robust)
     return result
 
@@ -179,9 +180,12 @@ class _Run:
 
     def result(self, study: Study) -> Search:
         """Search until the designs are spent, then judge the best again."""
-        known = study.candidates()
-        self._spent = sum(each.designs for each in known)
-        self._sample(study, self.first - len(known))
+        self._spent = sum(each.designs for each in study.candidates())
+        if self._spent:
+            self._progress(self._spent)
+        # Other processes may be at work on the same storage.
+        while (left := self.first - len(study.candidates())) > 0:
+            self._sample(study, min(left, _BATCH))
         study.focus()
         while not self._is_over(study):
             self._polish(study)
@@ -189,18 +193,24 @@ class _Run:
                 part = max(_BATCH, int(_ROUND_SHARE * self._designs))
                 self._sample(study, min(part, self._designs - self._spent))
         every = study.candidates()
+        finalists = self._at_full_accuracy(every)
         return Search(
             problem=self.problem,
-            front=tuple(self._at_full_accuracy(every)),
+            front=tuple(self.problem.front(finalists)),
+            finalists=tuple(finalists),
             candidates=tuple(every),
             designs=self._spent,
             seconds=time.perf_counter() - self._begun,
+            seed=study.seed,
+            sampler=study.kind,
         )
 
     def _is_over(self, study: Study) -> bool:
+        known = study.candidates()
+        self._spent = max(self._spent, sum(each.designs for each in known))
         if self._spent >= self._designs:
             return True
-        return not self.problem.goals and any(c.is_feasible for c in study.candidates())
+        return not self.problem.goals and any(each.is_feasible for each in known)
 
     def _sample(self, study: Study, count: int) -> None:
         """Designs of the sampler."""
@@ -276,9 +286,9 @@ class _Run:
         best = problem.front(candidates)
         if not several:
             judged = [each for each in candidates if np.isfinite(each.excess)]
-            best = sorted(judged, key=problem.score)[:_LAST]
+            best = sorted(judged, key=problem.score)[:_LAST] or list(candidates[:1])
             if self.polishes and best:
                 end = polished(problem, best[0], accuracy=problem.accuracy)
                 best.append(end.candidate)
                 self._spent += end.designs
-        return problem.front([problem.judge(each.values, fine=True) for each in best])
+        return [problem.judge(each.values, fine=True) for each in best]

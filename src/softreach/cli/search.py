@@ -1,0 +1,238 @@
+"""`softreach search`: the designs that meet requirements and are best."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from softreach.cli.changes import design_from
+from softreach.cli.console import console
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Overwrite, Unit, out_option
+from softreach.cli.values import NUMBER, WHOLE, as_read
+from softreach.support.errors import InvalidInput
+from softreach.support.quantity import shortened
+
+if TYPE_CHECKING:
+    from softreach.optimization import Candidate, Search
+
+_ASKED = Group("In place of what the file says", sort_key=1)
+
+
+def search(
+    needs: Annotated[Path, Parameter(help="Requirements (.toml), with a table [search].")],
+    /,
+    *,
+    design: Annotated[
+        list[str] | None,
+        Parameter(
+            group=_ASKED,
+            help="Design to vary: a file (.toml) or a built-in design. Repeated, one is chosen.",
+        ),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        Parameter(
+            group=_ASKED,
+            help="A free parameter, its range with units or a tie: taper_deg=0:3.2, "
+            "left.revolution=-1rad:1rad, right.revolution=-left.revolution. May be repeated.",
+        ),
+    ] = None,
+    choice: Annotated[
+        list[str] | None,
+        Parameter(
+            group=_ASKED,
+            help="Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.",
+        ),
+    ] = None,
+    maximize: Annotated[
+        str | None,
+        Parameter(
+            group=_ASKED,
+            help="Objectives to make large, comma-separated; softreach list objectives has them.",
+        ),
+    ] = None,
+    minimize: Annotated[
+        str | None, Parameter(group=_ASKED, help="Objectives to make small, comma-separated.")
+    ] = None,
+    designs: Annotated[
+        int | None,
+        WHOLE,
+        Parameter(
+            name=("--designs", "-n"),
+            group=_ASKED,
+            help="Number of designs to look at: 200 if left out everywhere.",
+        ),
+    ] = None,
+    seed: Annotated[int | None, WHOLE, Parameter(group=_ASKED, help="Seed of the search.")] = None,
+    accuracy: Annotated[
+        float | None,
+        NUMBER,
+        Parameter(group=_ASKED, help="Relative error of volumes: 3e-3 if left out everywhere."),
+    ] = None,
+    sampler: Annotated[
+        str | None,
+        Parameter(group=_ASKED, help="auto, cma, tpe, nsga2, nsga3, sobol or random."),
+    ] = None,
+    polish: Annotated[
+        bool | None,
+        Parameter(
+            negative="--no-polish", group=_ASKED, help="Improve designs by their derivatives."
+        ),
+    ] = None,
+    storage: Annotated[
+        Path | None,
+        Parameter(
+            help="File in which every design is kept, a journal or SQLite (.db), by which a search "
+            "goes on and several processes share it: FOLDER/search.journal if left out."
+        ),
+    ] = None,
+    out: Annotated[Path, out_option("Folder for the designs, tables and report.")] = Path("best"),
+    overwrite: Overwrite = False,
+    unit: Unit = None,
+    json: AsJson = False,
+) -> int:
+    """Search the designs that meet requirements and are best.
+
+    Writes them as design files, with tables and a report. The same command goes on
+    after an interruption. The exit code is 0 if the best meets all requirements
+    and 1 if not.
+
+    Example: softreach search needs.toml --free taper_deg=0:3 --maximize exact_volume -o best
+    """
+    from softreach import optimization
+    from softreach.optimization.folder import check_folder
+    from softreach.optimization.search_file import read_search
+    from softreach.requirements.requirements import LONGEST
+    from softreach.support import progress
+    from softreach.support.files.interruption import remarking
+    from softreach.support.files.text import read_text
+
+    options = {"designs": designs, "seed": seed, "accuracy": accuracy, "sampler": sampler}
+    given = {
+        "design": design,
+        "maximize": None if maximize is None else maximize.split(","),
+        "minimize": None if minimize is None else minimize.split(","),
+        "free": _pairs("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2"),
+        "choices": _pairs("choice", choice, "NAME=VALUES, such as bundles=3,4"),
+        "polish": polish,
+        **options,
+    }
+    given = {name: value for name, value in given.items() if value is not None}
+    text = read_text("requirements", needs, LONGEST)
+    asked = read_search(text, needs.parent, design_from, source=str(needs), given=given)
+    base = asked.base
+    first = next(iter(base.values())) if isinstance(base, Mapping) else base
+    lengths = Lengths.of(first, unit)
+    check_folder(out, overwrite=overwrite)
+    if storage is None:
+        out.mkdir(parents=True, exist_ok=True)
+        storage = out / "search.journal"
+    watch = _Watch(asked.options)
+    kept = f"designs are kept in {storage}: the same command goes on from there"
+    with progress.bar(watch.label, watch.total) as step, remarking(lambda: kept):
+        result = optimization.search(
+            base,
+            asked.free,
+            asked.requirements,
+            choices=asked.choices,
+            storage=storage,
+            follow=watch,
+            progress=step,
+            **asked.options,
+        )
+    if json:
+        console.json(_record(result, out))
+    else:
+        from softreach.optimization.report import summary_text
+
+        console.line(summary_text(result, lengths.unit))
+    result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
+    return 0 if result.met else 1
+
+
+class _Watch:
+    """The best so far, beside the progress."""
+
+    def __init__(self, options: Mapping[str, Any]) -> None:
+        self.total = options.get("designs", 200)
+        self._up, self._down = options["maximize"], options["minimize"]
+        self._best: Candidate | None = None
+        self._met = 0
+
+    def __call__(self, candidate: Candidate) -> None:
+        """See a design that was judged."""
+        self._met += candidate.is_feasible
+        if self._best is None or self._place(candidate) < self._place(self._best):
+            self._best = candidate
+
+    def _place(self, candidate: Candidate) -> tuple[float, float]:
+        if not candidate.is_feasible:
+            return candidate.excess or math.inf, 0.0
+        sign = -1.0 if self._up else 1.0
+        return 0.0, sign * candidate.objectives[0].value if candidate.objectives else 0.0
+
+    def label(self) -> str:
+        """The best in a few words; with several objectives, how many designs meet all."""
+        best, names = self._best, [*self._up, *self._down]
+        if best is None or not (best.is_feasible or math.isfinite(best.excess)):
+            return "searching"
+        if not best.is_feasible:
+            return f"searching, best misses {best.excess:.3g}"
+        if len(names) != 1:
+            return f"searching, {self._met} meet all"
+        return f"searching, best {names[0]} {best.objectives[0].value:.5g}"
+
+
+def _pairs(name: str, texts: list[str] | None, allowed: str) -> dict[str, str] | None:
+    """Names and values of NAME=VALUE; the name of an actuator may hold another =."""
+    if texts is None:
+        return None
+    pairs: dict[str, str] = {}
+    for text in texts:
+        key, sign, value = (part.strip() for part in text.rpartition("="))
+        if not sign or not key or not value:
+            raise InvalidInput(name, shortened(text), allowed)
+        if key in pairs:
+            raise InvalidInput(name, shortened(text), f"given once for {key}")
+        pairs[key] = value
+    return pairs
+
+
+def _record(result: Search, out: Path) -> dict[str, Any]:
+    """The result for machines: SI units, angles in degrees."""
+    return {
+        "met": result.met,
+        "designs": result.designs,
+        "judged": result.judged,
+        "seconds": result.seconds,
+        "front": [_design(result, each) for each in result.front],
+        "at_ends": result.at_ends,
+        "findings": [vars(finding) for finding in result.findings],
+        "folder": str(out),
+    }
+
+
+def _design(result: Search, each: Candidate) -> dict[str, Any]:
+    parameters = []
+    for parameter in result.problem.parameters.free:
+        value = each.values[parameter.name]
+        unit = ""
+        if not isinstance(value, str):
+            value, unit = as_read(value, parameter.unit)
+        parameters.append({"parameter": parameter.name, "value": value, "unit": unit})
+    objectives = [
+        {"objective": goal.name, **value._asdict(), "unit": goal.objective.unit}
+        for goal, value in zip(result.goals, each.objectives, strict=bool(each.objectives))
+    ]
+    return {
+        "objectives": objectives,
+        "parameters": parameters,
+        "excess": each.excess,
+        "missed": dict(each.missed),
+        "fault": each.fault,
+    }

@@ -1,0 +1,374 @@
+"""Searches as people write them: a file of requirements with a table `[search]`, units in keys."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from softreach.arm.design_file.keys import key_text
+from softreach.arm.design_file.tables import unknown_key
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import Parameter
+from softreach.arm.parameters.changes import unknown_parameter
+from softreach.arm.parameters.shown import from_written, written_name
+from softreach.optimization.free_parameters import (
+    NAMED_CHOICES,
+    free_parameters,
+    known_parameters,
+)
+from softreach.optimization.objectives import goals, known_objective
+from softreach.optimization.study import SAMPLERS
+from softreach.requirements.requirements import Requirements
+from softreach.support.arguments import as_flag, as_integer, as_number, as_one_of
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, did_you_mean
+from softreach.support.quantity import read_quantity, unit_names
+from softreach.workspace.reach import ACCURACIES
+
+__all__ = ["SearchFile", "read_search"]
+
+_OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
+    "designs": lambda name, value: as_integer(name, value, 1, 1_000_000),
+    "seed": lambda name, value: as_integer(name, value, 0, 2**31),
+    "accuracy": lambda name, value: as_number(name, value, ACCURACIES),
+    "sampler": lambda name, value: as_one_of(name, value, SAMPLERS),
+    "polish": as_flag,
+}
+_SENSES = ("maximize", "minimize")
+_TABLES = ("free", "choices", "tolerances")
+_KEYS = ("design", *_SENSES, *_OPTIONS, *_TABLES)
+_WRONG: Any = object()
+"""In place of a value that has faults."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchFile:
+    """What a file asks to be searched."""
+
+    base: Manipulator | Mapping[str, Manipulator]
+    """The design to vary, or several by name."""
+    requirements: Requirements
+    free: Mapping[str, tuple[float, float] | str]
+    """Parameter -> range [SI unit], or the parameter that it is tied to."""
+    choices: Mapping[str, list[Any]]
+    """Parameter -> values [SI unit]."""
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    """Parameter -> standard deviation with which it is made [SI unit]."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Objectives and numbers of the search: further arguments of `search`."""
+
+
+def read_search(
+    text: str,
+    folder: Path,
+    design_from: Callable[[str], Manipulator],
+    *,
+    source: str = "",
+    given: Mapping[str, Any] | None = None,
+) -> SearchFile:
+    """A search from the text of a file.
+
+    ```toml
+    [[reach]]                       # requirements, as in every file of them
+    places_mm = [[200, 0, 700]]
+    [search]
+    design = "arm.toml"             # or a named design, or a list of several
+    maximize = "exact_volume"
+    designs = 200                   # seed, accuracy, sampler, polish
+    [search.free]
+    taper_deg = [0, 3.2]
+    "left.revolution_deg" = [-360, 360]
+    "right.revolution" = "-left.revolution"
+    [search.choices]
+    bundles = [3, 4]
+    [search.tolerances]
+    taper_deg = 0.1
+    ```
+
+    Args:
+        text: TOML.
+        folder: Folder that the paths in it start from.
+        design_from: Name or path of a design -> the design.
+        source: What errors call the file.
+        given: What was said elsewhere and goes before the table, by the same keys.
+
+    Raises:
+        InvalidDesign: All faults, of the requirements too, in the words of the file.
+    """
+    try:
+        document = tomllib.loads(text)
+    except (ValueError, RecursionError):
+        document = {}  # for which the requirements are refused
+    reader = _Reader(document.get("search", {}), given or {}, folder, design_from)
+    bases = reader.bases()
+    free, choices, tolerances = reader.parameters(bases)
+    lengths = {arm.length for arm in bases.values()}
+    alike = len(lengths) == 1 and "length" not in {*free, *choices}
+    needs, faults = None, ()
+    try:
+        needs = Requirements.from_toml(
+            text, folder=folder, length=lengths.pop() if alike else None, source=source
+        )
+    except InvalidDesign as error:
+        faults = error.faults
+    options = reader.options(needs)
+    if needs is None or reader.faults:
+        of_file = faults or any(fault.path.startswith("search") for fault in reader.faults)
+        raise InvalidDesign([*faults, *reader.faults], source if of_file else "")
+    return SearchFile(
+        base=bases if len(bases) > 1 else next(iter(bases.values())),
+        requirements=needs,
+        free=free,
+        choices=choices,
+        tolerances=tolerances,
+        options=options,
+    )
+
+
+class _Reader:
+    """Reads the table, and what was given beside it, and keeps their faults."""
+
+    def __init__(
+        self,
+        raw: Any,
+        given: Mapping[str, Any],
+        folder: Path,
+        design_from: Callable[[str], Manipulator],
+    ) -> None:
+        self.faults: list[Fault] = []
+        self._folder, self._design_from = folder, design_from
+        self._given = given
+        self._raw: dict[str, Any] = raw if isinstance(raw, dict) else {}
+        if not isinstance(raw, dict):
+            self._refuse("search", raw, "must be a table")
+        for key in self._raw:
+            if key not in _KEYS:
+                allowed = unknown_key(key, {name: name for name in _KEYS})
+                self._refuse(f"search.{key_text(key)}", self._raw[key], allowed)
+        for key in _TABLES:
+            if not isinstance(self._raw.get(key, {}), dict):
+                self._refuse(f"search.{key}", self._raw.pop(key), "must be a table")
+
+    def bases(self) -> dict[str, Manipulator]:
+        """Designs to vary by what they are called; none where none can be read."""
+        of_file = "design" not in self._given
+        path, value = self._value("design")
+        names = [value] if isinstance(value, str) else value
+        if not isinstance(names, list | tuple) or not all(isinstance(x, str) for x in names):
+            self._refuse(path, value, "must be a design file, a named design, or a list of these")
+            return {}
+        if not names or len({*names}) < len(names):
+            self._refuse(path, value, "must be different designs, one or more")
+        bases = {}
+        for name in names:
+            file = self._folder / name
+            try:
+                bases[name] = self._design_from(str(file) if of_file and file.is_file() else name)
+            except InvalidInput as error:
+                self._refuse(path, name, f"must be {error.allowed}")
+        return bases
+
+    def parameters(
+        self, bases: Mapping[str, Manipulator]
+    ) -> tuple[dict[str, Any], dict[str, list[Any]], dict[str, float]]:
+        """Ranges and ties, choices, and tolerances, by parameter."""
+        if not bases:
+            return {}, {}, {}
+        choices: dict[str, list[Any]] = {}
+        for path, key, value in self._entries("choices"):
+            if key in NAMED_CHOICES:
+                self._add(path, choices, key, self._named_choice(bases, path, key, value))
+        names = _Names(known_parameters(bases.values(), choices.get("bundles", ())))
+        for path, key, value in self._entries("choices", names):
+            if key not in NAMED_CHOICES and (name := self._name(names, path, key)):
+                listed = value.split(",") if isinstance(value, str) else value
+                self._add(path, choices, name, self._numbers(names, path, key, listed, None))
+        free: dict[str, Any] = {}
+        for path, key, value in self._entries("free", names):
+            if name := self._name(names, path, key):
+                self._add(path, free, name, self._range(names, path, key, value))
+        self._check(bases, names, free, choices)
+        return free, choices, self._tolerances(names)
+
+    def _tolerances(self, names: _Names) -> dict[str, float]:
+        tolerances: dict[str, float] = {}
+        for path, key, value in self._entries("tolerances", names):
+            if name := self._name(names, path, key):
+                numbers = self._numbers(names, path, key, [value], 1)
+                if numbers is not _WRONG and not numbers[0] > 0.0:
+                    numbers = self._refuse(path, value, "must be > 0")
+                self._add(path, tolerances, name, _WRONG if numbers is _WRONG else numbers[0])
+        return tolerances
+
+    def _check(
+        self,
+        bases: Mapping[str, Manipulator],
+        names: _Names,
+        free: dict[str, Any],
+        choices: dict[str, list[Any]],
+    ) -> None:
+        """Ties, and whether anything is free."""
+        ranges = {name: ends for name, ends in free.items() if not isinstance(ends, str)}
+        if not (ranges or choices or len(bases) > 1):
+            if not self.faults:
+                allowed = "needs one parameter or more with a range, or choices: taper_deg = [0, 3]"
+                self._refuse("search.free", None, allowed)
+            return
+        for path, key, value in self._entries("free", names):
+            if key in names.by_key and isinstance(free.get(names.by_key[key].name), str):
+                tied = {**ranges, names.by_key[key].name: value}
+                self._tried(path, value, partial(free_parameters, dict(bases), tied, choices))
+
+    def options(self, needs: Requirements | None) -> dict[str, Any]:
+        """Objectives and numbers of the search."""
+        options: dict[str, Any] = {word: self._objectives(word) for word in _SENSES}
+        for name, convert in _OPTIONS.items():
+            path, value = self._value(name)
+            if value is not None:
+                options[name] = self._tried(path, value, partial(convert, name, value))
+        if needs is not None and not self.faults:
+            try:
+                goals(options["maximize"], options["minimize"], needs)
+            except InvalidInput as error:
+                word = next((word for word in _SENSES if error.value in options[word]), "maximize")
+                self._refuse(self._value(word)[0], error.value, f"must be {error.allowed}")
+        return options
+
+    def _objectives(self, word: str) -> list[str]:
+        path, value = self._value(word)
+        names = [] if value is None else [value] if isinstance(value, str) else value
+        if not isinstance(names, list | tuple):
+            self._refuse(path, value, "must be an objective, or a list of them")
+            return []
+        for name in names:
+            self._tried(path, name, partial(known_objective, word, name))
+        return list(names)
+
+    def _tried(self, path: str, value: Any, make: Callable[[], Any]) -> Any:
+        """What is made of a value; `_WRONG` with a fault where it is refused."""
+        try:
+            return make()
+        except InvalidInput as error:
+            return self._refuse(path, value, f"must be {error.allowed}")
+
+    def _value(self, key: str) -> tuple[str, Any]:
+        """A value and what errors call it."""
+        if key in self._given:
+            return key, self._given[key]
+        return f"search.{key}", self._raw.get(key)
+
+    def _entries(self, table: str, names: _Names | None = None) -> Iterator[tuple[str, str, Any]]:
+        """Path in errors, key and value of a table; what was given goes before the file."""
+        given, known = self._given.get(table, {}), names.by_key if names else {}
+        said = {known[key].name if key in known else key for key in given}
+        for key, value in _flat(self._raw.get(table, {})):
+            if (known[key].name if key in known else key) not in said:
+                yield f"search.{table}.{key}", key, value
+        for key, value in given.items():
+            yield f"{table} {key}", key, value
+
+    def _name(self, names: _Names, path: str, key: str) -> str:
+        """Plain name of a parameter; empty with a fault if there is none."""
+        if key in names.by_key:
+            return names.by_key[key].name
+        hint = did_you_mean(key, names.by_key, 0.5)
+        allowed = unknown_parameter(key, names.written).allowed
+        text = f"is no parameter; {hint}" if hint else f"is no parameter, which are {allowed}"
+        self._refuse(path, None, text)
+        return ""
+
+    def _named_choice(
+        self, bases: Mapping[str, Manipulator], path: str, key: str, value: Any
+    ) -> Any:
+        values = value.split(",") if isinstance(value, str) else value
+        if key == "bundles" and isinstance(value, str):
+            values = [int(x) if x.strip().isdecimal() else x for x in values]
+        made = self._tried(path, value, partial(free_parameters, dict(bases), {}, {key: values}))
+        return _WRONG if made is _WRONG else list(values)
+
+    def _range(self, names: _Names, path: str, key: str, value: Any) -> Any:
+        """(low, high), or the text of a tie."""
+        if isinstance(value, str) and ":" not in value:
+            return value
+        ends = value.split(":") if isinstance(value, str) else value
+        numbers = self._numbers(names, path, key, ends, 2)
+        if numbers is _WRONG or numbers[0] < numbers[1]:
+            return _WRONG if numbers is _WRONG else tuple(numbers)
+        return self._refuse(path, value, "must be a range with low < high")
+
+    def _numbers(self, names: _Names, path: str, key: str, values: Any, count: int | None) -> Any:
+        """Numbers in SI units; `_WRONG` where some are none or beyond what they may be."""
+        parameter = names.by_key[key]
+        wanted = {None: "a list of different numbers", 1: "a number", 2: "a range [low, high]"}
+        if not isinstance(values, list | tuple) or (count or len(values)) != len(values):
+            return self._refuse(path, values, f"must be {wanted[count]}")
+        numbers = []
+        for value in values:
+            try:
+                numbers.append(names.number(key, value))
+            except ValueError:
+                shown = values if isinstance(values[0], int | float) else value
+                return self._refuse(path, shown, names.allowed(key))
+        allowed = parameter.range._replace(whole=False)
+        if count == 1:
+            return numbers  # of a standard deviation
+        if wrong := [value for value in numbers if not allowed.admits(value)]:
+            shown = allowed.in_degrees() if parameter.unit == "rad" else allowed
+            value = values[numbers.index(wrong[0])]
+            return self._refuse(path, value, f"must be {shown.text}")
+        if count is None and (not numbers or len({*numbers}) < len(numbers)):
+            return self._refuse(path, values, f"must be {wanted[None]}")
+        return numbers
+
+    def _add(self, path: str, table: dict[str, Any], name: str, value: Any) -> None:
+        if name in table:
+            self._refuse(path, None, "is given twice")
+        elif value is not _WRONG:
+            table[name] = value
+
+    def _refuse(self, path: str, value: Any, allowed: str) -> Any:
+        self.faults.append(Fault(path, value, allowed))
+        return _WRONG
+
+
+class _Names:
+    """Parameters by their names, with and without units."""
+
+    def __init__(self, plain: Mapping[str, Parameter]) -> None:
+        self.written = {written_name(name, p.unit): p for name, p in plain.items()}
+        self.by_key = {**plain, **self.written}
+
+    def number(self, key: str, value: Any) -> float:
+        """A value in its SI unit: a number under a key with the unit, or text with its unit.
+
+        Raises:
+            ValueError: Anything else.
+        """
+        unit = self.by_key[key].unit
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError(value)
+        if key in self.written:
+            return from_written(read_quantity(str(value), "1"), unit)
+        if not isinstance(value, str):
+            raise ValueError(value)
+        return read_quantity(value, unit)
+
+    def allowed(self, key: str) -> str:
+        """What values under a key must be."""
+        if key in self.written:
+            return "must be finite numbers" + " without a unit" * (self.by_key[key].unit != "1")
+        unit = self.by_key[key].unit
+        units = ", ".join(unit_names(unit))
+        return f"must have their unit ({units}), or stand under {written_name(key, unit)}"
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys and values; TOML reads the dots of unquoted keys as tables within tables."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value

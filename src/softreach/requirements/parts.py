@@ -1,0 +1,165 @@
+"""Parts of requirements as frozen values: targets to reach, regions to keep to, limits."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from softreach.requirements.regions import Region
+from softreach.support.arguments import (
+    as_flag,
+    as_given,
+    as_instance,
+    as_integer,
+    as_number,
+    as_one_of,
+    as_text,
+)
+from softreach.support.arrays import Array, as_points, read_only
+from softreach.support.errors import InvalidInput, Range
+from softreach.support.files.text import MEGABYTE
+
+__all__ = ["Keep", "Limits", "Target"]
+
+MOST_PLACES = 1_000_000
+"""Places that all targets may have together."""
+LONGEST = 64 * MEGABYTE
+"""Bytes that a file of requirements may have."""
+
+_NOT_NEGATIVE = Range(0.0)
+_LENGTH = Range(0.0, unit="m")
+_SHARE = Range(0.0, 1.0, open_low=True)
+_REGION = "a region: Box, Sphere, HalfSpace or Mesh"
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Places that the tip must reach, or a region of which it must reach a share.
+
+    Raises:
+        InvalidInput: Neither places nor a region, both, or numbers out of range.
+    """
+
+    places: Array | None = None
+    """A place, the places of a path, or a cloud of places [m], shape (n, 3)."""
+    _: dataclasses.KW_ONLY
+    region: Region | None = None
+    """A region to be covered instead."""
+    share: float = 1.0
+    """Share of the region that must be reached [-]."""
+    within: float = 0.0
+    """Distance to which the tip must come to a place [m]; 0 for the error of the tips."""
+    name: str = ""
+    """What it is called in results."""
+
+    def __post_init__(self) -> None:
+        if (self.places is None) == (self.region is None):
+            raise InvalidInput("places", as_given(self.places), "given, or a region, and not both")
+        if self.places is not None:
+            places = as_points("places", self.places)
+            if not 0 < len(places) <= MOST_PLACES:
+                raise InvalidInput("places", f"{len(places):,}", f"from 1 to {MOST_PLACES:,}")
+            object.__setattr__(self, "places", read_only(places.copy()))
+        else:
+            region = as_instance("region", self.region, Region, _REGION)
+            if not np.isfinite(region.volume):
+                raise InvalidInput("region", region, "bounded: a half-space has no end")
+        object.__setattr__(self, "share", as_number("share", self.share, _SHARE))
+        if self.region is None and self.share != 1.0:
+            raise InvalidInput("share", self.share, "left out where there is no region")
+        object.__setattr__(self, "within", as_number("within", self.within, _LENGTH))
+        as_text("name", self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Keep:
+    """A region that the arm must stay in, or must avoid.
+
+    Raises:
+        InvalidInput: No region, or a value that is not one of those listed.
+    """
+
+    region: Region
+    """The region."""
+    inside: bool
+    """True to stay inside, False to avoid it."""
+    _: dataclasses.KW_ONLY
+    of: Literal["tip", "arm"] = "arm"
+    """The tip alone, or the body from base to tip with its radius before activation."""
+    when: Literal["targets", "always"] = "targets"
+    """In the poses that are used at the targets, or in every pose within the bounds, among which
+    the worst is searched for: samples and a polish, no proof."""
+    clearance: float = 0.0
+    """Distance to keep from the boundary [m]."""
+    name: str = ""
+    """What it is called in results."""
+
+    def __post_init__(self) -> None:
+        as_instance("region", self.region, Region, _REGION)
+        as_flag("inside", self.inside)
+        as_one_of("of", self.of, ("tip", "arm"))
+        as_one_of("when", self.when, ("targets", "always"))
+        object.__setattr__(self, "clearance", as_number("clearance", self.clearance, _LENGTH))
+        as_text("name", self.name)
+
+    @property
+    def kind(self) -> str:
+        """Table of a file that it stands in: "stay_inside" or "avoid"."""
+        return "stay_inside" if self.inside else "avoid"
+
+    def missed(self, points: Array) -> Array:
+        """How far points (n, 3) are from where they may be [m], negative where they are well."""
+        distance = self.region.distance(points)
+        return (distance if self.inside else -distance) + self.clearance
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Upper limits of an arm; None for no limit.
+
+    Those of poses (shortening, force, pressure, stroke, bending) are judged in the poses that are
+    used at the targets; where there are no targets, over all of the bounds. The others follow from
+    the design alone.
+
+    Raises:
+        InvalidInput: A number out of range.
+    """
+
+    actuators: int | None = None
+    """Number of inputs that can move."""
+    shortening: float | None = None
+    """Share of its length before activation by which the line of a bundle shortens [-]; without
+    targets at all corners of the bounds."""
+    force: float | None = None
+    """Pull or push of a bundle that is driven by force, and tension of a tendon driven by length
+    [N]."""
+    pressure: float | None = None
+    """Pressure of a chamber, above or below that around it [Pa]."""
+    stroke: float | None = None
+    """Displacement of a tendon that is driven by length [m]."""
+    mass: float | None = None
+    """Mass of the arm [kg]."""
+    load_number: float | None = None
+    """Λ, theory (79), under the largest payload [-]."""
+    bending: float | None = None
+    """κ R2 anywhere along the arm [-]; its inner side folds at 1."""
+
+    def __post_init__(self) -> None:
+        for name, value in self.given.items():
+            if name == "actuators":
+                as_integer(name, value, 0)
+                continue
+            allowed = Range(0.0, 1.0) if name == "shortening" else _NOT_NEGATIVE
+            object.__setattr__(self, name, as_number(name, value, allowed))
+
+    @property
+    def given(self) -> dict[str, float]:
+        """Those that there are, by name."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
+POSE_LIMITS = ("shortening", "force", "pressure", "stroke", "bending")
+"""Limits of poses."""
