@@ -107,7 +107,7 @@ def main() -> None:
 def take_picture(browser: object, running: Studio, name: str) -> None:
     """Open a tab of the right size, bring it into its state, and save what it shows."""
     width, height = PHONE if name.endswith("phone") else LAPTOP
-    tab = Tab(browser, running, width=width, height=height)
+    tab = Tab(browser, running, (width, height))
     SCENES[name](tab)
     tab.settle()
     tab.page.locator(NOTICE).first.click()

@@ -76,6 +76,7 @@ _ABOUT = {
     "at": "Designs of the front, from the first objective to the second",
     "take": "Makes it the design; can be undone. So does a click on a point of the picture in the "
     "scene",
+    "clear": "Ends it, and takes its picture away; the design stays",
 }
 
 
@@ -119,10 +120,12 @@ class SearchPanel:
         )
         self._search = gui.add_button("Search", hint=_ABOUT["search"])
         self._summary = Line(gui)
-        self._picture = PictureFrame(gui, gui.add_folder("designs that were judged"))
+        self._judged = gui.add_folder("designs that were judged", visible=False)
+        self._picture = PictureFrame(gui, self._judged)
         self._at = gui.add_slider("on the front", 1, 2, 1, 1, hint=_ABOUT["at"], visible=False)
         self._values = Line(gui)
         self._take = gui.add_button("Load the best", hint=_ABOUT["take"], visible=False)
+        self._clear = gui.add_button("Remove the search", hint=_ABOUT["clear"], visible=False)
 
     def _listen(self) -> None:
         session = self._session
@@ -135,6 +138,7 @@ class SearchPanel:
         bind_button(self._search, session, self._ask)
         self._at.on_update(lambda _: attempt(session, self._show_values))
         bind_button(self._take, session, self._loaded)
+        bind_button(self._clear, session, self._forget)
 
     def show(self, session: Session) -> None:
         """Show what is met and missed, and how far the search is."""
@@ -278,16 +282,18 @@ class SearchPanel:
 
     def _show_run(self, run: SearchRun | None) -> None:
         """Show the picture, and what can be loaded."""
-        if run is None or not run.candidates:
+        some = run is not None and bool(run.candidates)
+        self._judged.visible = self._take.visible = self._clear.visible = some
+        if run is None or not some:
             self._summary.say()
             self._values.say()
-            self._at.visible = self._take.visible = False
+            self._at.visible = False
             return
         if run.picture is not None:
             self._picture.show(run.picture.image)
         self._summary.say(*_summary(run))
         count = len(run.front)
-        self._at.visible, self._take.visible = count > 1, True
+        self._at.visible = count > 1
         self._at.max = max(count, 2)
         if self._at.value > count:
             self._at.value = 1
@@ -311,6 +317,11 @@ class SearchPanel:
         if run is None or not run.candidates:
             raise InvalidInput("search", "none", "begun, before a design of it is loaded")
         self._replace(run, self._chosen(run))
+
+    def _forget(self) -> None:
+        self._session.search = None
+        self._session.follow(SearchDesigns, DrawSearch)  # which drops what it is doing
+        self._session.show()
 
     def _replace(self, run: SearchRun, candidate: Candidate) -> None:
         arm = run.arm(candidate)
