@@ -14,7 +14,6 @@ from softreach.optimization import Candidate, Search, search
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.objectives import goals
 from softreach.optimization.problem import Problem
-from softreach.picture.axes_box import round_box
 from softreach.requirements import Check, check
 from softreach.requirements.checks import quick_check
 from softreach.studio.needs import requirements_of
@@ -30,6 +29,7 @@ _ACCURACY = 0.03  # of shares that are covered, and of distances between station
 _PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
 _LOOK = 0.05  # [s]
 _BETWEEN = 0.5  # [s] between two pictures of a search, which take a core for some time
+_FLAT = 0.7  # of the box around arm and board, which is wider than high
 _POSES = ("reach", "cover", "stay_inside", "avoid")
 """Kinds of findings that other poses may change."""
 
@@ -176,11 +176,11 @@ class SearchDesigns(AskedJob):
 
     def _look(self) -> None:
         """See the arm and the board that is going to be beside it."""
-        session = self.session
+        session, aspect = self.session, self.session.camera.aspect
         around = np.vstack([*session.scene.axes.corners, session.job(DrawSearch).board.corners])
-        session.camera.look_from(
-            framing(*round_box(around), VIEWS["oblique"], session.camera.aspect)
-        )
+        middle, half = 0.5 * (around.max(axis=0) + around.min(axis=0)), 0.5 * np.ptp(around, axis=0)
+        half *= _FLAT if aspect > 1.0 else 1.0
+        session.camera.look_from(framing(middle - half, middle + half, VIEWS["oblique"], aspect))
 
 
 class DrawSearch(Job):
