@@ -31,6 +31,7 @@ MODULES = [
         "forces",
         "inverse",
         "inverse.path",
+        "optimization",
         "workspace.payload",
         "plot",
         "requirements",

@@ -101,7 +101,7 @@ class DesignPoint:
     def margin(self, goal: Goal) -> float:
         """Distance of a robust goal from that of the design itself."""
         if goal.name not in self._margins:
-            self._margins[goal.name] = margin(goal.objective, self.case)
+            self._margins[goal.name] = goal.sense * margin(goal, self.case)
         return self._margins[goal.name]
 
     def margin_slope(self, goal: Goal) -> Array:
@@ -113,7 +113,7 @@ class DesignPoint:
             moved = reals.copy()
             moved[k] += step if reals[k] + step <= high[k] else -step
             case = self.problem.case(parameters.moved(self.values, moved), self.accuracy)
-            change = margin(goal.objective, case) - self.margin(goal)
+            change = goal.sense * margin(goal, case) - self.margin(goal)
             slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
         return np.array(slopes)
 
