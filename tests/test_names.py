@@ -31,7 +31,6 @@ MODULES = [
         "forces",
         "inverse",
         "inverse.path",
-        "optimization",
         "workspace.payload",
         "plot",
         "requirements",
