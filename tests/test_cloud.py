@@ -130,7 +130,7 @@ def test_making_and_keeping_a_large_cloud_takes_little_more_memory_than_the_clou
     monkeypatch.setenv("SOFTREACH_NUM_THREADS", "1")
     sr.save_cloud(sr.compute_cloud(trunk, 100), tmp_path / "cloud.zarr")  # what is loaded once
     with _traced() as peak:
-        cloud = sr.compute_cloud(trunk, 5_000_000)
+        cloud = sr.compute_cloud(trunk, 3_000_000)
         assert peak() <= 1.3 * cloud.nbytes
         sr.save_cloud(cloud, tmp_path / "cloud.zarr")
         assert peak() <= 1.3 * cloud.nbytes

@@ -9,6 +9,7 @@ from softreach.arm.base import POINTS
 from softreach.inverse import Status, twin_hints
 
 
+@pytest.mark.large  # the command line is asked for one in the usual run
 def test_a_place_below_is_reached_by_a_hanging_arm_when_asked_just_so():
     arm = sr.designs.minimal_trunk(length=0.3)
     hanging = arm.replace(base=sr.Base(points="down"))

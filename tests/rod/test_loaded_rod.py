@@ -209,26 +209,26 @@ def test_slopes_and_turns_are_the_differences_of_tips_and_frames(loads):
     found = loaded(loads, 1e-10)
     motions = found.tip_motions(GAMMA)
     np.testing.assert_allclose(motions.tips, found.tips(GAMMA), atol=1e-11)
-    np.testing.assert_allclose(motions.slopes, differences(found.tips, GAMMA, 1e-3), atol=2e-8)
 
-    def directors(gamma):
-        return found.frames(gamma, [1.0]).directors[:, 0]
+    def pose(gamma):
+        """Directors of the tip, and its place."""
+        frames = found.frames(gamma, [1.0])
+        return np.concatenate([frames.directors[:, 0], frames.position], axis=1)
 
-    np.testing.assert_allclose(motions.directions, directors(GAMMA)[:, 2], atol=1e-9)
-    turned = differences(directors, GAMMA, 1e-3)
-    expected = np.cross(motions.rotations[:, None], directors(GAMMA)[..., None], axis=2)
-    np.testing.assert_allclose(turned, expected, atol=1e-7)
+    directors, changes = pose(GAMMA)[:, :3], differences(pose, GAMMA, 1e-3)
+    np.testing.assert_allclose(motions.slopes, changes[:, 3], atol=2e-8)
+    np.testing.assert_allclose(motions.directions, directors[:, 2], atol=1e-9)
+    expected = np.cross(motions.rotations[:, None], directors[..., None], axis=2)
+    np.testing.assert_allclose(changes[:, :3], expected, atol=1e-7)
 
 
 def test_compliance_is_the_difference_of_tips_by_a_force_and_symmetric():
-    force = 1e-2
+    force = np.array([6e-3, -5e-3, 7e-3])
     compliance = loaded(Loads(gravity=SIDE)).compliance(GAMMA)
-    for axis, e in enumerate(force * np.eye(3)):
-        there, back = (
-            loaded(Loads(gravity=SIDE, tip_force=tuple(sign * e))).tips(GAMMA) for sign in (1, -1)
-        )
-        measured = (there - back) / (2 * force)
-        np.testing.assert_allclose(measured, compliance[:, :, axis], atol=1e-6)
+    there, back = (
+        loaded(Loads(gravity=SIDE, tip_force=tuple(sign * force))).tips(GAMMA) for sign in (1, -1)
+    )
+    np.testing.assert_allclose(compliance @ force, (there - back) / 2, atol=1e-8)
     np.testing.assert_allclose(compliance, np.swapaxes(compliance, 1, 2), atol=1e-8)
 
 

@@ -1,8 +1,26 @@
 """From requirements to designs: free parameters, objectives, search, tolerance."""
 
+from softreach.optimization.deviations import Spread
 from softreach.optimization.objectives import OBJECTIVES, Objective, Value
 from softreach.optimization.problem import Candidate
 from softreach.optimization.result import Search
 from softreach.optimization.searching import search
+from softreach.optimization.sensitivity import Multiplier, Sensitivity, VarianceShares, sensitivity
+from softreach.optimization.tolerance import TargetTolerance, Tolerance, tolerance
 
-__all__ = ["OBJECTIVES", "Candidate", "Objective", "Search", "Value", "search"]
+__all__ = [
+    "OBJECTIVES",
+    "Candidate",
+    "Multiplier",
+    "Objective",
+    "Search",
+    "Sensitivity",
+    "Spread",
+    "TargetTolerance",
+    "Tolerance",
+    "Value",
+    "VarianceShares",
+    "search",
+    "sensitivity",
+    "tolerance",
+]

@@ -64,6 +64,15 @@ class FreeParameter:
         """True of a number that can change a little."""
         return not self.choices and not self.whole
 
+    def at(self, place: float) -> float | str | int:
+        """Its value at a place between 0 and 1 of its range or choices."""
+        if self.choices:
+            return self.choices[min(int(place * len(self.choices)), len(self.choices) - 1)]
+        if self.whole:
+            low, high = int(self.low), int(self.high)
+            return min(low + int(place * (high - low + 1)), high)
+        return self.low + place * (self.high - self.low)
+
     @property
     def ends(self) -> tuple[float | str, float | str]:
         """Least and largest value; first and last choice."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -29,7 +29,23 @@ if TYPE_CHECKING:
 
     from softreach.workspace import ReachableSet
 
-__all__ = ["OBJECTIVES", "DesignCase", "Goal", "Objective", "Value", "goals", "known_objective"]
+__all__ = [
+    "OBJECTIVES",
+    "SETS",
+    "DesignCase",
+    "Goal",
+    "Objective",
+    "Value",
+    "goals",
+    "known_objective",
+]
+
+SETS = {
+    "exact_volume": "volume",
+    "exact_convex_volume": "convex_volume",
+    "exact_unreachability": "unreachability",
+}
+"""Goals and measures of the reachable set, and what they are called there."""
 
 _COARSE, _FINE = 1 << 12, 1 << 15
 """Samples of a cloud, for what is asked of one, of coarse and of fine cases."""
@@ -120,6 +136,10 @@ class Objective:
     """Part of the requirements that it is about: "targets" or "regions"; "" for none."""
     smooth: bool = False
     """A polish knows its derivatives."""
+    sigmas: Mapping[str, float] = field(default_factory=dict)
+    """Deviations of the arm under which it is a quantile; none for the design itself."""
+    nominal: Objective | None = None
+    """That of the design itself, for a quantile."""
 
 
 class Goal(NamedTuple):
@@ -301,7 +321,7 @@ _ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value], str, bool], ...
     ("payload", "kg", "payload under which 80 % of the volume is left", _payload, "", False),
     ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance, "", False),
     ("mass", "kg", "mass of the arm", _mass, "", True),
-    ("actuators", "1", "number of inputs", _actuators, "", False),
+    ("actuators", "1", "number of inputs", _actuators, "", True),
 )
 
 OBJECTIVES = {

@@ -12,10 +12,11 @@ from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
 from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
 from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
-__all__ = ["Polished", "can_polish", "polished"]
+__all__ = ["Polished", "can_polish", "point_of", "polished"]
 
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
@@ -74,6 +75,17 @@ def polished(
     return Polished(better, program.designs)
 
 
+@no_warnings()
+def point_of(problem: Problem, candidate: Candidate, accuracy: float, goal: int = 0) -> Point:
+    """The program of one goal at a design, with the poses that it has at the targets.
+
+    Raises:
+        InvalidDesign: It is no design.
+    """
+    program = _Program(problem, candidate, accuracy, goal, ())
+    return program.point(program.begin())
+
+
 def _solved(program: _Program, first: Array, iterations: int) -> Array:
     from scipy.optimize import minimize
 
@@ -112,6 +124,7 @@ class _Program:
         self._goal, self._floors = goal, floors
         self._shape, self._scale = (0, 0), 1.0
         self._points: dict[bytes, Point] = {}
+        self._like: Sequence[TipMap] = ()
 
     def begin(self) -> Array:
         """Unknowns of the start.
@@ -130,6 +143,8 @@ class _Program:
             poses = np.clip(box.to_cube(box.clip(gamma))[:, box.free], 0.0, 1.0)
         self._shape = poses.shape
         first = np.concatenate([np.clip(reals, 0.0, 1.0), poses.ravel()])
+        if len(poses):
+            self._like = self.point(first).design.rods
         self._scale = (abs(self.point(first).cost[0]) or 1.0) / _GENTLE
         return first
 
@@ -156,7 +171,8 @@ class _Program:
             )
             if design is None:
                 self.designs += 1
-                design = DesignPoint(self._problem, self.values_of(unknowns), self._accuracy)
+                values = self.values_of(unknowns)
+                design = DesignPoint(self._problem, values, self._accuracy, self._like)
             if len(self._points) > 3:
                 self._points.pop(next(iter(self._points)))
             self._points[key] = Point(design, reals, poses, self._goal, self._floors)

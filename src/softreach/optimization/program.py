@@ -13,11 +13,12 @@ from softreach.arm.parameters import find_parameters
 from softreach.arm.parameters.changes import parameters_by_every_name
 from softreach.arm.summary import load_number, mass
 from softreach.optimization.free_parameters import Values
-from softreach.optimization.objectives import DesignCase, Goal
+from softreach.optimization.objectives import SETS, DesignCase, Goal
 from softreach.optimization.problem import Problem
+from softreach.optimization.robust import margin
 from softreach.requirements.checks import effort_scales
 from softreach.requirements.poses import PoseRules
-from softreach.rod.rods import refined, tip_map
+from softreach.rod.rods import in_steps, refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
@@ -27,22 +28,18 @@ from softreach.workspace.tip_derivatives import TipDerivatives
 
 __all__ = ["DesignPoint", "Point"]
 
-SETS = {
-    "exact_volume": "volume",
-    "exact_convex_volume": "convex_volume",
-    "exact_unreachability": "unreachability",
-}
-"""Goals and measures of the reachable set, and what they are called there."""
 EFFORTS = ("mean_effort", "worst_effort")
 _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
     "mass": lambda arm: mass(arm) or 0.0,
     "load_number": lambda arm: load_number(arm) or 0.0,
+    "actuators": lambda arm: float(arm.inputs),
 }
-_TOL = 1e-9  # of tips at the targets, in L
+_TOL = 1e-7  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
 _FAR = 0.25  # over L or relative: room beyond which a rule is not differentiated
-_ROOM = 0.99  # of the distance within which a tip must come to a place
+_ROOM = 0.98  # of the distance within which a tip must come to a place
 _SPARE = 1e-4  # over L or relative, by which limits are kept
+_WIDE_STEP = 0.02  # of a range, for what is rough
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
@@ -54,6 +51,8 @@ class DesignPoint:
     problem: Problem
     values: Values
     accuracy: float
+    like: Sequence[TipMap] = ()
+    """Tip maps of a design nearby, in as many steps."""
 
     @lazy
     def case(self) -> DesignCase:
@@ -63,7 +62,11 @@ class DesignPoint:
     @lazy
     def rods(self) -> tuple[TipMap, ...]:
         """Its tip map under each payload."""
-        return tuple(refined(tip_map(arm), _TOL) for arm in _laden(self.problem, self.case.arm))
+        arms = _laden(self.problem, self.case.arm)
+        if not self.like:
+            return tuple(refined(tip_map(arm), _TOL) for arm in arms)
+        pairs = zip(arms, self.like, strict=True)
+        return tuple(in_steps(arm, rod.steps, rod) for arm, rod in pairs)
 
     @lazy
     def derivatives(self) -> tuple[TipDerivatives, ...]:
@@ -94,6 +97,29 @@ class DesignPoint:
         of = _OF_ARM[name]
         slopes = [(of(ahead) - of(behind)) / step for step, ahead, behind in self.neighbors]
         return of(self.case.arm), np.array(slopes)
+
+    def margin(self, goal: Goal) -> float:
+        """Distance of a robust goal from that of the design itself."""
+        if goal.name not in self._margins:
+            self._margins[goal.name] = margin(goal.objective, self.case)
+        return self._margins[goal.name]
+
+    def margin_slope(self, goal: Goal) -> Array:
+        """Its derivatives by the reals: differences to one side."""
+        parameters = self.problem.parameters
+        reals, (low, high) = parameters.reals(self.values), parameters.bounds.T
+        slopes = []
+        for k, step in enumerate(_WIDE_STEP * (high - low)):
+            moved = reals.copy()
+            moved[k] += step if reals[k] + step <= high[k] else -step
+            case = self.problem.case(parameters.moved(self.values, moved), self.accuracy)
+            change = margin(goal.objective, case) - self.margin(goal)
+            slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
+        return np.array(slopes)
+
+    @lazy
+    def _margins(self) -> dict[str, float]:
+        return {}
 
     @lazy
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:
@@ -159,7 +185,8 @@ class Point:
         if not goals or goals[self.goal].name not in SETS:
             return self.cost[0]
         goal = goals[self.goal]
-        return -goal.sense * float(getattr(self.design.case.reached, SETS[goal.name]))
+        cost = -goal.sense * float(getattr(self.design.case.reached, SETS[goal.name]))
+        return cost + self.design.margin(goal) if goal.objective.sigmas else cost
 
     @lazy
     def cost(self) -> tuple[float, Array]:
@@ -190,7 +217,11 @@ class Point:
             value, slope[: len(self.reals)] = self.design.of_set(goal.name)
         else:
             value, slope[: len(self.reals)] = self.design.of_arm(goal.name)
-        return -goal.sense * value, -goal.sense * slope
+        cost, slope = -goal.sense * value, -goal.sense * slope
+        if goal.objective.sigmas:
+            cost += self.design.margin(goal)
+            slope[: len(self.reals)] += self.design.margin_slope(goal)
+        return cost, slope
 
     def _effort(self, name: str) -> tuple[float, Array]:
         """Mean of |γ|, each over its largest bound; of a high power for the largest of them."""
@@ -219,7 +250,8 @@ class Point:
             slopes = lazily(partial(self._tip_slopes, number))
             for k, gap in enumerate(gaps):
                 slope = partial(_row, slopes, k)
-                parts.append(Part(f"place {k + 1}", gap, slope, within[k] / rod.length))
+                near = within[k] / rod.length
+                parts.append(Part(f"place {k + 1}", gap, slope, near, rod.length, "m"))
         return parts
 
     def _tip_slopes(self, number: int) -> Array:
@@ -256,7 +288,9 @@ class Point:
 
         def rules_of(arm: Manipulator, number: int) -> PoseRules:
             laden = _laden(self.design.problem, arm)[number]
-            return PoseRules.of(laden, keeps, needs.limits, np.inf)
+            like = self.design.rods[number]
+            rod = like if arm is self.design.case.arm else in_steps(laden, like.steps, like)
+            return PoseRules.of(laden, keeps, needs.limits, np.inf, rod)
 
         for number, (_, cube) in enumerate(self._by_payload()):
             rules = rules_of(self.design.case.arm, number)
@@ -264,9 +298,11 @@ class Point:
                 return
             value = _room(rules, cube)
             slopes = lazily(partial(self._rule_slopes, rules_of, number, value))
-            names = [*(keep.name for keep in keeps), *rules.limits]
-            for column, name in enumerate(names):
-                yield Part(name, value[:, column], partial(_column, slopes, column))
+            scales = [(keep.name, rules.arm.length, "m") for keep in keeps]
+            scales += [(name, most or 1.0, "") for name, most in rules.limits.items()]
+            for column, (name, scale, unit) in enumerate(scales):
+                slope = partial(_column, slopes, column)
+                yield Part(name, value[:, column], slope, scale=scale, unit=unit)
 
     def _rule_slopes(
         self, rules_of: Callable[[Manipulator, int], PoseRules], number: int, value: Array
@@ -319,7 +355,8 @@ class Point:
             row[0, : len(self.reals)] = -sense * derived()[1] / scale
             return row
 
-        return Part(name, np.array([sense * (limit - value) / scale - _SPARE]), slope)
+        room = np.array([sense * (limit - value) / scale - _SPARE])
+        return Part(name, room, slope, scale=scale)
 
     def _other_goals(self) -> Iterator[Part]:
         """Goals that must not become worse than given."""
@@ -329,7 +366,8 @@ class Point:
                 cost, slope = self._cost_of(goal)
                 scale = abs(floor) or 1.0
                 value = np.array([(floor - cost) / scale])
-                yield Part(goal.name, value, partial(np.multiply, -1.0 / scale, slope[None]))
+                row = partial(np.multiply, -1.0 / scale, slope[None])
+                yield Part(goal.name, value, row, scale=scale)
 
 
 @dataclass(frozen=True)
@@ -344,6 +382,10 @@ class Part:
     """Makes the derivatives by all unknowns, shape (n, unknowns)."""
     within: float = 0.0
     """Distance to a place that is allowed, over L."""
+    scale: float = 1.0
+    """Of what the requirement allows, per unit of the value."""
+    unit: str = ""
+    """Unit of that; "" for that of the limit or measure."""
 
 
 def stacked(parts: Sequence[Part]) -> Array:
@@ -357,10 +399,17 @@ def stacked_slopes(parts: Sequence[Part]) -> Array:
 
 
 def _near_place(part: Part) -> Part:
-    """How much nearer the tip is than it must be, over that distance."""
-    gap, within = part.value, _ROOM * part.within
-    value = np.array([(within**2 - gap @ gap) / within])
-    return Part(part.name, value, lambda: -2.0 / within * (gap @ part.slope())[None])
+    """Room on both sides along each axis in a cube within the distance that is allowed."""
+    half = _ROOM * part.within / np.sqrt(3.0)
+    value = np.concatenate([half - part.value, half + part.value])
+    scale = part.scale * np.sqrt(3.0) / _ROOM
+    return Part(
+        part.name,
+        value,
+        lambda: np.concatenate([-part.slope(), part.slope()]),
+        scale=scale,
+        unit=part.unit,
+    )
 
 
 def _row(slopes: Callable[[], Array], k: int) -> Array:

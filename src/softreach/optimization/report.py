@@ -150,6 +150,10 @@ def missed_text(search: Search) -> Iterator[str]:
 
 def remarks(search: Search) -> Iterator[str]:
     """How designs were judged."""
+    for spread in search.spreads:
+        word = "robust" if search.robust else "as made"
+        nominal = f"nominal {spread.nominal:.6g}"
+        yield f"{word}: {spread.name} {nominal}; mean {spread}"
     problem, judged = search.problem, search.judged
     ways = [f"{judged['bounds']} by bounds alone"] if judged["bounds"] else []
     ways += [f"{judged['coarse']} on coarse sets (to {problem.coarse:g})"] * bool(judged["coarse"])

@@ -222,19 +222,7 @@ def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
     sampler = qmc.Sobol(len(free), rng=np.random.default_rng(seed))
     cube = sampler.random(1 << max(0, math.ceil(math.log2(max(count, 1)))))[:count]
     for place in cube:
-        yield {each.name: _at(each, float(x)) for each, x in zip(free, place, strict=True)}
-
-
-def _at(parameter: FreeParameter, place: float) -> float | str | int:
-    """A value of a parameter from a place between 0 and 1."""
-    if parameter.choices:
-        return parameter.choices[
-            min(int(place * len(parameter.choices)), len(parameter.choices) - 1)
-        ]
-    if parameter.whole:
-        low, high = int(parameter.low), int(parameter.high)
-        return min(low + int(place * (high - low + 1)), high)
-    return parameter.low + place * (parameter.high - parameter.low)
+        yield {each.name: each.at(float(x)) for each, x in zip(free, place, strict=True)}
 
 
 def _storage(optuna: Any, place: str) -> Any:

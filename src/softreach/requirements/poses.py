@@ -54,14 +54,21 @@ class PoseRules:
     limits: dict[str, float]
     tolerance: float
     """Error that is allowed in how far a region is missed [m]."""
+    known_rod: TipMap | None = None
+    """Tip map of the arm, if it is to be another than to the usual tolerance."""
 
     @classmethod
     def of(
-        cls, arm: Manipulator, keeps: Sequence[Keep], limits: Limits, tolerance: float
+        cls,
+        arm: Manipulator,
+        keeps: Sequence[Keep],
+        limits: Limits,
+        tolerance: float,
+        rod: TipMap | None = None,
     ) -> PoseRules:
         """The rules for single poses among regions and limits."""
         poses = {name: x for name, x in limits.given.items() if name in POSE_LIMITS}
-        return cls(arm, tuple(keeps), poses, tolerance)
+        return cls(arm, tuple(keeps), poses, tolerance, rod)
 
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
@@ -69,7 +76,7 @@ class PoseRules:
     @property
     def rod(self) -> TipMap:
         """The tip map of the arm, whose activations are its inputs."""
-        return tip_map(self.arm)
+        return tip_map(self.arm) if self.known_rod is None else self.known_rod
 
     def judged(self, gamma: Array) -> Judged:
         """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""

@@ -1,0 +1,191 @@
+"""Deviations of arms as they are made from their design, and how numbers spread with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.parameters import Parameter, find_parameters
+from softreach.arm.parameters.draft import Draft
+from softreach.arm.tables import check_extension
+from softreach.support.arguments import as_mapping, as_number
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput, Range
+from softreach.support.quantity import quantity
+
+__all__ = [
+    "NORMAL",
+    "QUANTILE",
+    "Deviations",
+    "Spread",
+    "deviations_of",
+    "probabilities",
+]
+
+QUANTILE = 0.05
+"""Share of arms that are worse than the number given for them."""
+NORMAL = 1.6448536269514722
+"""The 95 % quantile of the normal distribution."""
+_AGREEMENT = 3.0  # standard errors
+_SIGMA = Range(0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Deviations:
+    """Independent normal deviations of parameters of an arm."""
+
+    arm: Manipulator
+    parameters: tuple[Parameter, ...]
+    sigmas: Array
+    """Standard deviation of each [its unit], shape (parameters,)."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    def draws(self, count: int, seed: int) -> Array:
+        """Changes of the parameters [their units], shape (count, parameters)."""
+        normal = np.random.default_rng(seed).standard_normal((count, len(self.sigmas)))
+        return normal * self.sigmas
+
+    def made(self, change: Array) -> Manipulator:
+        """The arm with changes of its parameters; parts that share one change alike.
+
+        Raises:
+            InvalidDesign: No such arm can exist.
+        """
+        made = self.arm
+        for parameter, amount in zip(self.parameters, change.tolist(), strict=True):
+            if amount:
+                # One after the other: what follows from a parameter deviates with it.
+                draft = Draft(made)
+                parameter.shift(draft, amount)
+                made = draft.made()
+        check_extension(made)
+        return made
+
+
+def deviations_of(arm: Manipulator, sigmas: Mapping[str, Any]) -> Deviations:
+    """Deviations from what a user gives.
+
+    Args:
+        arm: The design.
+        sigmas: Parameter -> standard deviation in its SI unit.
+
+    Raises:
+        InvalidInput: None, an unknown parameter or one without a single value, or no σ >= 0.
+    """
+    arm = a_manipulator("arm", arm)
+    given = as_mapping("sigmas", sigmas, lambda name, x: as_number(f"sigmas {name}", x, _SIGMA))
+    if not given:
+        raise InvalidInput("sigmas", "none", "the standard deviation of one parameter or more")
+    known = find_parameters(arm, given)
+    for name, parameter in known.items():
+        if parameter.whole or not np.isfinite(parameter.values(arm)).all():
+            raise InvalidInput("sigmas", name, "of numbers that can change a little")
+    return Deviations(arm, tuple(known.values()), np.array([given[name] for name in known]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """A number of arms as they are made: to first order, and of arms really made."""
+
+    name: str
+    unit: str
+    """SI unit; "1" for none."""
+    nominal: float
+    """Of the design itself."""
+    mean: float
+    deviation: float
+    """Standard deviation."""
+    quantile: float
+    """What 5 % of the arms are worse than."""
+    error: float = 0.0
+    """Of the mean, from how finely sets were computed."""
+    sense: float = 1.0
+    """1 if large values are good, -1 if small ones are."""
+    made: int = 0
+    """Arms that were made; the fields below are NaN without any."""
+    made_mean: float = math.nan
+    made_error: float = math.nan
+    """Standard error of their mean."""
+    made_deviation: float = math.nan
+    deviation_error: float = math.nan
+    """Standard error of their standard deviation."""
+    made_quantile: float = math.nan
+    quantile_error: float = math.nan
+    """Standard error of their quantile, from the ranks within one of it."""
+
+    @property
+    def level(self) -> float:
+        """Share of arms below the quantile: 0.05, or 0.95 where small values are good."""
+        return QUANTILE if self.sense > 0.0 else 1.0 - QUANTILE
+
+    @property
+    def agrees(self) -> bool:
+        """True if both means, and both deviations, are within three standard errors."""
+        if self.made < 2:
+            return False
+        off = abs(self.mean - self.made_mean), abs(self.deviation - self.made_deviation)
+        errors = math.hypot(self.made_error, self.error), self.deviation_error + self.error
+        rounding = 1e-9 * abs(self.nominal)
+        return all(x <= _AGREEMENT * error + rounding for x, error in zip(off, errors, strict=True))
+
+    def with_made(self, values: Array, error: float = 0.0) -> Self:
+        """The same with values of arms that were made, NaN for those without one.
+
+        Args:
+            values: Of each arm.
+            error: Error that all values share.
+        """
+        values = values[np.isfinite(values)]
+        count = len(values)
+        if count < 2:
+            return replace(self, made=count)
+        mean, deviation = float(values.mean()), float(values.std(ddof=1))
+        fourth = float(((values - mean) ** 4).mean())
+        spread = max(fourth - deviation**4, 0.0) / (4.0 * count * max(deviation**2, 1e-300))
+        ends = [
+            float(np.quantile(values, np.clip(self.level + side, 0.0, 1.0)))
+            for side in np.array([-1.0, 1.0]) * math.sqrt(self.level * (1.0 - self.level) / count)
+        ]
+        return replace(
+            self,
+            made=count,
+            made_mean=mean,
+            made_error=math.hypot(deviation / math.sqrt(count), error),
+            made_deviation=deviation,
+            deviation_error=math.sqrt(spread),
+            made_quantile=float(np.quantile(values, self.level)),
+            quantile_error=math.hypot(0.5 * (ends[1] - ends[0]), error),
+        )
+
+    def __str__(self) -> str:
+        percent = self.unit == "1"
+        scale, unit = (100.0, "%") if percent else (1.0, self.unit.replace("m3", "m³"))
+        first = f"{self._text(self.mean, scale, unit)}, {100 * self.level:.0f} % quantile "
+        first += self._text(self.quantile, scale, unit)
+        if self.made < 2:
+            return first
+        mean = quantity(scale * self.made_mean, unit, scale * self.made_error)
+        low = quantity(scale * self.made_quantile, unit, scale * self.quantile_error)
+        verdict = "agrees" if self.agrees else "DIFFERS"
+        return f"{first}; made {mean}, {low}: {verdict}"
+
+    def _text(self, value: float, scale: float, unit: str) -> str:
+        return quantity(scale * value, unit, 0.01 * scale * self.deviation)
+
+
+def probabilities(signed: Array, sigma: Array) -> Array:
+    """Φ(signed / σ): 0 or 1 where σ is 0 and nothing moves."""
+    from scipy.special import ndtr
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = ndtr(signed / sigma)
+    return np.where(sigma > 0.0, share, (signed >= 0.0).astype(float))

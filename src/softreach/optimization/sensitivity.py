@@ -1,0 +1,407 @@
+"""Sensitivity of a search: what each parameter is worth, and which requirement decides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from softreach.atlas.metric import MetricFailed
+from softreach.optimization.objectives import SETS, Goal
+from softreach.optimization.polish import point_of
+from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.program import Point, stacked_slopes
+from softreach.optimization.result import Search
+from softreach.support import parallel
+from softreach.support.arguments import as_instance, as_integer
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
+from softreach.support.progress import Progress, as_progress
+from softreach.support.quantity import quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Multiplier", "Sensitivity", "VarianceShares", "sensitivity"]
+
+_ACTIVE = 1e-3  # room below which a requirement may decide
+_AT_END = 1e-6  # of a range
+_CONFIDENCE = 0.95
+_RESAMPLES = 400
+_LEAST_ROWS = 8
+_MOST = 1 << 16
+_MOST_DRAWN = 4  # times as many rows, until all designs of enough of them exist
+
+
+class Multiplier(NamedTuple):
+    """What a requirement costs: by how much the goal would be better if it allowed more."""
+
+    name: str
+    """Requirement, place of a target, or end of a parameter's range."""
+    value: float
+    """Gain of the goal per unit that is allowed more; for a place per m that it comes nearer."""
+    unit: str
+    """Unit of what is allowed; "" where it is that of the limit."""
+
+
+class VarianceShares(NamedTuple):
+    """Share of a goal's variance over the searched ranges by each free parameter."""
+
+    first: Array
+    """By itself: Sobol's index of first order, shape (parameters,)."""
+    first_error: Array
+    """Half the confidence interval of 95 % by bootstrap."""
+    total: Array
+    """With all that it does together with others: the total index."""
+    total_error: Array
+    rows: int
+    """Rows of designs that exist, of which the indices are."""
+    replaced: int
+    """Rows that were drawn again, as one of their designs cannot exist or has no such number: the
+    indices are those among designs that exist, where parameters are not quite independent."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Sensitivity:
+    """What decides a design: by parameters nearby, over the ranges, and by requirements."""
+
+    goals: tuple[str, ...]
+    goal_units: tuple[str, ...]
+    reals: tuple[str, ...]
+    """Parameters that can change a little."""
+    units: tuple[str, ...]
+    """Unit of each of them."""
+    parameters: tuple[str, ...]
+    """All free parameters."""
+    gradient: Array
+    """Derivatives of the goals with poses that follow [goal per unit], (goals, reals); NaN of goals
+    without derivatives."""
+    gradient_error: Array
+    multipliers: tuple[Multiplier, ...]
+    """Of the first goal, those that decide most first, over their sizes."""
+    residual: float
+    """Part of the goal's slope that no requirement explains: 0 at an optimum, NaN without any."""
+    variance: tuple[VarianceShares | None, ...]
+    """For each goal; None if too few designs exist."""
+    designs: int
+    """Designs that were looked at."""
+
+    def to_dataset(self) -> xr.Dataset:
+        """Gradients, shares of variance and multipliers, labeled."""
+        import xarray as xr
+
+        count = len(self.parameters)
+        lacks = np.full(count, math.nan)
+        empty = VarianceShares(lacks, lacks, lacks, lacks, 0, 0)
+        shares = [each or empty for each in self.variance]
+        fields = ("first", "first_error", "total", "total_error")
+        at = ("goal", "parameter")
+        return xr.Dataset(
+            {
+                "gradient": (("goal", "real"), self.gradient),
+                "gradient_error": (("goal", "real"), self.gradient_error),
+                **{
+                    name: (
+                        at,
+                        np.array([getattr(s, name) for s in shares]).reshape(-1, count),
+                        {"units": "1"},
+                    )
+                    for name in fields
+                },
+                "multiplier": ("requirement", [each.value for each in self.multipliers]),
+                "rows": ("goal", [each.rows for each in shares]),
+                "rows_replaced": ("goal", [each.replaced for each in shares]),
+            },
+            {
+                "goal": list(self.goals),
+                "goal_unit": ("goal", list(self.goal_units)),
+                "real": list(self.reals),
+                "real_unit": ("real", list(self.units)),
+                "parameter": list(self.parameters),
+                "requirement": [each.name for each in self.multipliers],
+            },
+            {"residual": self.residual, "designs": self.designs},
+        )
+
+    def __repr__(self) -> str:
+        lines = [f"Sensitivity ({self.designs:,} designs):"]
+        for k, goal in enumerate(self.goals):
+            lines.append(f"{goal}:")
+            for name, unit, value, error in zip(
+                self.reals, self.units, self.gradient[k], self.gradient_error[k], strict=True
+            ):
+                per = f"{_shown(self.goal_units[k])}/{unit if unit != '1' else '1'}"
+                if np.isfinite(value):
+                    lines.append(f"  by {name}: {quantity(value, per, error)}")
+            if (share := self.variance[k]) is not None:
+                order = np.argsort(-share.total, kind="stable")
+                each = ", ".join(
+                    f"{self.parameters[j]} {share.first[j]:.2f} ± {share.first_error[j]:.2f} "
+                    f"({share.total[j]:.2f} ± {share.total_error[j]:.2f})"
+                    for j in order
+                )
+                replaced = f", {share.replaced} more replaced" if share.replaced else ""
+                lines.append(f"  variance alone (in all), {share.rows} rows{replaced}: {each}")
+        for each in self.multipliers:
+            unit = f" per {each.unit}" if each.unit else " per unit"
+            lines.append(f"decides: {each.name}, {each.value:.4g} {self.goal_units[0]}{unit}")
+        if np.isfinite(self.residual):
+            lines.append(f"not explained by requirements: {100 * self.residual:.2g} % of the slope")
+        return "\n  ".join(lines)
+
+
+def _shown(unit: str) -> str:
+    return unit.replace("m3", "m³")
+
+
+def sensitivity(
+    of: Search | Problem,
+    candidate: Candidate | None = None,
+    *,
+    n: int = 64,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Sensitivity:
+    """What each free parameter is worth to the goals, and which requirement decides.
+
+    Derivatives at the design are exact; poses at the targets follow so that the tips stay where
+    they must be. Multipliers explain the slope of the first goal by requirements that have no room
+    left and by ends of ranges: nonnegative least squares of the conditions of Karush, Kuhn and
+    Tucker, with the part that is left. Shares of variance are Sobol's indices of the goals, on
+    coarse sets over all of the ranges and choices, whether or not requirements are met.
+
+    Args:
+        of: A search, or its problem.
+        candidate: The design; by default the best of the search.
+        n: Rows of designs for the shares of variance, a power of two; parameters + 2 designs each.
+            0 for none.
+        seed: Of these designs.
+        progress: Called with the number of designs looked at since its last call.
+
+    Raises:
+        InvalidInput: A problem without a candidate, or an n that is no power of two.
+        InvalidDesign: The candidate cannot exist.
+    """
+    as_instance("of", of, (Search, Problem), "a Search, or a Problem with a candidate")
+    if isinstance(of, Search):
+        problem, candidate = of.problem, candidate or of.best
+    else:
+        problem = of
+        if candidate is None:
+            raise InvalidInput("candidate", "none", "given with a problem")
+    as_instance("candidate", candidate, Candidate, "a Candidate")
+    n, seed = as_integer("n", n, 0, _MOST), as_integer("seed", seed, 0)
+    if n & (n - 1):
+        raise InvalidInput("n", n, "a power of two, or 0")
+    progress = as_progress(progress)
+    with no_warnings():
+        gradient, error = _gradients(problem, candidate)
+        multipliers, residual = _multipliers(problem, candidate)
+        variance = _variances(problem, n, seed, progress) if n else (None,) * len(problem.goals)
+    parameters = problem.parameters
+    return Sensitivity(
+        goals=tuple(goal.name for goal in problem.goals),
+        goal_units=tuple(goal.objective.unit for goal in problem.goals),
+        reals=tuple(each.name for each in parameters.real),
+        units=tuple(each.unit for each in parameters.real),
+        parameters=parameters.names,
+        gradient=gradient,
+        gradient_error=error,
+        multipliers=multipliers,
+        residual=residual,
+        variance=variance,
+        designs=n * (len(parameters) + 2),
+    )
+
+
+def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
+    """Derivatives of the goals by the real parameters, and their errors, (goals, reals) each."""
+    count = len(problem.parameters.real)
+    values = np.full((len(problem.goals), count), math.nan)
+    errors = np.full_like(values, math.nan)
+    widths = np.ptp(problem.parameters.bounds, axis=1)
+    for k, goal in enumerate(problem.goals):
+        if not goal.objective.smooth or not count:
+            continue
+        point = point_of(problem, candidate, problem.accuracy, k)
+        values[k] = -goal.sense * _with_poses(point) / widths
+        errors[k] = _error(point, goal) / widths
+    return values, errors
+
+
+def _with_poses(point: Point) -> Array:
+    """Slope of the cost by the reals, while poses keep the tips where they are."""
+    count, (_, slope) = len(point.reals), point.cost
+    equations = _equations(point)
+    if not len(equations) or not np.any(slope[count:]):
+        return slope[:count]
+    forces = np.linalg.lstsq(equations[:, count:].T, -slope[count:], rcond=None)[0]
+    return slope[:count] + forces @ equations[:, :count]
+
+
+def _error(point: Point, goal: Goal) -> Array:
+    design = point.design
+    if goal.name not in SETS:
+        return np.zeros(len(point.reals))
+    return getattr(design.sets, f"{SETS[goal.name]}_error") @ np.abs(design.chain)
+
+
+class _Condition(NamedTuple):
+    """A column of the conditions of optimality, and what its multiplier is worth."""
+
+    slope: Array
+    name: str
+    """Empty for a pose at its bounds."""
+    unit: str = ""
+    gain: float = 0.0
+    """Of the goal per unit that is allowed more, for a multiplier of 1."""
+
+
+def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multiplier, ...], float]:
+    """Multipliers of the first goal, and the part of its slope that they do not explain."""
+    from scipy.optimize import nnls
+
+    if not problem.goals or not problem.goals[0].objective.smooth or not problem.parameters.real:
+        return (), math.nan
+    point = point_of(problem, candidate, problem.accuracy)
+    slope, equations = point.cost[1], _equations(point)
+    size = float(np.linalg.norm(slope))
+    bounds = [*_rooms(point), *_ends(problem, point)]
+    columns = [*equations, *-equations, *(each.slope for each in bounds)]
+    if not size or not columns:
+        return (), float(bool(size))
+    weights, rest = nnls(np.stack(columns, axis=1), -slope)
+    there, back, others = np.split(weights, [len(equations), 2 * len(equations)])
+    gains: dict[tuple[str, str], float] = {}
+    pulls = np.linalg.norm((there - back).reshape(-1, 3), axis=1)
+    for pull, what in zip(pulls.tolist(), point.equations, strict=True):
+        key = what.name, what.unit  # a place under several payloads counts with all of them
+        gains[key] = gains.get(key, 0.0) + pull / what.scale
+    for weight, each in zip(others.tolist(), bounds, strict=True):
+        if each.name:
+            key = each.name, each.unit
+            gains[key] = gains.get(key, 0.0) + weight * each.gain
+    result = [Multiplier(name, gain, unit) for (name, unit), gain in gains.items() if gain]
+    result.sort(key=lambda each: -each.value)
+    return tuple(result), float(rest) / size
+
+
+def _rooms(point: Point) -> list[_Condition]:
+    """Requirements that have no room left."""
+    return [
+        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
+        for part in point.rooms
+        for k in np.flatnonzero(part.value <= _ACTIVE)
+    ]
+
+
+def _equations(point: Point) -> Array:
+    """Derivatives of all equations, three for each place."""
+    parts = point.equations
+    return stacked_slopes(parts) if parts else np.empty((0, len(point.cost[1])))
+
+
+def _ends(problem: Problem, point: Point) -> list[_Condition]:
+    """Unknowns at an end of their ranges."""
+    unknowns = np.concatenate([point.reals, point.poses.ravel()])
+    rows, result = np.eye(len(unknowns)), []
+    for j, place in enumerate(unknowns):
+        for end, sign, word in ((0.0, -1.0, "low"), (1.0, 1.0, "high")):
+            if abs(place - end) > _AT_END:
+                continue
+            if j >= len(problem.parameters.real):
+                result.append(_Condition(sign * rows[j], ""))
+                continue
+            real = problem.parameters.real[j]
+            name, gain = f"{word} end of {real.name}", 1.0 / (real.high - real.low)
+            result.append(_Condition(sign * rows[j], name, real.unit, gain))
+    return result
+
+
+def _variances(
+    problem: Problem, n: int, seed: int, progress: Progress
+) -> tuple[VarianceShares | None, ...]:
+    """Shares of variance of each goal, of designs on coarse sets."""
+    from scipy.stats import qmc
+
+    free, known, drawn = problem.parameters.free, [], 0
+    sampler = qmc.Sobol(2 * len(free), rng=np.random.default_rng(seed))
+    while drawn < _MOST_DRAWN * n and (count := sum(each.shape[1] for each in known)) < n:
+        with np.errstate(all="ignore"):
+            cube = sampler.random(n if not drawn else min(n, 4 * (n - count)))
+        values = _rows(problem, cube, progress)
+        known.append(values[:, np.isfinite(values).all(axis=(0, 2))])
+        drawn += len(cube)
+    values = np.concatenate(known, axis=1)
+    count = values.shape[1]
+    if count < _LEAST_ROWS:
+        return (None,) * len(problem.goals)
+    used = min(n, 1 << (count.bit_length() - 1))
+    return tuple(
+        variance_shares(values[:, :used, k], drawn - count, seed) for k in range(len(problem.goals))
+    )
+
+
+def _rows(problem: Problem, cube: Array, progress: Progress) -> Array:
+    """Goals at A, B and, for each parameter, A with that of B: (parameters + 2, n, goals)."""
+    free = problem.parameters.free
+    d = len(free)
+    first, second = cube[:, :d], cube[:, d:]
+    mixed = np.repeat(first[None], d, axis=0)
+    for j in range(d):
+        mixed[j, :, j] = second[:, j]
+    tasks = (
+        partial(_values, problem, {p.name: p.at(float(x)) for p, x in zip(free, at, strict=True)})
+        for at in np.concatenate([first, second, mixed.reshape(-1, d)])
+    )
+    rows = []
+    for row in parallel.in_order(tasks):
+        rows.append(row)
+        progress(1)
+    return np.array(rows).reshape(d + 2, len(cube), len(problem.goals))
+
+
+def _values(problem: Problem, values: Mapping[str, Any]) -> list[float]:
+    """All goals of a design on coarse sets; NaN where it cannot exist or has no such number."""
+    with parallel.undivided(), no_warnings():
+        try:
+            case = problem.case(values, problem.coarse)
+            return [goal.value(case).value for goal in problem.goals]
+        except (InvalidDesign, InvalidInput, MetricFailed):
+            return [math.nan] * len(problem.goals)
+
+
+def variance_shares(values: Array, replaced: int = 0, seed: int = 0) -> VarianceShares:
+    """Sobol's indices of a number of designs, with errors by bootstrap.
+
+    Args:
+        values: At the designs A, B and, for each parameter, A with that of B: (parameters + 2, n),
+            n a power of two.
+        replaced: Rows that others stand for.
+        seed: Of the bootstrap.
+    """
+    from scipy.stats import sobol_indices
+
+    mixed = values[2:, None, :]
+    indices = sobol_indices(
+        func={"f_A": values[:1], "f_B": values[1:2], "f_AB": mixed},  # pyright: ignore
+        n=values.shape[1],
+        rng=np.random.default_rng(seed),
+    )
+    again = indices.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
+    first, total = (
+        0.5 * np.ravel(np.subtract(each.confidence_interval.high, each.confidence_interval.low))
+        for each in (again.first_order, again.total_order)
+    )
+    return VarianceShares(
+        np.ravel(indices.first_order),
+        first,
+        np.ravel(indices.total_order),
+        total,
+        values.shape[1],
+        replaced,
+    )
