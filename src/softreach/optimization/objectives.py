@@ -111,7 +111,7 @@ class DesignCase:
     def _intermediates(self) -> Intermediates:
         (cube,) = cube_blocks("sobol", self.samples, tip_map(self.arm).box.bundles, 0, self.samples)
         command = Command(
-            space=DesignSpace(base=self.arm, parameters=()),
+            space=DesignSpace.grid(self.arm, length=[self.arm.length]),
             n=self.samples,
             seed=0,
             sampler="sobol",

@@ -184,7 +184,7 @@ class _Run:
         if self._spent:
             self._progress(self._spent)
         # Other processes may be at work on the same storage.
-        while (left := self.first - len(study.candidates())) > 0:
+        while (left := self.first - len(study.candidates())) > 0 and not self._is_over(study):
             self._sample(study, min(left, _BATCH))
         study.focus()
         while not self._is_over(study):
