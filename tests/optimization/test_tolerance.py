@@ -61,7 +61,7 @@ def test_the_mean_of_normal_changes_is_that_of_their_samples():
 
 
 @cache
-def tolerated(arm: Manipulator, checked: int = 24) -> Tolerance:
+def tolerated(arm: Manipulator, checked: int = 16) -> Tolerance:
     inside = tip_positions(arm, arm.bounds.mean(axis=1)[None])
     needs = Requirements(
         targets=(
@@ -69,13 +69,13 @@ def tolerated(arm: Manipulator, checked: int = 24) -> Tolerance:
             Target(region=Box(tuple(inside[0] - 0.1), tuple(inside[0] + 0.1)), name="box"),
         )
     )
-    return tolerance(arm, SIGMAS, needs, samples=2000, checked=checked)
+    return tolerance(arm, SIGMAS, needs, samples=2000, checked=checked, accuracy=3e-2)
 
 
 @BOTH
 def test_the_first_order_agrees_with_arms_that_are_made(arm):
     result = tolerated(arm)
-    assert result.made == 24
+    assert result.made == 16
     assert result.impossible == 0
     assert result.kept.agrees
     assert result.volume.agrees
@@ -86,7 +86,9 @@ def test_the_first_order_agrees_with_arms_that_are_made(arm):
 @pytest.mark.large
 @BOTH
 def test_the_first_order_is_near_ten_thousand_arms(arm):
-    result = tolerance(arm, {k: 0.5 * v for k, v in SIGMAS.items()}, samples=10_000, checked=10_000)
+    result = tolerance(
+        arm, {k: 0.5 * v for k, v in SIGMAS.items()}, samples=10_000, checked=10_000, accuracy=3e-2
+    )
     lost, made = 1.0 - result.kept.mean, 1.0 - result.kept.made_mean
     assert lost == pytest.approx(made, rel=0.1)
     assert 1.0 - result.kept.quantile == pytest.approx(1.0 - result.kept.made_quantile, rel=0.1)
