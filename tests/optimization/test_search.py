@@ -180,7 +180,7 @@ def test_an_objective_that_no_design_has_is_said_in_one_line():
     )
     search = sr.search(ARM, FREE, maximize=nothing, polish=False, **FAST)
     assert not search.met
-    assert "no hope" in repr(search)
+    assert "hope = nan: must be finite" in repr(search)
     assert repr(search).startswith("Search: no design that can be judged was found")
 
 

@@ -28,6 +28,7 @@ from softreach.support.arguments import (
     as_function,
     as_instance,
     as_integer,
+    as_mapping,
     as_number,
     as_one_of,
     as_path,
@@ -118,7 +119,8 @@ def search(
     needs = Requirements() if requirements is None else requirements
     as_instance("requirements", needs, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
-    targets, sigmas = goals(maximize, minimize, needs), dict(tolerances or {})
+    targets = goals(maximize, minimize, needs)
+    sigmas = {} if tolerances is None else as_mapping("tolerances", tolerances, as_number)
     if as_flag("robust", robust) and not sigmas:
         raise InvalidInput("tolerances", "none", "given for a robust search")
     parameters = free_parameters(base, free, choices)
@@ -138,7 +140,7 @@ def search(
         follow=(lambda _: None) if follow is None else as_function("follow", follow),
         progress=as_progress(progress),
     )
-    run.polishes = bool(polish) and can_polish(problem)
+    run.polishes = as_flag("polish", polish) and can_polish(problem)
     study = Study(
         problem,
         storage=None if storage is None else as_path("storage", storage),

@@ -189,7 +189,7 @@ def sensitivity(
     """
     as_instance("of", of, (Search, Problem), "a Search, or a Problem with a candidate")
     if isinstance(of, Search):
-        problem, candidate = of.problem, candidate or of.best
+        problem, candidate = of.problem, of.best if candidate is None else candidate
     else:
         problem = of
         if candidate is None:
