@@ -36,10 +36,11 @@ _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
 }
 _TOL = 1e-7  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
-_FAR = 0.25  # over L or relative: room beyond which a rule is not differentiated
+_FAR = 0.1  # over L or relative: room beyond which a rule is not differentiated
 _ROOM = 0.98  # of the distance within which a tip must come to a place
 _SPARE = 1e-4  # over L or relative, by which limits are kept
 _WIDE_STEP = 0.02  # of a range, for what is rough
+_TOUCHES = 1e-12
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
@@ -101,7 +102,7 @@ class DesignPoint:
     def margin(self, goal: Goal) -> float:
         """Distance of a robust goal from that of the design itself."""
         if goal.name not in self._margins:
-            self._margins[goal.name] = margin(goal.objective, self.case)
+            self._margins[goal.name] = goal.sense * margin(goal, self.case)
         return self._margins[goal.name]
 
     def margin_slope(self, goal: Goal) -> Array:
@@ -113,7 +114,7 @@ class DesignPoint:
             moved = reals.copy()
             moved[k] += step if reals[k] + step <= high[k] else -step
             case = self.problem.case(parameters.moved(self.values, moved), self.accuracy)
-            change = margin(goal.objective, case) - self.margin(goal)
+            change = goal.sense * margin(goal, case) - self.margin(goal)
             slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
         return np.array(slopes)
 
@@ -309,18 +310,20 @@ class Point:
     ) -> Array:
         """Derivatives of rules by differences, shape (place, rule, unknowns); 0 far from them."""
         slope = np.zeros((*value.shape, self._size))
-        if (value > _FAR).all():
+        near = np.flatnonzero(((value < _FAR) & (value != 0.0)).any(axis=0))
+        if not len(near):
             return slope
         rules, cube = rules_of(self.design.case.arm, number), self._by_payload()[number][1]
         for k, (apart, *pair) in enumerate(self.design.neighbors):
-            ahead, behind = (_room(rules_of(arm, number), cube) for arm in pair)
-            slope[:, :, k] = (ahead - behind) / apart
+            ahead, behind = (_room(rules_of(arm, number).some(near), cube) for arm in pair)
+            slope[:, near, k] = (ahead - behind) / apart
         for j, column in enumerate(self._columns(number)):
-            ends, rooms = np.repeat(cube[None], 2, axis=0), []
+            ends = np.repeat(cube[None], 2, axis=0)
             ends[:, :, j] = np.clip(cube[:, j] + np.array([[_STEP], [-_STEP]]), 0.0, 1.0)
-            rooms = [_room(rules, end) for end in ends]
+            ahead, behind = (_room(rules.some(near), end) for end in ends)
             apart = (ends[0, :, j] - ends[1, :, j])[:, None]
-            slope[np.arange(len(cube)), :, column] = (rooms[0] - rooms[1]) / apart
+            for place, at in enumerate(column):
+                slope[place, near, at] = ((ahead - behind) / apart)[place]
         return slope
 
     def _of_design(self) -> Iterator[Part]:
@@ -426,13 +429,17 @@ def lazily(make: Callable[[], Array]) -> Callable[[], Array]:
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:
-    """How far poses are from what the rules forbid, over L or over the limit, shape (n, rule)."""
+    """How far poses are from what the rules forbid, over L or over the limit, shape (n, rule).
+
+    With a little to spare, but for what touches at the base, which nothing moves.
+    """
     value = rules.judged(rules.rod.box.from_free_cube(cube)).value
     most = np.array([0.0] * len(rules.keeps) + [*rules.limits.values()])
     scale = np.array(
-        [rules.arm.length] * len(rules.keeps) + [x or 1.0 for x in most[len(rules.keeps) :]]
+        [rules.arm.length] * len(rules.keeps) + [x or 1.0 for x in rules.limits.values()]
     )
-    return np.nan_to_num((most - value) / scale - _SPARE, nan=-1.0, neginf=-1.0, posinf=1.0)
+    room = np.nan_to_num((most - value) / scale, nan=-1.0, neginf=-1.0, posinf=1.0)
+    return np.where(np.abs(room) < _TOUCHES, 0.0, room - _SPARE)
 
 
 def _within(targets: Sequence[object]) -> Array:

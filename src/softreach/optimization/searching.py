@@ -99,8 +99,8 @@ def search(
         tolerances: Parameter -> standard deviation of arms as they are made [SI unit]; the result
             then says how the goals of arms made after the best design spread.
         robust: Whether an objective is what 5 % of these arms are worse than instead of that of the
-            design itself, to first order: f - 1.645 ‖σ ∇f‖, or f + ... to minimize. Requirements
-            are those of the design itself.
+            design itself, to second order by arms one deviation away. Requirements are those of
+            the design itself.
         seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
             number of threads.
         storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
@@ -245,7 +245,8 @@ class _Run:
             if len(self.problem.goals) < 2:
                 return polished(self.problem, start)
             # One goal at a time, in turn, while the others stay as good as they are.
-            goal = len(self._starts) % len(self.problem.goals)
+            moving = [k for k, goal in enumerate(self.problem.goals) if goal.name != "actuators"]
+            goal = (moving or [0])[len(self._starts) % max(1, len(moving))]
             floors = self.problem.costs(start) if start.is_feasible else ()
             return polished(self.problem, start, goal=goal, floors=floors)
 
