@@ -255,7 +255,7 @@ class _Run:
         if len(self.problem.goals) > 1:
             ordered = self.problem.front(candidates)
         else:
-            judged = [each for each in candidates if np.isfinite(each.excess)]
+            judged = [each for each in candidates if each.fidelity != "bounds"]
             ordered = sorted(judged, key=self.problem.score)
         chosen: list[Candidate] = []
         for candidate in ordered:
