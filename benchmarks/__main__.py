@@ -22,6 +22,7 @@ PARTS = (
     "workspace",
     "loads",
     "calibration",
+    "search",
     "inverse",
     "redundancy",
     "atlas",

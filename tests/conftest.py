@@ -20,14 +20,21 @@ from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 pytest_plugins = ["tests.durations"]
 
-settings.register_profile(
-    "ci",
-    derandomize=True,
-    deadline=None,  # the first call compiles
-    max_examples=25,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
-)
-settings.load_profile("ci")
+for profile, examples in {"usual": 12, "large": 25}.items():
+    settings.register_profile(
+        profile,
+        derandomize=True,
+        deadline=None,  # the first call compiles
+        max_examples=examples,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+    )
+settings.load_profile("usual")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """More random designs where the large sizes are asked for."""
+    if config.option.markexpr == "large or not large":
+        settings.load_profile("large")
 
 
 @pytest.fixture(scope="session")

@@ -33,6 +33,7 @@ MODULES = [
         "inverse.path",
         "workspace.payload",
         "plot",
+        "optimization",
         "requirements",
         "cloud.redundancy",
         "rest",
@@ -61,6 +62,7 @@ def public_functions() -> dict[str, Callable]:
         elif inspect.isclass(thing):
             for method, function in inspect.getmembers(thing, inspect.isroutine):
                 ours = getattr(function, "__module__", None) or ""
+                ours = ours if callable(function) else ""  # no property that is computed once
                 if not method.startswith("_") and ours.startswith("softreach"):
                     found[f"{name}.{method}"] = function
     return found

@@ -121,6 +121,13 @@ def statistics():
     return sr.curvature.curvature_statistics(cloud())
 
 
+@cache
+def searched():
+    """A search of one design."""
+    free = {"taper": (0.0, 0.02)}
+    return sr.search(ARM, free, maximize="actuators", designs=1, accuracy=0.2, polish=False)
+
+
 BENCH = hanging_tentacle()
 
 
@@ -338,6 +345,7 @@ CALLS: dict[str, Call] = {
         kinds=dict(bundles="mapping"),
         fine={"bundles": {"a dictionary"}},
     ),
+    "plot.plot_search": Call(lambda: dict(search=searched()), kinds=dict(search="dataset")),
     "plot.plot_slab": Call(lambda: dict(cloud=cloud(), thickness=1.0)),
     "plot.plot_slice": Call(lambda: dict(grid=grid())),
     "plot.plot_slices": Call(lambda: dict(grid=grid()), kinds=dict(at="array")),
@@ -348,6 +356,49 @@ CALLS: dict[str, Call] = {
     "cloud.redundancy.distance_map": Call(lambda: dict(cloud=cloud(), distance=distance())),
     "cloud.redundancy.redundancy_summary": Call(lambda: dict(cloud=cloud(), distance=distance())),
     "cloud.redundancy.tip_density": Call(lambda: dict(cloud=cloud())),
+    "optimization.search": Call(
+        lambda: dict(base=ARM, free={"taper": (0.0, 0.02)}, designs=1, accuracy=0.2, polish=False),
+        kinds=dict(
+            free="mapping",
+            choices="mapping",
+            tolerances="mapping",
+            requirements="dataset",
+            maximize="words",
+            minimize="words",
+            designs="whole number",
+            polish="flag",
+            robust="flag",
+            storage="path",
+            follow="function",
+        ),
+        fine=dict(follow={"a class", "a function"}),  # what they raise is theirs
+        said="parameter",
+    ),
+    "optimization.sensitivity": Call(
+        lambda: dict(of=searched(), n=0),
+        kinds=dict(of="dataset", candidate="dataset"),
+        fine=dict(seed={"a number of 400 digits", "a number of 5000 digits"}),
+    ),
+    "optimization.tolerance": Call(
+        lambda: dict(arm=ARM, sigmas={"taper": 1e-3}, samples=100, checked=0, accuracy=0.1),
+        kinds=dict(
+            sigmas="mapping", requirements="dataset", samples="whole number", checked="whole number"
+        ),
+        fine=dict(seed={"a number of 400 digits", "a number of 5000 digits"}),
+        said="parameter",
+    ),
+    "optimization.Search.save": Call(
+        lambda: dict(folder="missing/x"),
+        function=lambda **given: searched().save(**given),
+        kinds=dict(folder="path"),
+    ),
+    "optimization.Search.save_report": Call(
+        lambda: dict(path="missing/x.html"),
+        function=lambda **given: searched().save_report(**given),
+    ),
+    "optimization.Search.save_table": Call(
+        lambda: dict(path="missing/x.csv"), function=lambda **given: searched().save_table(**given)
+    ),
     "requirements.check": Call(
         lambda: dict(arm=ARM, requirements=needs()), kinds=dict(requirements="dataset")
     ),

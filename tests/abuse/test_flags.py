@@ -319,7 +319,9 @@ def _commands():
 
 def _options():
     for function in (*_commands(), Changes, Sampling):
-        for name, hint in typing.get_type_hints(function, include_extras=True).items():
+        hints = typing.get_type_hints(function, include_extras=True)
+        hints.pop("return", None)
+        for name, hint in hints.items():
             yield pytest.param(hint, id=f"{getattr(function, '__name__', function)} {name}")
 
 

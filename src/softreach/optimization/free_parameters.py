@@ -200,7 +200,7 @@ def free_parameters(
     bases = as_mapping("base", base, a_manipulator) if isinstance(base, Mapping) else {}
     bases = bases or {"": a_manipulator("base", base)}
     given = as_mapping("free", free, lambda _, value: value)
-    picks = as_mapping("choices", choices or {}, lambda _, value: value)
+    picks = {} if choices is None else as_mapping("choices", choices, lambda _, value: value)
     known = known_parameters(bases.values(), picks.get(BUNDLES, ()))
     texts = {name: text for name, text in given.items() if isinstance(text, str)}
     found = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]

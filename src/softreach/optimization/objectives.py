@@ -111,7 +111,7 @@ class DesignCase:
     def _intermediates(self) -> Intermediates:
         (cube,) = cube_blocks("sobol", self.samples, tip_map(self.arm).box.bundles, 0, self.samples)
         command = Command(
-            space=DesignSpace(base=self.arm, parameters=()),
+            space=DesignSpace.grid(self.arm, length=[self.arm.length]),
             n=self.samples,
             seed=0,
             sampler="sobol",
@@ -312,7 +312,7 @@ _ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value], str, bool], ...
     ("exact_volume", "m3", "volume of the reachable set", _volume, "", True),
     ("exact_convex_volume", "m3", "volume of its convex hull", _convex_volume, "", True),
     ("exact_unreachability", "1", "1 - volume / convex volume", _unreachability, "", True),
-    ("coverage", "1", "mean share of the regions that is reached", _coverage, "regions", False),
+    ("coverage", "1", "mean share of the regions that is reached", _coverage, "regions", True),
     ("mean_effort", "1", "mean effort at the targets", _mean_effort, "targets", True),
     ("worst_effort", "1", "largest effort at the targets", _worst_effort, "targets", True),
     ("manipulability", "m3", "mean √det(J Jᵀ) over the box", _manipulability, "", False),

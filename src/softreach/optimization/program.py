@@ -18,16 +18,20 @@ from softreach.optimization.problem import Problem
 from softreach.optimization.robust import margin
 from softreach.requirements.checks import effort_scales
 from softreach.requirements.poses import PoseRules
+from softreach.requirements.regions import Region
 from softreach.rod.rods import in_steps, refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
+from softreach.workspace import ReachableSet, ReachableSolid, reachable_set
+from softreach.workspace.boundary_samples import boundary_samples
 from softreach.workspace.gradient import VolumeGradient, volume_gradient
 from softreach.workspace.tip_derivatives import TipDerivatives
 
 __all__ = ["DesignPoint", "Point"]
 
+COVERAGE = "coverage"
 EFFORTS = ("mean_effort", "worst_effort")
 _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
     "mass": lambda arm: mass(arm) or 0.0,
@@ -36,10 +40,12 @@ _OF_ARM: dict[str, Callable[[Manipulator], float]] = {
 }
 _TOL = 1e-7  # of tips at the targets, in L
 _STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
-_FAR = 0.25  # over L or relative: room beyond which a rule is not differentiated
+_FAR = 0.1  # over L or relative: room beyond which a rule is not differentiated
 _ROOM = 0.98  # of the distance within which a tip must come to a place
 _SPARE = 1e-4  # over L or relative, by which limits are kept
 _WIDE_STEP = 0.02  # of a range, for what is rough
+_TOUCHES = 1e-12
+_PLACES = 8192  # of a region, whose share is covered
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
@@ -92,6 +98,38 @@ class DesignPoint:
         value = float(getattr(self.case.reached, SETS[name]))
         return value, getattr(self.sets, SETS[name]) @ self.chain
 
+    def of_coverage(self) -> tuple[float, Array]:
+        """Mean share of the regions that the tip reaches, and its derivatives by the reals."""
+        pairs = [
+            (number, target.region)
+            for number in range(len(self.rods))
+            for target in self.problem.requirements.targets
+            if target.region is not None
+        ]
+        shares, slopes = zip(*(self.share(*pair) for pair in pairs), strict=True)
+        return float(np.mean(shares)), np.mean(slopes, axis=0)
+
+    def share(self, number: int, region: Region) -> tuple[float, Array]:
+        """Share of a region that the tip reaches under a payload, and its derivatives.
+
+        They are what the part of the boundary that is in the region sweeps, theory (98).
+        """
+        solid = self._solids[number]
+        if not isinstance(solid, ReachableSolid):
+            return 0.0, np.zeros(self.chain.shape[1])
+        nodes = boundary_samples(solid.image)
+        inside = (region.distance(nodes.places) <= 0.0).astype(float)
+        swept = nodes.derivative(self.derivatives[number].at(nodes.cube), inside)
+        share = float(solid.contains(region.places(_PLACES)).mean())
+        return share, swept @ self.chain / region.volume
+
+    @lazy
+    def _solids(self) -> tuple[ReachableSet, ...]:
+        """Reachable sets under each payload."""
+        if len(self.rods) == 1:
+            return (self.case.reached,)
+        return tuple(reachable_set(rod.arm, accuracy=self.accuracy) for rod in self.rods)
+
     def of_arm(self, name: str) -> tuple[float, Array]:
         """A number that follows from the design alone, and its derivatives by differences."""
         of = _OF_ARM[name]
@@ -101,7 +139,7 @@ class DesignPoint:
     def margin(self, goal: Goal) -> float:
         """Distance of a robust goal from that of the design itself."""
         if goal.name not in self._margins:
-            self._margins[goal.name] = margin(goal.objective, self.case)
+            self._margins[goal.name] = goal.sense * margin(goal, self.case)
         return self._margins[goal.name]
 
     def margin_slope(self, goal: Goal) -> Array:
@@ -113,7 +151,7 @@ class DesignPoint:
             moved = reals.copy()
             moved[k] += step if reals[k] + step <= high[k] else -step
             case = self.problem.case(parameters.moved(self.values, moved), self.accuracy)
-            change = margin(goal.objective, case) - self.margin(goal)
+            change = goal.sense * margin(goal, case) - self.margin(goal)
             slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
         return np.array(slopes)
 
@@ -203,7 +241,7 @@ class Point:
     def rooms(self) -> tuple[Part, ...]:
         """What must not fall below 0: limits, measures, regions, other goals."""
         near = (_near_place(part) for part in self._tips if part.within > 0.0)
-        return (*near, *self._rules(), *self._of_design(), *self._other_goals())
+        return (*near, *self._rules(), *self._shares(), *self._of_design(), *self._other_goals())
 
     @property
     def _size(self) -> int:
@@ -213,6 +251,8 @@ class Point:
         slope = np.zeros(self._size)
         if goal.name in EFFORTS:
             value, slope = self._effort(goal.name)
+        elif goal.name == COVERAGE:
+            value, slope[: len(self.reals)] = self.design.of_coverage()
         elif goal.name in SETS:
             value, slope[: len(self.reals)] = self.design.of_set(goal.name)
         else:
@@ -309,19 +349,30 @@ class Point:
     ) -> Array:
         """Derivatives of rules by differences, shape (place, rule, unknowns); 0 far from them."""
         slope = np.zeros((*value.shape, self._size))
-        if (value > _FAR).all():
+        near = np.flatnonzero(((value < _FAR) & (value != 0.0)).any(axis=0))
+        if not len(near):
             return slope
         rules, cube = rules_of(self.design.case.arm, number), self._by_payload()[number][1]
         for k, (apart, *pair) in enumerate(self.design.neighbors):
-            ahead, behind = (_room(rules_of(arm, number), cube) for arm in pair)
-            slope[:, :, k] = (ahead - behind) / apart
+            ahead, behind = (_room(rules_of(arm, number).some(near), cube) for arm in pair)
+            slope[:, near, k] = (ahead - behind) / apart
         for j, column in enumerate(self._columns(number)):
-            ends, rooms = np.repeat(cube[None], 2, axis=0), []
+            ends = np.repeat(cube[None], 2, axis=0)
             ends[:, :, j] = np.clip(cube[:, j] + np.array([[_STEP], [-_STEP]]), 0.0, 1.0)
-            rooms = [_room(rules, end) for end in ends]
+            ahead, behind = (_room(rules.some(near), end) for end in ends)
             apart = (ends[0, :, j] - ends[1, :, j])[:, None]
-            slope[np.arange(len(cube)), :, column] = (rooms[0] - rooms[1]) / apart
+            for place, at in enumerate(column):
+                slope[place, near, at] = ((ahead - behind) / apart)[place]
         return slope
+
+    def _shares(self) -> Iterator[Part]:
+        """Shares of regions that must be covered."""
+        for target in self.design.problem.requirements.targets:
+            if (region := target.region) is None:
+                continue
+            for number in range(len(self.design.rods)):
+                share = partial(self.design.share, number, region)
+                yield self._limit(target.name, -1.0, share()[0], target.share, share)
 
     def _of_design(self) -> Iterator[Part]:
         """Limits and measures that follow from the design or its set."""
@@ -426,13 +477,17 @@ def lazily(make: Callable[[], Array]) -> Callable[[], Array]:
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:
-    """How far poses are from what the rules forbid, over L or over the limit, shape (n, rule)."""
+    """How far poses are from what the rules forbid, over L or over the limit, shape (n, rule).
+
+    With a little to spare, but for what touches at the base, which nothing moves.
+    """
     value = rules.judged(rules.rod.box.from_free_cube(cube)).value
     most = np.array([0.0] * len(rules.keeps) + [*rules.limits.values()])
     scale = np.array(
-        [rules.arm.length] * len(rules.keeps) + [x or 1.0 for x in most[len(rules.keeps) :]]
+        [rules.arm.length] * len(rules.keeps) + [x or 1.0 for x in rules.limits.values()]
     )
-    return np.nan_to_num((most - value) / scale - _SPARE, nan=-1.0, neginf=-1.0, posinf=1.0)
+    room = np.nan_to_num((most - value) / scale, nan=-1.0, neginf=-1.0, posinf=1.0)
+    return np.where(np.abs(room) < _TOUCHES, 0.0, room - _SPARE)
 
 
 def _within(targets: Sequence[object]) -> Array:

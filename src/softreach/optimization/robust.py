@@ -1,4 +1,4 @@
-"""Objectives of arms as they are made: quantiles to first order, and arms really made."""
+"""Objectives of arms as they are made: quantiles to second order, and arms really made."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,16 +18,15 @@ from softreach.requirements.requirements import Requirements
 from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
-from softreach.workspace.gradient import volume_gradient
 
-__all__ = ["margin", "robust_goals", "spreads_of"]
+__all__ = ["Moments", "margin", "moments", "robust_goals", "spreads_of"]
 
 _ARMS = 200  # made to check what is reported
 _POLISHED = (*SETS, "mass")  # whose quantiles are cheap enough to be differentiated again
 
 
 def robust_goals(goals: Sequence[Goal], sigmas: Mapping[str, float]) -> tuple[Goal, ...]:
-    """Goals that 5 % of the arms made are worse than, to first order.
+    """Goals that 5 % of the arms made are worse than, to second order.
 
     Args:
         goals: Goals of the design itself.
@@ -49,36 +49,52 @@ def _robust(goal: Goal, sigmas: Mapping[str, float]) -> Objective:
 
 def _quantile(own: Objective, sense: float, case: DesignCase) -> Value:
     value, error = own.compute(case)
-    return Value(value - sense * margin(own, case), error)
+    return Value(value - margin(Goal(own, sense), case), error)
+
+
+class Moments(NamedTuple):
+    """Mean and standard deviation of an objective of arms made, to second order."""
+
+    shift: float
+    """Mean less the design's own value."""
+    deviation: float
+
+    def margin(self, sense: float) -> float:
+        """Distance of the 5 % quantile of what is to be large (1), or of -f (-1), from f."""
+        return NORMAL * self.deviation - sense * self.shift
+
+
+def margin(goal: Goal, case: DesignCase) -> float:
+    """By how much the quantile of a goal is worse, in its unit, than the design's own value."""
+    return goal.sense * moments(goal.objective, case).margin(goal.sense)
 
 
 @no_warnings()
-def margin(objective: Objective, case: DesignCase) -> float:
-    """Distance of the quantile from the design's own value, 1.645 ‖σ ∇f‖.
+def moments(objective: Objective, case: DesignCase) -> Moments:
+    """Moments by arms one deviation of each parameter away.
+
+    First order alone would take the top of a hill for a place where nothing changes: with slopes s
+    and curvatures c per deviation, the mean is f + Σ c / 2 and the variance Σ s² + Σ c² / 2.
 
     Args:
         objective: With deviations.
         case: The design.
+
+    Raises:
+        InvalidDesign: One of these arms cannot exist.
     """
     deviations = deviations_of(case.arm, objective.sigmas)
-    if objective.name in SETS:
-        gradient = volume_gradient(case.arm, deviations.names, accuracy=case.accuracy)
-        slopes = getattr(gradient, SETS[objective.name]) * deviations.sigmas
-    else:
-        slopes = [
-            _half_change(objective, case, deviations, k) for k in range(len(deviations.sigmas))
-        ]
-    return NORMAL * float(np.linalg.norm(slopes))
-
-
-def _half_change(objective: Objective, case: DesignCase, deviations: Deviations, k: int) -> float:
-    """Change of an objective by one deviation of a parameter: half of that by two."""
-    change = np.eye(len(deviations.sigmas))[k] * deviations.sigmas
-    if not change.any():
-        return 0.0
     compute = (objective.nominal or objective).compute
-    ends = [compute(_with(case, deviations.made(side * change))).value for side in (1, -1)]
-    return 0.5 * (ends[0] - ends[1])
+    value, slopes, curvatures = compute(case).value, [], []
+    for change in np.diag(deviations.sigmas):
+        if change.any():
+            ahead, behind = (
+                compute(_with(case, deviations.made(side * change))).value for side in (1, -1)
+            )
+            slopes.append(0.5 * (ahead - behind))
+            curvatures.append(ahead + behind - 2.0 * value)
+    variance = np.dot(slopes, slopes) + 0.5 * np.dot(curvatures, curvatures)
+    return Moments(0.5 * float(np.sum(curvatures)), math.sqrt(float(variance)))
 
 
 def _with(case: DesignCase, arm: Manipulator) -> DesignCase:
@@ -94,7 +110,7 @@ def spreads_of(
     sigmas: Mapping[str, float],
     seed: int,
 ) -> tuple[Spread, ...]:
-    """Spread of goals of the design itself: to first order, and of 200 arms made.
+    """Spread of goals of the design itself: to second order, and of 200 arms made.
 
     Args:
         goals: Goals of the design itself.
@@ -117,16 +133,16 @@ def spreads_of(
 def _spread(goal: Goal, case: DesignCase, sigmas: Mapping[str, float]) -> Spread:
     nominal = goal.value(case)
     try:
-        away = margin(replace(goal.objective, sigmas=dict(sigmas)), case)
+        both = moments(replace(goal.objective, sigmas=dict(sigmas)), case)
     except (InvalidDesign, InvalidInput, MetricFailed):
-        away = math.nan
+        both = Moments(math.nan, math.nan)
     return Spread(
         name=goal.name,
         unit=goal.objective.unit,
         nominal=nominal.value,
-        mean=nominal.value,
-        deviation=away / NORMAL,
-        quantile=nominal.value - goal.sense * away,
+        mean=nominal.value + both.shift,
+        deviation=both.deviation,
+        quantile=nominal.value - goal.sense * both.margin(goal.sense),
         error=0.0 if math.isnan(nominal.error) else nominal.error,
         sense=goal.sense,
     )

@@ -36,6 +36,7 @@ _OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
     "accuracy": lambda name, value: as_number(name, value, ACCURACIES),
     "sampler": lambda name, value: as_one_of(name, value, SAMPLERS),
     "polish": as_flag,
+    "robust": as_flag,
 }
 _SENSES = ("maximize", "minimize")
 _TABLES = ("free", "choices", "tolerances")
@@ -77,7 +78,7 @@ def read_search(
     [search]
     design = "arm.toml"             # or a named design, or a list of several
     maximize = "exact_volume"
-    designs = 200                   # seed, accuracy, sampler, polish
+    designs = 200                   # seed, accuracy, sampler, polish, robust
     [search.free]
     taper_deg = [0, 3.2]
     "left.revolution_deg" = [-360, 360]
@@ -229,6 +230,10 @@ class _Reader:
             path, value = self._value(name)
             if value is not None:
                 options[name] = self._tried(path, value, partial(convert, name, value))
+        if options.get("robust") and not (
+            self._raw.get("tolerances") or self._given.get(_TABLES[2])
+        ):
+            self._refuse(self._value("robust")[0], True, "needs tolerances")
         if needs is not None and not self.faults:
             try:
                 goals(options["maximize"], options["minimize"], needs)

@@ -28,6 +28,7 @@ from softreach.support.arguments import (
     as_function,
     as_instance,
     as_integer,
+    as_mapping,
     as_number,
     as_one_of,
     as_path,
@@ -98,8 +99,8 @@ def search(
         tolerances: Parameter -> standard deviation of arms as they are made [SI unit]; the result
             then says how the goals of arms made after the best design spread.
         robust: Whether an objective is what 5 % of these arms are worse than instead of that of the
-            design itself, to first order: f - 1.645 ‖σ ∇f‖, or f + ... to minimize. Requirements
-            are those of the design itself.
+            design itself, to second order by arms one deviation away. Requirements are those of
+            the design itself.
         seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
             number of threads.
         storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
@@ -118,7 +119,8 @@ def search(
     needs = Requirements() if requirements is None else requirements
     as_instance("requirements", needs, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
-    targets, sigmas = goals(maximize, minimize, needs), dict(tolerances or {})
+    targets = goals(maximize, minimize, needs)
+    sigmas = {} if tolerances is None else as_mapping("tolerances", tolerances, as_number)
     if as_flag("robust", robust) and not sigmas:
         raise InvalidInput("tolerances", "none", "given for a robust search")
     parameters = free_parameters(base, free, choices)
@@ -138,7 +140,7 @@ def search(
         follow=(lambda _: None) if follow is None else as_function("follow", follow),
         progress=as_progress(progress),
     )
-    run.polishes = bool(polish) and can_polish(problem)
+    run.polishes = as_flag("polish", polish) and can_polish(problem)
     study = Study(
         problem,
         storage=None if storage is None else as_path("storage", storage),
@@ -184,7 +186,7 @@ class _Run:
         if self._spent:
             self._progress(self._spent)
         # Other processes may be at work on the same storage.
-        while (left := self.first - len(study.candidates())) > 0:
+        while (left := self.first - len(study.candidates())) > 0 and not self._is_over(study):
             self._sample(study, min(left, _BATCH))
         study.focus()
         while not self._is_over(study):
@@ -243,7 +245,8 @@ class _Run:
             if len(self.problem.goals) < 2:
                 return polished(self.problem, start)
             # One goal at a time, in turn, while the others stay as good as they are.
-            goal = len(self._starts) % len(self.problem.goals)
+            moving = [k for k, goal in enumerate(self.problem.goals) if goal.name != "actuators"]
+            goal = (moving or [0])[len(self._starts) % max(1, len(moving))]
             floors = self.problem.costs(start) if start.is_feasible else ()
             return polished(self.problem, start, goal=goal, floors=floors)
 
@@ -252,7 +255,7 @@ class _Run:
         if len(self.problem.goals) > 1:
             ordered = self.problem.front(candidates)
         else:
-            judged = [each for each in candidates if np.isfinite(each.excess)]
+            judged = [each for each in candidates if each.fidelity != "bounds"]
             ordered = sorted(judged, key=self.problem.score)
         chosen: list[Candidate] = []
         for candidate in ordered:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -188,7 +189,7 @@ def sensitivity(
     """
     as_instance("of", of, (Search, Problem), "a Search, or a Problem with a candidate")
     if isinstance(of, Search):
-        problem, candidate = of.problem, candidate or of.best
+        problem, candidate = of.problem, of.best if candidate is None else candidate
     else:
         problem = of
         if candidate is None:
@@ -387,14 +388,19 @@ def variance_shares(values: Array, replaced: int = 0, seed: int = 0) -> Variance
     from scipy.stats import sobol_indices
 
     mixed = values[2:, None, :]
-    indices = sobol_indices(
-        func={"f_A": values[:1], "f_B": values[1:2], "f_AB": mixed},  # pyright: ignore
-        n=values.shape[1],
-        rng=np.random.default_rng(seed),
-    )
-    again = indices.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what does not depend on a parameter
+        indices = sobol_indices(
+            func={"f_A": values[:1], "f_B": values[1:2], "f_AB": mixed},  # pyright: ignore
+            n=values.shape[1],
+            rng=np.random.default_rng(seed),
+        )
+        again = indices.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
     first, total = (
-        0.5 * np.ravel(np.subtract(each.confidence_interval.high, each.confidence_interval.low))
+        0.5
+        * np.nan_to_num(
+            np.subtract(each.confidence_interval.high, each.confidence_interval.low)
+        ).ravel()
         for each in (again.first_order, again.total_order)
     )
     return VarianceShares(

@@ -27,7 +27,8 @@ from softreach.requirements.poses import PoseRules, some_corners, worst_pose
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements
 from softreach.rod.kinematics import configuration
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import in_steps, tip_map
+from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.sampling import sample_cube
 from softreach.schema import AXES, provenance
@@ -52,6 +53,8 @@ _MOST_TRIED = 4_096  # places for which they are
 _LEAST_PLACES = 64  # in a region to be covered
 _MOST_PLACES = 100_000
 _TOL = 1e-6
+_SAME = 1e-4  # of the ranges, by which poses are told apart
+_ROUGH_TOL = 1e-4  # of tips on the way of a search, in L
 _SEEDS, _NEIGHBORS = 256, 5
 """Samples that quick descents start from, and how many of them for each place."""
 _CELLS = 16  # along each axis of three bundles: as many solutions as with 32, in half the time
@@ -126,6 +129,8 @@ def _checked(
     coverages: list[Coverage] = []
     for payload, loaded in zip(payloads, arms, strict=True):
         rules = _rules(loaded, needs, accuracy)
+        if choose is _descended:
+            rules = replace(rules, known_rod=_rough_map(loaded))
         posed.append(_solved(rules, needs.places, _within(needs), step, choose))
         for target in needs.targets:
             if target.region is not None:
@@ -300,6 +305,12 @@ def _rules(arm: Manipulator, needs: Requirements, accuracy: float) -> PoseRules:
     return PoseRules.of(arm, keeps, needs.limits, 0.1 * accuracy * arm.length)
 
 
+def _rough_map(arm: Manipulator) -> TipMap:
+    """A tip map for designs on the way, whose shapes have no more steps than its tips."""
+    rod = tip_map(arm, _ROUGH_TOL)
+    return in_steps(arm, rod.steps, rod)
+
+
 def _solved(
     rules: PoseRules, places: Array, within: Array, step: Progress, choose: _Chooser
 ) -> Posed:
@@ -359,7 +370,10 @@ def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     np.minimum.at(least, owner, ends.distance)
     # Local minima that are farther away than another are no poses at the place.
     wanted = np.maximum(np.maximum(within, enough)[owner], least[owner] * (1.0 + 1e-9))
-    kept = ends.distance <= wanted
+    kept = np.flatnonzero(ends.distance <= wanted)
+    # Most descents to a place end in one pose.
+    same = np.column_stack([owner[kept], np.rint(rod.box.to_cube(ends.gamma[kept]) / _SAME)])
+    kept = kept[np.unique(same, axis=0, return_index=True)[1]]
     return _ranked(
         rules, places, owner[kept], ends.gamma[kept], ends.distance[kept], ends.tips[kept]
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +72,13 @@ class PoseRules:
 
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
+
+    def some(self, columns: Index) -> PoseRules:
+        """Some of the rules, by their columns."""
+        keeps = tuple(self.keeps[k] for k in columns if k < len(self.keeps))
+        limits = list(self.limits.items())
+        own = dict(limits[k - len(self.keeps)] for k in columns if k >= len(self.keeps))
+        return replace(self, keeps=keeps, limits=own)
 
     @property
     def rod(self) -> TipMap:

@@ -1,0 +1,195 @@
+"""Search of designs: the paper's problem, its question set free, and five places to reach.
+
+`python -m benchmarks.bench_search [paper | free | places]` prints Markdown tables; under
+pytest-benchmark one small search runs. The grid of the paper's problem takes ten minutes.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import optuna
+
+import softreach as sr
+from softreach.arm.parameters import changed
+from softreach.optimization import Search
+from softreach.optimization.free_parameters import free_parameters
+from softreach.optimization.problem import Candidate
+from softreach.optimization.search_file import read_search
+from softreach.support import parallel
+from softreach.support.errors import no_warnings
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+TURN = np.radians(360.0)
+PAPER = {"revolution": (0.0, np.radians(108.0)), "taper": (0.0, np.radians(3.0))}
+NAMES = ("left", "right", "longitudinal")
+OPEN = {
+    **{f"{name}.revolution": (-TURN, TURN) for name in NAMES},
+    "left.offset": (0.0, TURN),
+    "right.offset": (0.0, TURN),
+    "taper": (0.0, np.radians(3.2)),
+}
+EXTENTS = {f"{name}.extent": (np.radians(20.0), np.radians(110.0)) for name in NAMES}
+BOUNDS = {f"{name}.lower": (-5.0 / 3.0, -0.5) for name in NAMES}
+
+
+def trunk() -> sr.Manipulator:
+    """The paper's arm of three fibers."""
+    return sr.designs.minimal_trunk(revolution=np.radians(54.0), taper=np.radians(2.0))
+
+
+def paper(cells: int = 200) -> Iterator[str]:
+    """The paper's two parameters against a grid of exact sets."""
+    yield "| objective | best of the grid | found | share of it | designs | wall | CPU |"
+    yield "|---|---|---|---|---|---|---|"
+    volume, unreachability = grid(cells)
+    known = {"exact_volume": volume.max(), "exact_unreachability": unreachability.min()}
+    for name, best in known.items():
+        sense = "maximize" if name == "exact_volume" else "minimize"
+        found, wall, cpu = timed(trunk(), PAPER, designs=40, **{sense: name})
+        value = found.best.objectives[0]
+        yield (
+            f"| {name} | {best:.5f} | {value.value:.5f} ± {value.error:.0e} | "
+            f"{100 * value.value / best:.2f} % | {found.designs} | {wall:.1f} s | {cpu:.1f} s |"
+        )
+
+
+@no_warnings()
+def grid(cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """Volume and unreachability of all designs of a grid, each to 0.3 %."""
+    base = trunk()
+    axes = [np.linspace(*PAPER[name], cells) for name in PAPER]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    def of(place: np.ndarray) -> tuple[float, float]:
+        with parallel.undivided():
+            arm = changed(base, dict(zip(PAPER, place.tolist(), strict=True)))
+            solid = sr.reachable_set(arm, accuracy=1e-2)
+        return solid.volume, solid.unreachability
+
+    values = np.array(list(parallel.in_order(partial(of, place) for place in places)))
+    return values[:, 0], values[:, 1]
+
+
+def timed(base: Any, free: Mapping[str, Any], **options: Any) -> tuple[Search, float, float]:
+    """A search, its wall and its CPU time [s]."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    found = sr.search(base, free, **options)
+    return found, time.perf_counter() - wall, time.process_time() - cpu
+
+
+def freed(seeds: int = 10) -> Iterator[str]:
+    """The paper's question with more and more numbers free."""
+    yield "| free numbers | seeds | volume, median (least, largest) | designs | wall | CPU |"
+    yield "|---|---|---|---|---|---|"
+    ratio = {"radius_ratio": (0.5, 0.9)}
+    rows = [
+        ("three revolutions, two offsets, taper", OPEN, 160, seeds),
+        ("and extents", OPEN | EXTENTS, 300, 3),
+        ("and the radius ratio and the bounds", OPEN | EXTENTS | ratio | BOUNDS, 400, 3),
+    ]
+    for label, free, designs, count in rows:
+        runs = [
+            timed(trunk(), free, maximize="exact_volume", designs=designs, seed=seed)
+            for seed in range(count)
+        ]
+        values = np.array([found.best.objectives[0].value for found, _, _ in runs])
+        walls, cpus = (np.median([run[k] for run in runs]) for k in (1, 2))
+        spent = int(np.median([found.designs for found, _, _ in runs]))
+        yield (
+            f"| {label} | {count} | {np.median(values):.4f} ({values.min():.4f}, "
+            f"{values.max():.4f}) L³ | {spent} | {walls:.0f} s | {cpus:.0f} s |"
+        )
+
+
+METHODS: Mapping[str, Mapping[str, Any]] = {
+    "softreach": {},
+    "Optuna alone, CMA-ES": {"polish": False, "sampler": "cma"},
+    "Optuna alone, TPE": {"polish": False, "sampler": "tpe"},
+    "random": {"polish": False, "sampler": "random"},
+}
+
+
+def places(seeds: int = 10) -> Iterator[str]:
+    """Five places under two payloads in a box: least effort of three fibers, method by method."""
+    text = (EXAMPLES / "five_places.toml").read_text()
+    asked = read_search(text, EXAMPLES, lambda name: sr.Manipulator.load(EXAMPLES / name))
+    runs: dict[str, list[tuple[list[Candidate], float]]] = {}
+    for method, options in METHODS.items():
+        for seed in range(seeds):
+            log: list[Candidate] = []
+            cpu = time.process_time()
+            sr.search(
+                changed_bundles(asked.base),
+                asked.free,
+                asked.requirements,
+                minimize="worst_effort",
+                designs=150,
+                seed=seed,
+                follow=log.append,
+                **options,
+            )
+            runs.setdefault(method, []).append((log, time.process_time() - cpu))
+    best = min(least(log)[-1] for each in runs.values() for log, _ in each)
+    yield "| method | least effort, median of ten seeds | designs to 1 % of the best | CPU |"
+    yield "|---|---|---|---|"
+    for method, each in runs.items():
+        ends = np.median([least(log)[-1] for log, _ in each])
+        counts = [designs_to(log, 1.01 * best) for log, _ in each]
+        median = float(np.median(counts))
+        count = f"{median:.0f}" if np.isfinite(median) else "more than 150"
+        reached = sum(np.isfinite(counts))
+        cpu = np.median([seconds for _, seconds in each])
+        yield f"| {method} | {ends:.4f} | {count} ({reached} of {len(each)} seeds) | {cpu:.0f} s |"
+
+
+def changed_bundles(base: Any) -> sr.Manipulator:
+    """The arm of the example with three alike fibers."""
+    parameters = free_parameters(base, {"taper": (0.0, 0.01)}, {"bundles": [3]})
+    return parameters.arm({"taper": float(base.profile.taper), "bundles": 3})
+
+
+def least(log: Sequence[Candidate]) -> np.ndarray:
+    """Least effort of feasible designs so far; infinite without one."""
+    values = [each.objectives[0].value if each.is_feasible else np.inf for each in log]
+    return np.minimum.accumulate(values)
+
+
+def designs_to(log: Sequence[Candidate], value: float) -> float:
+    """Designs looked at until the least effort is as small."""
+    counts = np.cumsum([each.designs for each in log])
+    small = np.flatnonzero(least(log) <= value)
+    return float(counts[small[0]]) if len(small) else np.inf
+
+
+TABLES = {
+    "paper": ("the paper's problem, Ω and φ, against a grid of 200 × 200 exact sets", paper),
+    "free": ("the paper's question set free: largest volume of three fibers", freed),
+    "places": ("five places, two payloads, a box and a lamp: least effort of three fibers", places),
+}
+
+
+def main() -> None:
+    """Print the tables, or those named on the command line."""
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    for name in sys.argv[1:] if Path(sys.argv[0]).stem == "bench_search" else TABLES:
+        title, table = TABLES[name]
+        print(f"\n## Search: {title}\n", flush=True)
+        for row in table():
+            print(row, flush=True)
+
+
+def test_search(benchmark: Any) -> None:
+    """A small search of the paper's problem."""
+    options = {"maximize": "exact_volume", "designs": 12, "accuracy": 0.05}
+    benchmark(lambda: sr.search(trunk(), PAPER, **options))
+
+
+if __name__ == "__main__":
+    main()

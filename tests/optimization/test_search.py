@@ -1,0 +1,207 @@
+"""Laws of a search: what it finds, that it goes on, and that chance is in its seed alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.atlas import Metric
+from softreach.optimization.free_parameters import free_parameters
+from softreach.requirements import Limits, Requirements, Target
+from softreach.support.errors import InvalidInput
+
+ARM = sr.designs.minimal_trunk(material=sr.Material(young_modulus=1e6, density=1000.0))
+FREE = {"taper": (0.0, 0.05), "outer_radius": (0.06, 0.08), "revolution": (0.0, 1.8)}
+NEEDS = Requirements(limits=Limits(mass=8.0, shortening=0.9))
+FAST = dict(designs=12, accuracy=0.1)
+
+
+def heavy(**options):
+    """The heaviest arm that is not too heavy."""
+    return sr.search(ARM, FREE, NEEDS, maximize="mass", **{**FAST, **options})
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """That search without interruption or company."""
+    return heavy()
+
+
+def rows(search):
+    return [(each.values, each.objectives, each.excess) for each in search.candidates]
+
+
+def test_the_best_is_the_first_that_no_other_beats_and_meets_all(alone):
+    assert alone.met
+    assert alone.arm == alone.problem.parameters.arm(alone.best.values)
+    assert sr.check(alone.arm, NEEDS, accuracy=0.1).met
+    best = alone.best.objectives[0].value
+    assert best == pytest.approx(8.0, rel=1e-3)
+    assert best == pytest.approx(sr.describe(alone.arm).mass)
+    assert best >= max(each.objectives[0].value for each in alone.candidates if each.is_feasible)
+    assert alone.judged["bounds"] == sum(bool(each.missed) for each in alone.candidates) > 0
+    assert all(each.fidelity == "full" for each in alone.finalists)
+
+
+@pytest.mark.parametrize("threads", ["1", "3"])
+def test_the_same_seed_gives_the_same_designs_whatever_the_number_of_threads(
+    threads, alone, monkeypatch
+):
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", threads)
+    assert rows(heavy()) == rows(alone)
+
+
+def test_another_seed_gives_other_designs(alone):
+    assert rows(heavy(seed=1, polish=False)) != rows(alone)
+
+
+KILLED = """
+    import os, signal, sys
+    from tests.optimization.test_search import heavy
+    count = int(sys.argv[2])
+    def follow(candidate):
+        global count
+        count -= 1
+        if not count:
+            os.kill(os.getpid(), signal.SIGKILL)
+    print(heavy(storage=sys.argv[1], follow=follow).designs)
+"""
+
+
+def started(storage, count):
+    """A process with that search, killed after some designs, if there are so many."""
+    command = [sys.executable, "-c", textwrap.dedent(KILLED), str(storage), str(count)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+
+def assert_same_front(one, other):
+    ours, theirs = (np.array([each.objectives for each in x.front])[..., 0] for x in (one, other))
+    np.testing.assert_allclose(ours, theirs, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["search.journal", "search.db"])
+def test_a_search_that_was_killed_goes_on(name, tmp_path, alone):
+    storage = tmp_path / name
+    with started(storage, 6) as process:
+        process.communicate()
+    assert process.returncode == -9
+    seen = []
+    search = heavy(storage=storage, follow=seen.append)
+    assert len(seen) < len(search.candidates)
+    assert search.designs >= FAST["designs"]
+    assert_same_front(search, alone)
+    again = []
+    same = heavy(storage=storage, follow=again.append)
+    assert again == []
+    assert same.best == search.best
+
+
+def test_two_processes_share_a_search(tmp_path, alone):
+    storage = tmp_path / "search.journal"
+    with started(storage, -1) as process:
+        search = heavy(storage=storage)
+        process.communicate()
+    assert process.returncode == 0
+    both = heavy(storage=storage)
+    assert_same_front(both, alone)
+    assert search.designs <= both.designs <= 2 * alone.designs
+    values = [tuple(each.values.values()) for each in both.candidates if each.designs == 1]
+    assert len({*values}) == len(values)
+
+
+def test_the_storage_of_another_search_is_refused(tmp_path):
+    storage = tmp_path / "search.journal"
+    heavy(storage=storage, designs=1, polish=False)
+    with pytest.raises(InvalidInput, match=r"storage = .*another search: remove it, or choose"):
+        sr.search(ARM, FREE, NEEDS, minimize="mass", storage=storage, **FAST)
+
+
+@pytest.mark.parametrize("place", ["missing/search.journal", ".", "text.db"])
+def test_a_storage_that_cannot_be_used_is_refused_in_one_line(place, tmp_path):
+    (tmp_path / "text.db").write_text("no data base" * 100)
+    with pytest.raises(InvalidInput, match=r"^storage = [^\n]*$"):
+        heavy(storage=tmp_path / place)
+
+
+def test_without_an_objective_it_ends_with_the_first_design_that_meets_all():
+    search = sr.search(ARM, FREE, Requirements(limits=Limits(mass=5.0)), designs=5000, accuracy=0.1)
+    assert search.met
+    assert search.designs < 500
+    assert search.best.objectives == ()
+    assert sr.describe(search.arm).mass <= 5.0
+
+
+def test_what_no_design_reaches_is_proved_by_bounds_and_said():
+    far = Requirements(targets=(Target([[0, 0, 2.0]], name="moon"),), limits=Limits(mass=100.0))
+    search = sr.search(ARM, FREE, far, minimize="mass", polish=False, **FAST)
+    assert not search.met
+    assert search.judged["bounds"] == len(search.candidates)
+    assert "MISSED  moon: 1 m farther from the base" in repr(search).replace("0.999999", "1")
+
+
+def test_ties_follow_what_they_are_tied_to():
+    ties = {"right.offset": "-1*left.offset + 90deg", "left.offset": (0.0, 1.0)}
+    parameters = free_parameters(ARM, ties)
+    arm = parameters.arm({"left.offset": 0.3})
+    left, right = arm.actuators[0], arm.actuators[1]
+    assert left.offset == pytest.approx(0.3)
+    assert right.offset == pytest.approx(np.pi / 2 - 0.3)
+
+
+def test_choices_and_integers_are_among_those_allowed():
+    choices = {"bundles": [2, 3], "material": ["ecoflex_00_30", "spring_steel"]}
+    search = sr.search(
+        ARM, {"taper": (0.0, 0.02)}, minimize="mass", choices=choices, designs=16, accuracy=0.1
+    )
+    assert {each.values["bundles"] for each in search.candidates} == {2, 3}
+    assert search.best.values["material"] == "ecoflex_00_30"
+    assert len(search.arm.actuators) == search.best.values["bundles"]
+    table = search.to_dataset()
+    row = table.sel(parameter="material")
+    assert str(row.choices.values) == "ecoflex_00_30, spring_steel"
+    assert float(row.value[table.front.values].max()) == 0.0
+
+
+def test_designs_by_name_are_chosen_among():
+    long = sr.designs.minimal_trunk(length=1.5, material=ARM.section.rings[0].material)
+    designs = {"long": long, "short": ARM}
+    search = sr.search(designs, {"taper": (0.0, 0.02)}, minimize="mass", **FAST)
+    assert search.best.values["design"] == "short"
+
+
+def test_an_objective_that_no_design_has_is_said_in_one_line():
+    nothing = Metric(
+        name="hope", unit="1", meaning="no number", needs=(), compute=lambda: float("nan")
+    )
+    search = sr.search(ARM, FREE, maximize=nothing, polish=False, **FAST)
+    assert not search.met
+    assert "hope = nan: must be finite" in repr(search)
+    assert repr(search).startswith("Search: no design that can be judged was found")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (dict(free={"taper": (0.05, 0.0)}), "low < high"),
+        (dict(free={"tapr": (0.0, 0.05)}), 'did you mean "taper"'),
+        (dict(free={"taper": (0.0, 9.0)}), "in its range"),
+        (dict(free={**FREE, "left.offset": "offset"}), "another free parameter"),
+        (dict(free={}), "one parameter or more"),
+        (dict(free=FREE, maximize="mas"), 'did you mean "mass"'),
+        (dict(free=FREE, maximize="coverage"), "regions among the requirements"),
+        (dict(free=FREE, maximize="mass", minimize="mass"), "given once"),
+        (dict(free=FREE, designs=0), "whole number"),
+        (dict(free=FREE, sampler="luck"), "one of auto, cma"),
+        (dict(free=FREE, choices={"bundles": [0]}), "1 or more"),
+    ],
+)
+def test_what_cannot_be_searched_is_refused_in_one_line(arguments, said):
+    free = arguments.pop("free")
+    with pytest.raises(InvalidInput, match=said) as error:
+        sr.search(ARM, free, **arguments)
+    assert "\n" not in str(error.value)
