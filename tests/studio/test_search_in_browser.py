@@ -24,8 +24,10 @@ def test_needs_are_seen_met_and_missed_and_a_search_finds_a_design_that_meets_th
     assert len(tab.drawn("/needs/reached").points) == 1
 
     tab.open("Design")
+    tab.page.get_by_text("needs: 1 of 2 met · place 2 missed by").wait_for()
     tab.drag("taper φ [deg]", -60)
     tab.wait(lambda: tab.drawn("/needs/missed") is None, "the cross is a ball")
+    tab.page.get_by_text("needs: 2 of 2 met").wait_for()
     tab.settle()
     assert len(tab.drawn("/needs/reached").points) == 2
     tab.open("Search")

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
-from softreach.requirements import Box, Keep, Requirements, Target
+from softreach.requirements import Box, Check, Finding, Keep, Requirements, Target
+from softreach.requirements.findings import shown_unit
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 from softreach.support.units import LengthUnit
 
@@ -15,7 +16,9 @@ __all__ = [
     "LARGEST",
     "needs_of_text",
     "needs_parts",
+    "reach_text",
     "requirements_of",
+    "verdict_text",
     "with_box",
     "with_payload",
     "with_place",
@@ -143,3 +146,29 @@ def needs_parts(
             measures={each: ends for each, ends in now.measures.items() if each != out}
         )
     return parts
+
+
+def reach_text(check: Check, finding: Finding) -> str:
+    """A target in words: reached, or missed by its largest gap."""
+    needs = check.requirements
+    index = next(k for k, target in enumerate(needs.targets) if target.name == finding.name)
+    own = check.target_of == index
+    gap, unit = float(check.gaps[:, own].max()) - needs.targets[index].within, shown_unit(check.arm)
+    reached = int(check.reached[:, own].all(axis=0).sum())
+    many = f"{reached} of {int(own.sum())} places, " if own.sum() > 1 else ""
+    if finding.met:
+        return f"{many}reached"
+    if "not held" in finding.text:
+        return f"{many}not held: no stable equilibrium"
+    return f"{many}missed by {gap / unit.size:.3g} {unit.name}"
+
+
+def verdict_text(check: Check) -> str:
+    """Number of needs that are met, and the worst that is missed, in words."""
+    missed = [finding for finding in check.findings if not finding.met]
+    text = f"needs: {len(check.findings) - len(missed)} of {len(check.findings)} met"
+    if not missed:
+        return text
+    worst = max(missed, key=lambda finding: finding.excess)
+    more = f" {reach_text(check, worst)}" if worst.kind == "reach" else ""
+    return f"{text} · {worst.name}{more}"

@@ -20,6 +20,7 @@ from softreach.studio.needs import (
     LARGEST,
     needs_of_text,
     needs_parts,
+    reach_text,
     requirements_of,
     with_box,
     with_payload,
@@ -349,22 +350,8 @@ def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
     color, sign = (REACHED, "\N{CHECK MARK}") if finding.met else (MISSED, "\N{MULTIPLICATION X}")
     text = finding.text
     if finding.kind == "reach":
-        text = _reach_text(check, finding)
+        text = reach_text(check, finding)
     return Swatch(color), f" {sign} ", Term(finding.name, finding.text), f": {text}"
-
-
-def _reach_text(check: Check, finding: Finding) -> str:
-    needs = check.requirements
-    index = next(k for k, target in enumerate(needs.targets) if target.name == finding.name)
-    own = check.target_of == index
-    gap, unit = float(check.gaps[:, own].max()) - needs.targets[index].within, shown_unit(check.arm)
-    reached = int(check.reached[:, own].all(axis=0).sum())
-    many = f"{reached} of {int(own.sum())} places, " if own.sum() > 1 else ""
-    if finding.met:
-        return f"{many}reached"
-    if "not held" in finding.text:
-        return f"{many}not held: no stable equilibrium"
-    return f"{many}missed by {gap / unit.size:.3g} {unit.name}"
 
 
 def _summary(run: SearchRun) -> tuple[Part, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from softreach.studio.captions import legend_text, loads_text, reach_text
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.markup import Part, Strong, fields_style
+from softreach.studio.needs import verdict_text
 from softreach.studio.scene.clouds import key_html
 from softreach.studio.widgets import Line
 
@@ -31,6 +32,7 @@ class StatusPanel:
         Line(gui).show(fields_style())
         self._numbers = Line(gui, "computing ...")
         self._comparison = Line(gui)
+        self._needs = Line(gui)
         self._key = Line(gui)
         self._legend = Line(gui)
         self._refusal = Line(gui)
@@ -43,6 +45,8 @@ class StatusPanel:
         """Show what is known, and whether it is about to change."""
         self._numbers.say(*_numbers_text(session))
         self._comparison.say(*loads_text(session))
+        check = session.check
+        self._needs.say(*((verdict_text(check),) if check is not None else ()))
         self._key.show(key_html(session.key))
         self._explain_marks(session)
         self._note.say(*((session.note,) if session.note else ()))
