@@ -20,7 +20,9 @@ from tests.studio.test_handle_in_browser import pose
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
+from softreach.requirements import Requirements, Target
 from softreach.studio import Studio
+from softreach.studio.jobs.search import SearchDesigns
 from softreach.studio.settings import PlotSettings
 from softreach.studio.start import start_on_design
 
@@ -31,6 +33,7 @@ MOST = 250_000  # bytes
 NOTICE = ".mantine-Notification-closeButton"  # of the note on missing graphics cards
 CURLED = (-0.7, -0.4, -0.9)
 FOLDED = designs.minimal_trunk(revolution=np.radians(36), taper=np.radians(3))
+PLACES = {"shelf": (0.37, 0.15, 0.85), "tray": (-0.1, -0.35, 0.6), "bin": (0.3, -0.3, 0.45)}
 TWICE = (-0.4, -0.65, -0.18)  # brings it where one more activation does
 
 
@@ -80,6 +83,20 @@ def studio_compare(tab: Tab) -> None:
         take(tab, name)
 
 
+def studio_search(tab: Tab) -> None:
+    """Three places, one of them missed, and the front of a search."""
+    pose(tab, CURLED)
+    needs = Requirements(targets=[Target([place], name=name) for name, place in PLACES.items()])  # pyright: ignore[reportArgumentType]
+    tab.session.update(lambda state: state.replace(needs=needs.to_toml()))
+    tab.settle()
+    tab.open("Search")
+    search = tab.session.job(SearchDesigns)
+    search.free = {"taper": (0.0, 0.05), "revolution": (1.0, 3.0), "left.offset": (0.0, 3.0)}
+    search.maximize, search.minimize, search.designs = ("exact_volume",), ("mean_effort",), 400
+    search.ask()
+    tab.wait(lambda: tab.session.search and tab.session.search.result, "the search is complete")
+
+
 def studio_phone(tab: Tab) -> None:
     """The sheet of controls under the scene."""
     tab.session.update(lambda state: state.replace(activation=CURLED))
@@ -90,6 +107,7 @@ SCENES: dict[str, Callable[[Tab], None]] = {
     "studio-handle": studio_handle,
     "studio-plots": studio_plots,
     "studio-compare": studio_compare,
+    "studio-search": studio_search,
     "studio-phone": studio_phone,
 }
 
@@ -107,7 +125,7 @@ def main() -> None:
 def take_picture(browser: object, running: Studio, name: str) -> None:
     """Open a tab of the right size, bring it into its state, and save what it shows."""
     width, height = PHONE if name.endswith("phone") else LAPTOP
-    tab = Tab(browser, running, width=width, height=height)
+    tab = Tab(browser, running, (width, height))
     SCENES[name](tab)
     tab.settle()
     tab.page.locator(NOTICE).first.click()

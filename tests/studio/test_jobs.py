@@ -6,6 +6,7 @@ from hypothesis import given
 
 from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
+from softreach.requirements import Requirements
 from softreach.studio.app import JOBS
 from softreach.studio.jobs.beside import DrawFree, DrawReference
 from softreach.studio.jobs.calibration import DrawSample
@@ -19,6 +20,7 @@ from softreach.studio.jobs.reach import (
     DrawSurfaces,
     FollowCamera,
 )
+from softreach.studio.jobs.search import CheckNeeds, DrawSearch
 from softreach.studio.plots import PLOTS
 from softreach.studio.session import what_follows
 from softreach.studio.settings import PlotSettings
@@ -26,6 +28,7 @@ from softreach.studio.state import Camera, MapView, Slice, StudioState
 from tests.studio.test_state import states
 
 _PLOT = {plot.name: job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True)}
+NEEDS = Requirements(payloads=(0.0,)).to_toml()
 ALONG_ARM, SECTION = _PLOT["along_arm"], _PLOT["section"]
 
 
@@ -47,7 +50,8 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
         state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowCamera},
         state.showing(cut="half"): {FollowCamera},
         state.showing(orthographic=True): {FollowCamera},
-        state.showing(dark=True): {SetTheme},
+        state.showing(dark=True): {SetTheme, DrawSearch},
+        state.replace(needs=NEEDS): {CheckNeeds, FollowCamera},
         state.replace(reference=trunk): {DrawReference},
         state.replace(design=other): {ComputeReach, DrawArm, DrawMap, DrawSample},
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
@@ -59,7 +63,8 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
 def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(trunk):
     plots = PlotSettings(shown=("along_arm", "section"))
     bare = StudioState(design=trunk)
-    full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk).showing(surface=True, plots=plots)
+    full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk, needs=NEEDS)
+    full = full.showing(surface=True, plots=plots)
     other = changed(trunk, {"taper": 0.01})
     moves = {
         full.replace(design=other): {
@@ -68,6 +73,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
             DrawMap,
             DrawSample,
             SolveInverse,
+            CheckNeeds,
             ALONG_ARM,
         },
         full.showing(slice=Slice(axis="x")): {
@@ -81,6 +87,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
         full.showing(plots=PlotSettings()): {ALONG_ARM, SECTION},
         full.replace(target=None): {SolveInverse, FollowCamera},
         full.replace(reference=None): {DrawReference},
+        full.replace(needs=""): {CheckNeeds, FollowCamera},
     }
     for new, jobs in moves.items():
         assert what_follows(JOBS, full, new) == jobs | {KeepState}

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
+from softreach.requirements import Requirements, Target
 from softreach.studio.state import (
     LEVELS,
     Appearance,
@@ -24,6 +25,7 @@ from tests.laws import arm_of, arms
 
 numbers = st.floats(-3, 3)
 vectors = st.tuples(numbers, numbers, numbers)
+NEEDS = Requirements(targets=(Target([(0.1, 0.0, 0.8)]),), payloads=(0.2,)).to_toml()
 
 
 @st.composite
@@ -45,6 +47,7 @@ def states(draw: st.DrawFn) -> StudioState:
         reference=draw(st.none() | st.just(designs.redundant_trunk())),
         side_by_side=draw(st.booleans()),
         camera=draw(st.none() | st.builds(Camera, position=vectors, look_at=vectors)),
+        needs=draw(st.sampled_from(["", NEEDS])),
     )
 
 

@@ -24,6 +24,7 @@ from softreach.studio.jobs.reach import (
     DrawSurfaces,
     FollowCamera,
 )
+from softreach.studio.jobs.search import CheckNeeds, ConfirmNeeds, DrawSearch, SearchDesigns
 from softreach.studio.scene.camera import framing
 from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
 from softreach.studio.serve.server import page_url, start_server, stop_server
@@ -47,6 +48,7 @@ JOBS: tuple[type[Job], ...] = (
     SolveInverse, DragTip,
     FollowPath, PlayPath, WriteMovie,
     DrawSample, FitArm,
+    CheckNeeds, ConfirmNeeds, SearchDesigns, DrawSearch,
     *PLOT_JOBS,
     DrawMap, SetTheme, KeepState,
 )  # fmt: skip
@@ -239,6 +241,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.tabs.parts import PartsPanel
     from softreach.studio.tabs.path import PathPanel
     from softreach.studio.tabs.plots import PlotsPanel
+    from softreach.studio.tabs.search import SearchPanel
     from softreach.studio.tabs.status import StatusPanel, add_history
     from softreach.studio.tabs.view import ViewPanel
 
@@ -257,6 +260,7 @@ def _furnish(session: Session, url: str) -> None:
         "Plots": (PlotsPanel,),
         "Compare": (ComparePanel,),
         "Calibrate": (CalibratePanel,),
+        "Search": (SearchPanel,),
     }
     for name, together in kinds.items():
         tab = tabs.add_tab(name)
@@ -265,7 +269,7 @@ def _furnish(session: Session, url: str) -> None:
     if session.board is not None:
         made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.board))
     session.panels = made
-    clickable = AtlasPanel | PathPanel | InversePanel
+    clickable = AtlasPanel | SearchPanel | PathPanel | InversePanel
     waiting = [panel for panel in reversed(made) if isinstance(panel, clickable)]
 
     @session.client.scene.on_click()

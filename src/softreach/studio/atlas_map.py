@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameter
 from softreach.atlas import over_length
 from softreach.plot.metric_map import metric_label, plot_metric_map
-from softreach.studio.scene.camera import plane_crossing
+from softreach.studio.scene.board import Board
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import MapView
 from softreach.support.errors import InvalidInput
@@ -264,18 +264,6 @@ def _command(atlas: xr.Dataset) -> dict[str, int | float | str]:
 
 Array = NDArray[np.float64]
 
-_ANGLE = 0.5  # [rad] about z, so that the board faces the camera of a new tab
-_RIGHT = np.array([np.cos(_ANGLE), np.sin(_ANGLE), 0.0])
-_UP = np.array([0.0, 0.0, 1.0])
-_SIZE = 1.7  # [L]
-_TURN = (  # the picture's right goes to _RIGHT, its down to -z
-    np.sqrt(0.5) * np.cos(_ANGLE / 2),
-    -np.sqrt(0.5) * np.cos(_ANGLE / 2),
-    -np.sqrt(0.5) * np.sin(_ANGLE / 2),
-    np.sqrt(0.5) * np.sin(_ANGLE / 2),
-)
-_CENTER = -2.0 * _RIGHT + 0.4 * _UP
-
 
 class MapBoard:
     """The board of one tab."""
@@ -283,6 +271,7 @@ class MapBoard:
     def __init__(self, scene: Scene, atlas: xr.Dataset) -> None:
         """Nothing is drawn yet."""
         self._scene, self.atlas = scene, atlas
+        self._board = Board(scene, "/atlas/map")
         self.map: AtlasMap | None = None
         """The map that is drawn."""
         self._drawn: tuple[MapView, dict[str, int]] | None = None
@@ -299,32 +288,27 @@ class MapBoard:
             self._drawn = content
             self._scene.remove("/atlas")
             if self.map is not None:
-                self._scene.draw_picture("/atlas/map", self.map.image, _SIZE, _CENTER, _TURN)
+                self._board.draw(self.map.image)
         self._mark(design)
 
     def parameters_under(
         self, origin: Sequence[float], direction: Sequence[float]
     ) -> dict[str, float] | None:
         """The place of the atlas under the cursor, {} beside the axes, None beside the board."""
-        hit = plane_crossing(origin, direction, _CENTER, np.cross(_UP, _RIGHT))
-        if self.map is None or hit is None:
+        place = self._board.place_under(origin, direction)
+        if self.map is None or place is None:
             return None
-        right, up = (hit - _CENTER) @ np.stack([_RIGHT, _UP]).T / _SIZE + 0.5
-        if not (0 <= right <= 1 and 0 <= up <= 1):
-            return None
-        return self.map.parameters_at(float(right), float(up)) or {}
+        return self.map.parameters_at(*place) or {}
 
     def place_of(self, **at: float) -> Array:
         """Place in the scene where the map shows a design [L]."""
         assert self.map is not None
-        right, up = self.map.place_of(**at)
-        return _CENTER + _SIZE * ((right - 0.5) * _RIGHT + (up - 0.5) * _UP)
+        return self._board.in_scene(*self.map.place_of(**at))
 
     @property
     def corners(self) -> Array:
         """Corners of the board in the scene [L], shape (4, 3)."""
-        ends = (-_SIZE / 2, _SIZE / 2)
-        return np.array([_CENTER + right * _RIGHT + up * _UP for right in ends for up in ends])
+        return self._board.corners
 
     def _mark(self, design: Manipulator) -> None:
         self._scene.remove("/atlas/here")

@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
     from softreach.plot.coloring import BundleKey, ScalarKey
+    from softreach.requirements import Check
     from softreach.studio.jobs.calibration import Bench
+    from softreach.studio.jobs.search import SearchRun
     from softreach.studio.scene.drag import TipDrag
 
 __all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
@@ -189,6 +191,12 @@ class Session:
         """True while a drag of the tip is under way."""
         self.bench: Bench | None = None
         """Measured poses, and what was fitted to them."""
+        self.check: Check | None = None
+        """The design against its needs, or the design before it until that is known."""
+        self.check_refusal = ""
+        """Reason why it cannot be judged."""
+        self.search: SearchRun | None = None
+        """The search that was begun last."""
         self.figures = Figures()
         """Results of the plots beside the scene."""
         self.atlas: xr.Dataset | None = start.atlas
@@ -387,6 +395,7 @@ class Session:
         # viser may hold on to what belongs to a page for a while; clouds are large.
         self.reach = self.free = self.reference = self.answer = self.atlas = None
         self.panels, self.trail, self.figures, self.bench = [], [], Figures(), None
+        self.check = self.search = None
         self._shown.clear()
 
     def _rested(self) -> None:

@@ -17,6 +17,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
+from softreach.studio.needs import requirements_of
 from softreach.studio.settings import PlotSettings, TipPath
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
 
@@ -206,10 +207,13 @@ class StudioState:
     camera: Camera | None = None
     path: TipPath | None = None
     """Path that the tip follows."""
+    needs: str = ""
+    """Requirements of the design, as TOML; "" for none."""
 
     def __post_init__(self) -> None:
         if self.reference is not None:
             rod_of(self.reference)
+        requirements_of(self.needs)
         within = _within(rod_of(self.design).box, self.activation)
         object.__setattr__(self, "activation", within)
 
@@ -253,7 +257,7 @@ class StudioState:
             raise InvalidInput("state file", str(error), "one that the studio saved") from None
 
 
-_PLAIN = ("activation", "target", "side_by_side")
+_PLAIN = ("activation", "target", "side_by_side", "needs")
 
 
 def _parsed(text: str | bytes) -> dict[str, Any]:
@@ -282,6 +286,7 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "side_by_side": bool(values["side_by_side"]),
         "camera": camera and Camera(**{name: vector(v) for name, v in camera.items()}),
         "path": path and TipPath.from_fields(path),
+        "needs": str(values.get("needs", "")),
     }
 
 
@@ -322,7 +327,7 @@ def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...
 
 _LONGEST = 200  # steps back
 _PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
-_SETTINGS = ("design", "reference", "side_by_side")
+_SETTINGS = ("design", "reference", "side_by_side", "needs")
 _POSE = ("activation", "target")
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.jobs.plots import plots_from
 from softreach.studio.multiplicity import count_activations, uncounted
+from softreach.studio.needs import requirements_of
 from softreach.studio.reach import Reach, shown_rows, stages
 from softreach.studio.scene.camera import Viewpoint, is_behind
 from softreach.studio.scene.clouds import shown_color
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 _LONGEST_TRAIL = 2000
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _TARGET = 0.02  # [L]
+_MOST_PLACES = 40  # that a view is cut free to
 _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 _NOTHING = np.empty((0, 3)), np.empty(0)
 
@@ -211,11 +213,11 @@ class DrawArm(Job):
 
 
 class FollowCamera(Job):
-    """Cuts away what is in front of the arm and the target, and turns the axes to the camera."""
+    """Cuts away what hides the arm and places to reach, and turns the axes to the camera."""
 
     depends_on = (
         "appearance.cut", "appearance.arm", "appearance.handle", "appearance.orthographic",
-        "target",
+        "target", "needs",
     )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
@@ -244,9 +246,11 @@ class FollowCamera(Job):
         session, state = self.session, self.session.state
         camera = session.camera.actual()
         centers, radii = session.scene.spine if state.appearance.arm else _NOTHING
+        places = requirements_of(state.needs).places[:_MOST_PLACES]
         if state.target is not None:
-            target = np.asarray(state.target) / state.design.length
-            centers, radii = np.vstack([centers, target]), np.append(radii, _TARGET)
+            places = np.vstack([places, state.target])
+        centers = np.vstack([centers, places / state.design.length])
+        radii = np.append(radii, np.full(len(places), _TARGET))
         return Viewpoint(
             position=np.asarray(camera.position),
             look_at=np.asarray(camera.look_at),

@@ -112,12 +112,14 @@ def without_tunnel(server: ViserServer) -> None:
 
 _THEIRS = "<title>Viser</title>"
 # viser's sheet for phones leaves a third of the width unused, and tabs break into two lines.
-# Eleven tabs just fit, twelve in smaller letters; where they do not, the line can be moved.
+# Eleven tabs just fit, more in smaller letters; where they do not, the line can be moved.
 _OURS = """<title>softreach</title><style>
 [role="tablist"]:has([role="tab"]){flex-wrap:nowrap!important;overflow-x:auto;scrollbar-width:none}
 [role="tab"]{padding-inline:0.12em!important;font-size:0.7rem!important;flex:1 0 auto!important;
 letter-spacing:-0.02em}
-[role="tablist"]:has([role="tab"]:nth-child(12)) [role="tab"]{font-size:0.65rem!important}
+[role="tablist"]:has([role="tab"]:nth-child(12)) [role="tab"]{font-size:0.63rem!important}
+[role="tablist"]:has([role="tab"]:nth-child(13)) [role="tab"]{font-size:0.6rem!important;
+letter-spacing:-0.03em}
 [role="tab"]:only-of-type{flex:none!important}
 input{text-overflow:ellipsis}
 @media (max-width:36em){

@@ -1,0 +1,344 @@
+"""Needs and search in a tab without a browser: judged live, searched for, loaded and undone."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import softreach as sr
+import softreach.studio.jobs.search as jobs
+from softreach.arm import designs
+from softreach.arm.parameters import changed
+from softreach.optimization.free_parameters import free_parameters
+from softreach.requirements import Requirements, Target
+from softreach.rod.kinematics import tip_positions
+from softreach.studio import Studio
+from softreach.studio.jobs.inverse import SolveInverse
+from softreach.studio.jobs.search import DrawSearch
+from softreach.studio.needs import requirements_of
+from softreach.studio.scene.needs import MISSED
+from softreach.studio.search_ranges import ranges_of, slider_range
+from softreach.studio.session import Session
+from softreach.studio.shown_parameters import slider_parameters
+from softreach.studio.tabs.search import SearchPanel
+from softreach.support.errors import SoftreachError
+from tests.studio.sockets import page
+
+ARM = designs.minimal_trunk(length=0.4)
+POSE = (-0.7, -0.4, -0.9)
+REACHED = tip_positions(ARM, [POSE])[0]
+FAR = (0.3, 0.1, 0.42)
+
+
+@pytest.fixture(scope="module")
+def opened(studio: Studio) -> Iterator[Session]:
+    with page(studio) as session:
+        yield session
+
+
+@pytest.fixture
+def session(opened, monkeypatch) -> Session:
+    monkeypatch.setattr(jobs, "_PAUSE", 0.0)
+    monkeypatch.setattr(jobs, "_BETWEEN", 0.0)
+    panel = panel_of(opened)
+    panel._forget()
+    panel._free.value = ""
+    panel._first.value, panel._second.value = "maximize exact_volume", "nothing more"
+    opened.update(lambda state: state.replace(design=ARM, activation=POSE, needs="", target=None))
+    opened.settle()
+    opened.end_step()
+    return opened
+
+
+def panel_of(session) -> SearchPanel:
+    return next(panel for panel in session.panels if isinstance(panel, SearchPanel))
+
+
+def added(session, kind, text="") -> None:
+    panel = panel_of(session)
+    panel._kind.value, panel._field.value = kind, text
+    panel._added()
+    session.settle()
+
+
+def verdict(session) -> str:
+    return panel_of(session)._verdict._widget.content
+
+
+def drawn(session, name):
+    return session.client.scene.get_handle_by_name(f"/needs{name}")
+
+
+def searched(session, free, first, second="nothing more", designs=6) -> None:
+    panel = panel_of(session)
+    panel._free.value, panel._designs.value = free, designs
+    panel._first.value, panel._second.value = first, second
+    panel._ask()
+    session.settle()
+
+
+def test_a_place_is_a_ball_where_it_is_reached_and_a_cross_with_its_gap_where_it_is_not(session):
+    added(session, "place to reach")  # where the tip is
+    added(session, "place to reach", ", ".join(str(1e3 * x) for x in FAR))
+    exact = sr.check(ARM, requirements_of(session.state.needs))
+    np.testing.assert_allclose(exact.places, [REACHED, FAR], atol=1e-5)
+    gap = exact.gaps.max()
+    assert "place 1</b>: reached" in verdict(session)
+    assert f"place 2</b>: missed by {1e3 * gap:.3g} mm" in verdict(session)
+    np.testing.assert_allclose(drawn(session, "/reached").points, [REACHED / 0.4], atol=1e-5)
+    cross = drawn(session, "/missed").points
+    np.testing.assert_allclose(cross.mean(axis=(0, 1)), np.array(FAR) / 0.4, atol=1e-6)
+    ((place, nearest),) = drawn(session, "/gaps").points
+    np.testing.assert_allclose(np.linalg.norm(place - nearest), gap / 0.4, rtol=1e-3)
+    assert drawn(session, "/label 1").text == f"{1e3 * gap:.3g} mm"
+    session.step(back=True)
+    session.settle()
+    assert "place 2" not in verdict(session)
+    assert drawn(session, "/missed") is None
+
+
+def test_the_gap_follows_the_design(session, monkeypatch):
+    monkeypatch.setattr(jobs.ConfirmNeeds, "run", lambda *_: None)
+    added(session, "place to reach", "150, 60, 330")
+    gaps = []
+    for taper in (0.0, 0.05):
+        session.update(lambda s, taper=taper: s.replace(design=changed(ARM, {"taper": taper})))
+        session.settle()
+        assert session.check.arm == session.state.design
+        gaps.append(float(session.check.gaps.max()))
+    assert gaps[0] < 1e-6 < 1e-3 < gaps[1]
+    assert "missed by" in verdict(session)
+
+
+def test_a_place_can_be_the_target(session, monkeypatch):
+    monkeypatch.setattr(SolveInverse, "run", lambda *_: None)
+    with pytest.raises(sr.InvalidInput, match="tab Inverse"):
+        added(session, "place at the target")
+    session.update(lambda state: state.replace(target=(0.05, 0.0, 0.3)))
+    added(session, "place at the target")
+    assert requirements_of(session.state.needs).places.tolist() == [[0.05, 0.0, 0.3]]
+
+
+def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_drawn(session):
+    added(session, "place to reach")
+    added(session, "box to stay inside")
+    added(session, "box to avoid", "-20, -20, 90, 20, 20, 140")
+    inside, avoid = drawn(session, "/region 0"), drawn(session, "/region 1")
+    np.testing.assert_allclose(
+        [inside.points.min(axis=(0, 1)), inside.points.max(axis=(0, 1))],
+        session.scene.axes.corners,
+        atol=1e-5,
+    )
+    broken = [tuple(np.asarray(node.colors).ravel()[:3]) == MISSED for node in (inside, avoid)]
+    assert broken == [False, True]
+    assert "the arm keeps" in verdict(session)
+    assert "inside or too near" in verdict(session)
+
+
+def test_what_quick_poses_miss_is_looked_at_again(session, monkeypatch):
+    plain = jobs.quick_check
+
+    def blind(*arguments):
+        made = plain(*arguments)
+        wrong = tuple(dataclasses.replace(each, met=False) for each in made.findings)
+        return dataclasses.replace(made, findings=wrong, gaps=made.gaps + 0.1)
+
+    monkeypatch.setattr(jobs, "quick_check", blind)
+    added(session, "place to reach")
+    assert session.check.met
+    assert "place 1</b>: reached" in verdict(session)
+
+
+def test_needs_are_removed_one_by_one_or_all(session):
+    added(session, "place to reach")
+    added(session, "most shortening", "90")
+    panel = panel_of(session)
+    assert tuple(panel._part.options)[1:] == ("limit of shortening", "everything")
+    panel._part.value = "limit of shortening"
+    panel._removed()
+    session.settle()
+    assert tuple(panel._part.options)[1:] == ("everything",)
+    panel._part.value = "everything"
+    panel._removed()
+    session.settle()
+    assert session.state.needs == ""
+    assert session.check is None
+    assert drawn(session, "") is None
+    assert not panel._part.visible
+
+
+def test_a_payload_without_a_modulus_is_refused_below_the_needs(session):
+    added(session, "payload", "50")
+    assert requirements_of(session.state.needs).payloads == (0.05,)
+    added(session, "place to reach")
+    assert "modulus" in panel_of(session)._refusal._widget.content
+    assert session.check is None
+
+
+def test_files_are_read_in_lengths_of_the_design(session):
+    text = '[[reach]]\nname = "shelf"\nplaces = ["0.3L, 0.1L, 0.8L"]\n[search]\ndesigns = 9\n'
+    panel_of(session)._read(SimpleNamespace(name="needs.toml", content=text.encode()))
+    session.settle()
+    places = requirements_of(session.state.needs).places
+    np.testing.assert_allclose(places, [[0.12, 0.04, 0.32]], rtol=1e-12)
+    assert "shelf" in verdict(session)
+
+
+BAD_FILES = {
+    "bytes": (b"\xff\xfe", "UTF-8"),
+    "no toml": (b"[[reach", "TOML"),
+    "a key": (b"[[reech]]", "reech"),
+    "a file": (b'[[reach]]\nfile = "/etc/passwd"', "not sent along"),
+    "a mesh": (b'[[stay_inside]]\nmesh = "/etc/passwd"', "not sent along"),
+    "many": (f"[[reach]]\nplaces_m = {[[0, 0, 1]] * 301}".encode(), "at most 300"),
+    "large": (b"#" * 1_000_001, "at most 1 MB"),
+}
+
+
+def test_a_file_of_no_needs_is_refused_and_the_needs_before_stay(opened):
+    before = opened.state
+    for content, words in BAD_FILES.values():
+        with pytest.raises(SoftreachError, match=words) as caught:
+            panel_of(opened)._read(SimpleNamespace(name="<b>.toml", content=content))
+        assert "root" not in str(caught.value)
+        assert opened.state == before
+
+
+BAD_NUMBERS = [
+    ("place to reach", "1, 2", "three numbers"),
+    ("place to reach", "a, b, c", "three numbers"),
+    ("box to avoid", "", "six numbers"),
+    ("box to stay inside", "0, 0, 0, 1, 1, 0", "low along z"),
+    ("payload", "", "a number"),
+    ("payload", "-1", "payloads"),
+    ("most shortening", "300", "shortening"),
+]
+
+
+def test_numbers_that_make_no_need_are_refused(opened):
+    before = opened.state
+    for kind, text, words in BAD_NUMBERS:
+        with pytest.raises(SoftreachError, match=words):
+            added(opened, kind, text)
+        assert opened.state == before
+
+
+def test_a_search_fills_its_picture_and_its_best_is_loaded_and_undone(session):
+    added(session, "place to reach")
+    told = []
+    session.report, plain = lambda text: (told.append(text), plain(text))[1], session.report
+    searched(session, "taper = 0:3", "maximize exact_volume")
+    session.report = plain
+    run, panel = session.search, panel_of(session)
+    assert any(text.startswith("searching, ") for text in told)
+    assert run.result is not None
+    assert len(run.candidates) >= 6
+    assert "computed to full accuracy" in panel._summary._widget.content
+    assert "taper φ [deg]" in panel._values._widget.content
+    panel._loaded()
+    session.settle()
+    assert session.state.design == run.result.arm
+    assert session.check.met
+    session.step(back=True)
+    session.settle()
+    assert session.state.design == ARM
+
+    # A click on a point of the board does the same.
+    candidate, place = run.picture.candidates[-1], run.picture.places[-1]
+    at = session.job(DrawSearch).board.in_scene(*place)
+    origin = np.array([2.1, -3.85, 1.45])
+    assert panel.click(origin, at - origin)
+    session.settle()
+    assert session.state.design == run.arm(candidate)
+    assert not panel.click(origin, np.array([0.0, 0.0, 1.0]))
+    panel._forget()
+    session.settle()
+    assert session.client.scene.get_handle_by_name("/search") is None
+    assert not panel.click(origin, at - origin)
+    assert not panel._take.visible
+
+
+def test_two_objectives_have_a_front_whose_designs_are_loaded_one_by_one(session):
+    added(session, "place to reach")
+    searched(session, "taper, revolution = 60:120", "maximize exact_volume", "minimize mean_effort")
+    run, panel = session.search, panel_of(session)
+    assert [goal.sense for goal in run.problem.goals] == [1.0, -1.0]
+    assert panel._at.visible == (len(run.front) > 1)
+    for k, candidate in enumerate(run.front, 1):
+        panel._at.value = k
+        panel._loaded()
+        assert session.state.design == run.arm(candidate)
+
+
+def test_a_canceled_search_keeps_what_it_has_judged(session, monkeypatch):
+    def canceled_soon(*arguments, follow, **options):
+        def judged(candidate):
+            session.cancel()
+            follow(candidate)
+
+        return plain(*arguments, follow=lambda c: (follow(c), judged(c)), **options)
+
+    plain = jobs.search
+    monkeypatch.setattr(jobs, "search", canceled_soon)
+    searched(session, "taper", "maximize exact_volume", designs=50)
+    assert "Canceled" in session.note
+    assert session.search.result is None
+    assert len(session.search.candidates) == 1
+    panel_of(session)._loaded()
+    assert session.state.design == session.search.arm(session.search.candidates[0])
+
+
+BAD_SEARCHES = [
+    ("", "maximize exact_volume", "nothing more", "one parameter or more"),
+    ("tapper", "maximize exact_volume", "nothing more", "taper"),
+    ("taper = 3:0", "maximize exact_volume", "nothing more", "low < high"),
+    ("taper = a:b", "maximize exact_volume", "nothing more", "a range such as 0:3"),
+    ("taper, taper", "maximize exact_volume", "nothing more", "given once"),
+    ("taper", "maximize coverage", "nothing more", "regions"),
+    ("taper", "maximize mass", "minimize mass", "given once"),
+    ("taper", "nothing more", "nothing more", "no needs"),
+]
+
+
+def test_a_search_that_cannot_be_is_refused_in_one_line(session):
+    for free, first, second, words in BAD_SEARCHES:
+        session.say("")
+        try:
+            searched(session, free, first, second)
+            said = session.note
+        except SoftreachError as error:  # which the button shows
+            said = str(error)
+        assert words in said
+        assert "\n" not in said
+        assert session.search is None
+
+
+def test_ranges_are_typed_in_the_units_of_sliders(trunk):
+    typed = ranges_of("taper = -1:3, revolution, left.offset = -right.offset", trunk)
+    assert typed["taper"] == pytest.approx(np.radians([-1, 3]))
+    assert typed["revolution"] == pytest.approx(np.radians([1, 360]))
+    assert typed["left.offset"] == "-right.offset"
+
+
+@pytest.mark.parametrize("name", ["minimal_trunk", "lce_arm", "redundant_trunk"])
+def test_the_range_of_every_slider_can_be_searched(name):
+    arm = getattr(designs, name)()
+    names = [slider.name for slider in slider_parameters(arm)]
+    assert names
+    for each in names:
+        (free,) = free_parameters(arm, ranges_of(f"{each} = {slider_range(arm, each)}", arm)).free
+        assert free.low < free.high
+
+
+def test_needs_of_many_places_are_drawn_with_few_labels(session):
+    places = [(0.3, 0.002 * k, 0.6) for k in range(60)]
+    needs = Requirements(targets=(Target(places, name="row"),))
+    session.update(lambda state: state.replace(needs=needs.to_toml()))
+    session.settle()
+    assert "row</b>: 0 of 60 places, missed by" in verdict(session)
+    assert drawn(session, "/label 19") is not None
+    assert drawn(session, "/label 20") is None
