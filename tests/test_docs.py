@@ -10,6 +10,7 @@ A fence in `README.md` or `docs/` is one of these, or the test fails:
   `# exit code 2` must fail so, one in `# exit code 1` find a requirement missed, and
   `softreach studio` is ended once it serves its page. Other lines set up a machine and are not
   executed.
+- `python` or `bash` that begins with `# takes a minute` is executed by `make test-all` only.
 - `toml`: read as a design; with `[[reach]]`, as requirements.
 - `text` right after one of these: what it printed. Numbers may differ by 0.1 %; `...` stands for
   anything up to the end of the line.
@@ -53,6 +54,7 @@ NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
 FEW = 5_000  # samples
 NOT_EXECUTED = re.compile(r"# not executed: \w.+")
+LONG = "# takes a minute"
 FILE = re.compile(r"# (\w+\.py)\n")
 FENCE = re.compile(r"^ *(`{3,})(.*)\n(?:.*\n)*?^ *\1 *$", re.MULTILINE)
 
@@ -63,7 +65,7 @@ def on_page(page: Path) -> str:
 
 @pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
-def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):
+def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch, request):
     plt = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
@@ -78,6 +80,7 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     ]
     document = Document.parse(str(page), *parsers, encoding="utf-8")
     document.namespace["__name__"] = "__documentation__"
+    document.namespace["_all"] = request.config.option.markexpr != "not large"
     for example in document.examples():
         example.evaluate()
     plt.close("all")
@@ -148,8 +151,18 @@ def test_pictures_stay_small(picture):
     assert picture.stat().st_size < 400_000
 
 
+def is_left_out(example):
+    """Whether a fence takes too long for the usual run; what follows it is not compared then."""
+    left_out = example.parsed.startswith(LONG) and not example.namespace["_all"]
+    if left_out:
+        example.namespace["_printed"] = LONG
+    return left_out
+
+
 def run_python(example):
     """Execute a fence and keep what it prints."""
+    if is_left_out(example):
+        return
     named = FILE.match(example.parsed)
     if named:
         Path(named[1]).write_text(example.parsed, encoding="utf-8")
@@ -171,6 +184,8 @@ def is_compared(example):
 
 def run_commands(example):
     """Execute the lines that begin with softreach."""
+    if is_left_out(example):
+        return
     small = not is_compared(example)
     with printed_into(example):
         for line in example.parsed.replace("\\\n", " ").splitlines():
@@ -224,6 +239,8 @@ def compare_output(example):
     """Hold a text fence against what was printed last."""
     printed = example.namespace.pop("_printed", None)
     assert printed is not None, f"line {example.line}: no executed fence before this output"
+    if printed == LONG:
+        return
     # compilation is announced on the first run only
     found = [line for line in printed.splitlines() if not line.startswith("softreach: compiling")]
     wanted = example.parsed.splitlines()

@@ -17,7 +17,7 @@ from softreach.atlas.space import DesignSpace
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.quantity import read_number, read_whole_number
 
-__all__ = ["parse_parameter", "parse_space"]
+__all__ = ["flat_keys", "parse_parameter", "parse_space"]
 
 _KEYS = ("design", "layout", "designs", "seed", "parameters")
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
@@ -54,7 +54,7 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     if not isinstance(table, dict):
         raise InvalidInput("parameters", table, "a table of parameters and their values")
     values: dict[str, list[float]] = {}
-    for key, value in _flat(table):
+    for key, value in flat_keys(table):
         name, numbers = parse_parameter(base, key, value)
         if name in values:
             raise InvalidInput(key, value, "given once")
@@ -62,11 +62,11 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     return _space(base, values, document)
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat_keys(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Keys and values; TOML reads the dots of unquoted keys as tables within tables."""
     for key, value in table.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
+            yield from flat_keys(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value
 

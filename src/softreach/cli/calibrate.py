@@ -20,6 +20,7 @@ from softreach.cli.options import (
     Unit,
     check_output,
     out_option,
+    pairs_in,
     refuse,
 )
 from softreach.cli.values import NUMBER, WHOLE, as_read
@@ -145,8 +146,8 @@ def calibrate(
             noise=None if noise is None else read_noise(noise),
             robust=robust,
             rivals=rivals,
-            inputs=_pairs("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"'),
-            markers=_pairs("marker", markers, "NAME=START, such as tip=disk3"),
+            inputs=pairs_in("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"'),
+            markers=pairs_in("marker", markers, "NAME=START, such as tip=disk3"),
             run=run,
             order=order,
             seed=seed,
@@ -176,21 +177,6 @@ def read_noise(text: str) -> float:
     if not noise > 0:
         raise InvalidInput("noise", shortened(text), f"a length > 0 such as 0.2mm ({TYPED})")
     return noise
-
-
-def _pairs(name: str, texts: list[str] | None, allowed: str) -> dict[str, str] | None:
-    """Names and columns of NAME=COLUMN; names of inputs may hold another =."""
-    if texts is None:
-        return None
-    pairs: dict[str, str] = {}
-    for text in texts:
-        key, sign, value = (part.strip() for part in text.rpartition("="))
-        if not sign or not key or not value:
-            raise InvalidInput(name, shortened(text), allowed)
-        if key in pairs:
-            raise InvalidInput(name, shortened(text), f"given once for {key}")
-        pairs[key] = value
-    return pairs
 
 
 def _record(result: Calibration) -> dict[str, Any]:

@@ -12,10 +12,8 @@ from cyclopts import Group, Parameter
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import AsJson, Overwrite, Unit, out_option
+from softreach.cli.options import AsJson, Overwrite, Unit, out_option, pairs_in
 from softreach.cli.values import NUMBER, WHOLE, as_read
-from softreach.support.errors import InvalidInput
-from softreach.support.quantity import shortened
 
 if TYPE_CHECKING:
     from softreach.optimization import Candidate, Search
@@ -129,9 +127,9 @@ def search(
         "design": design,
         "maximize": None if maximize is None else maximize.split(","),
         "minimize": None if minimize is None else minimize.split(","),
-        "free": _pairs("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2"),
-        "choices": _pairs("choice", choice, "NAME=VALUES, such as bundles=3,4"),
-        "tolerances": _pairs("tolerance", tolerance, "NAME=DEVIATION, such as taper_deg=0.1"),
+        "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2"),
+        "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4"),
+        "tolerances": pairs_in("tolerance", tolerance, "NAME=DEVIATION, such as taper_deg=0.1"),
         "polish": polish,
         "robust": robust,
         **options,
@@ -201,21 +199,6 @@ class _Watch:
         if len(names) != 1:
             return f"searching, {self._met} meet all"
         return f"searching, best {names[0]} {best.objectives[0].value:.5g}"
-
-
-def _pairs(name: str, texts: list[str] | None, allowed: str) -> dict[str, str] | None:
-    """Names and values of NAME=VALUE; the name of an actuator may hold another =."""
-    if texts is None:
-        return None
-    pairs: dict[str, str] = {}
-    for text in texts:
-        key, sign, value = (part.strip() for part in text.rpartition("="))
-        if not sign or not key or not value:
-            raise InvalidInput(name, shortened(text), allowed)
-        if key in pairs:
-            raise InvalidInput(name, shortened(text), f"given once for {key}")
-        pairs[key] = value
-    return pairs
 
 
 def _record(result: Search, out: Path) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter
 from softreach.arm.parameters.changes import unknown_parameter
 from softreach.arm.parameters.shown import from_written, written_name
+from softreach.atlas.space_file import flat_keys
 from softreach.optimization.free_parameters import (
     NAMED_CHOICES,
     free_parameters,
@@ -269,7 +270,7 @@ class _Reader:
         """Path in errors, key and value of a table; what was given goes before the file."""
         given, known = self._given.get(table, {}), names.by_key if names else {}
         said = {known[key].name if key in known else key for key in given}
-        for key, value in _flat(self._raw.get(table, {})):
+        for key, value in flat_keys(self._raw.get(table, {})):
             if (known[key].name if key in known else key) not in said:
                 yield f"search.{table}.{key}", key, value
         for key, value in given.items():
@@ -368,12 +369,3 @@ class _Names:
         unit = self.by_key[key].unit
         units = ", ".join(unit_names(unit))
         return f"must have their unit ({units}), or stand under {written_name(key, unit)}"
-
-
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Keys and values; TOML reads the dots of unquoted keys as tables within tables."""
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield prefix + key, value

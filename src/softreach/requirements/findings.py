@@ -15,6 +15,7 @@ from softreach.arm.summary import load_number, mass
 from softreach.arm.tables import ends_over, quadrature, tables
 from softreach.atlas.design_task import Intermediates
 from softreach.atlas.metrics import known_metric
+from softreach.requirements.parts import LIMIT_UNITS
 from softreach.requirements.requirements import Requirements
 from softreach.sampling import sample_cube
 from softreach.support.arguments import as_instance
@@ -27,16 +28,6 @@ _SAMPLES = 2**15
 _STATIONS = (0.5, 1.0)
 _PIECES = 8
 _ROUNDING = 1e-9
-_UNITS = {
-    "actuators": "",
-    "shortening": "",
-    "force": "N",
-    "pressure": "Pa",
-    "stroke": "m",
-    "mass": "kg",
-    "load_number": "",
-    "bending": "",
-}
 _WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": "actuators"}
 
 
@@ -126,7 +117,7 @@ def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
 
 def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:
     """A limit against its value."""
-    unit, symbol = shown_unit(arm), _UNITS[name]
+    unit, symbol = shown_unit(arm), LIMIT_UNITS[name]
     excess = max(value - most, 0.0) / (most or 1.0)
     excess = excess if excess > _ROUNDING else 0.0
     if name == "actuators":

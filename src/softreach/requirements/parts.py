@@ -163,3 +163,14 @@ class Limits:
 
 POSE_LIMITS = ("shortening", "force", "pressure", "stroke", "bending")
 """Limits of poses."""
+LIMIT_UNITS = {
+    "actuators": "",
+    "shortening": "",
+    "force": "N",
+    "pressure": "Pa",
+    "stroke": "m",
+    "mass": "kg",
+    "load_number": "",
+    "bending": "",
+}
+"""Limit -> its SI unit."""

@@ -13,7 +13,7 @@ from softreach.arm.design_file.keys import inline_table, key_text, value_text
 from softreach.arm.design_file.tables import unknown_key
 from softreach.atlas.metrics import known_metric
 from softreach.inverse.request import positions_in
-from softreach.requirements.parts import LONGEST, Keep, Limits, Target
+from softreach.requirements.parts import LIMIT_UNITS, LONGEST, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 from softreach.support.files.text import read_text
@@ -34,16 +34,6 @@ _SUFFIXES = {
 }
 """SI unit -> suffix of a key -> unit."""
 _EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa"}
-_LIMITS = {
-    "actuators": "",
-    "shortening": "",
-    "force": "N",
-    "pressure": "Pa",
-    "stroke": "m",
-    "mass": "kg",
-    "load_number": "",
-    "bending": "",
-}
 _SHAPES: Mapping[str, Mapping[str, str]] = {
     "box": {"low": "m", "high": "m"},
     "sphere": {"center": "m", "radius": "m"},
@@ -188,8 +178,10 @@ class _Reader:
         return self._made(_KINDS[shape], table, path, values)
 
     def _limits(self, raw: dict[str, Any]) -> Any:
-        self._check_keys(raw, _LIMITS, "limits.", tuple(_LIMITS))
-        values = {name: self._value(raw, "limits", name, unit) for name, unit in _LIMITS.items()}
+        self._check_keys(raw, LIMIT_UNITS, "limits.", tuple(LIMIT_UNITS))
+        values = {
+            name: self._value(raw, "limits", name, unit) for name, unit in LIMIT_UNITS.items()
+        }
         return self._made(Limits, raw, "limits", values)
 
     def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
@@ -422,7 +414,7 @@ def _region_lines(region: Region) -> Iterator[str]:
 
 
 def _limit_line(name: str, value: float) -> str:
-    unit = _LIMITS[name].lower()
+    unit = LIMIT_UNITS[name].lower()
     return f"{name}_{unit} = {value_text(value)}" if unit else f"{name} = {value_text(value)}"
 
 
