@@ -15,8 +15,9 @@ from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import ReachableSolid, reachable_set
-from softreach.workspace.flux import signed_volume
+from softreach.workspace.flux import grid_faces, signed_volume
 from softreach.workspace.injective import is_injective
+from softreach.workspace.measure import extrapolated_hull
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
 
@@ -242,3 +243,16 @@ def test_the_route_is_told_in_the_dataset():
     assert solid(ARM, accuracy=0.02).to_dataset().attrs["route"] == "raster"
     many = solid(designs.redundant_trunk(), accuracy=0.1, cell=0.1)
     assert many.to_dataset().attrs["route"] == "search"
+
+
+def test_the_hull_of_the_faces_is_measured_when_first_asked_for():
+    rod = Mapped(around(0.5, 0.0))
+    solid = reachable_set(rod, accuracy=0.02)
+    assert isinstance(solid, ReachableSolid)
+    assert solid.route == "flux"
+    assert "_hull" not in vars(solid)
+    cube = grid_faces(solid.cells)
+    even = (np.rint(cube * solid.cells) % 2 == 0).all(axis=1)
+    at_once = extrapolated_hull(rod.tips(cube), rod.tips(cube[even]))
+    assert (solid.convex_volume, solid.convex_volume_error) == at_once
+    assert "_hull" in vars(solid)

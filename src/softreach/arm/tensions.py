@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import LengthTendon
 from softreach.arm.rest_shape import RestStrains
 from softreach.arm.tables import quadrature, tables
-from softreach.kernels.box.complementarity import complementary
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
@@ -159,6 +158,8 @@ class LengthLaw:
             excess: By how much they are pulled in beyond their paths without tension [m], (n,
                 tendon).
         """
+        from softreach.kernels.box.complementarity import complementary  # loads Numba
+
         tension, taut = np.empty_like(excess), np.empty(excess.shape, np.int8)
         solved = np.empty(len(excess), np.int8)
         matrix, excess = np.ascontiguousarray(matrix), np.ascontiguousarray(excess)

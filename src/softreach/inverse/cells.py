@@ -208,16 +208,18 @@ class _Growing:
             return False
         self._close(many)
         self.edge /= 2
-        corner = self.corner[many][:, None] + self.edge * _OCTANTS
+        parent = self.corner[many]
+        corner = parent[:, None] + self.edge * _OCTANTS
         first, count = self.first[many], self.count[many]
         counts = np.zeros((len(first), 8), np.int64)
-        arguments = (self.planes, self.boxes, corner + self.edge / 2, self.edge / 2, first, count)
-        sort_into_children(*arguments, self.item, counts, counts, np.empty(0, np.int32))
+        meets = np.empty(len(self.item), np.uint8)
+        arguments = (self.planes, self.boxes, parent, self.edge, first, count, self.item, meets)
+        sort_into_children(*arguments, counts, counts, np.empty(0, np.int32))
         starts = (np.cumsum(counts) - counts.ravel()).reshape(counts.shape)
-        item = np.empty(int(counts.sum()), np.int32)
-        sort_into_children(*arguments, self.item, np.empty_like(counts), starts, item)
+        item = np.empty(int(counts.sum()) + 1, np.int32)
+        sort_into_children(*arguments, np.empty_like(counts), starts, item)
         self.corner = corner.reshape(-1, 3)
-        self.first, self.count, self.item = starts.ravel(), counts.ravel(), item
+        self.first, self.count, self.item = starts.ravel(), counts.ravel(), item[:-1]
         return True
 
     def _largest_leaf(self) -> int:

@@ -14,12 +14,13 @@ from __future__ import annotations
 import gc
 import threading
 from collections.abc import Callable
+from functools import cache
 from typing import Any, Literal
 
 from numba.core.codegen import CPUCodegen, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.typed_passes import NativeLowering
 
 __all__ = ["KernelDispatcher", "PartedDispatcher", "missing"]
@@ -131,12 +132,33 @@ class _Pause:
 _PAUSE = _Pause()
 
 
+@cache
+def _prepare_target() -> None:
+    """Let Numba load what any kernel needs, without SciPy's linear algebra.
+
+    Numba imports that, for a tenth of a second, only to see that it is there. It asks again where a
+    function multiplies matrices; no kernel of ours does.
+    """
+    from numba.np import linalg
+
+    ensure, linalg.ensure_blas = linalg.ensure_blas, _installed_with_softreach
+    try:
+        cpu_target.target_context.refresh()
+    finally:
+        linalg.ensure_blas = ensure
+
+
+def _installed_with_softreach() -> None:
+    """SciPy is there."""
+
+
 class KernelDispatcher(CPUDispatcher):
     """A function that is called from Python."""
 
     def compile(self, sig: Any) -> Any:
         """Compile for one set of types, or load what is cached."""
         with _PAUSE:
+            _prepare_target()
             return super().compile(sig)
 
 

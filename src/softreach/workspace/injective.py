@@ -58,7 +58,9 @@ def is_injective(rod: TipMap) -> bool:
 def solid_by_flux(
     rod: TipMap, cells: int, lattice_for: Callable[[Array], Lattice], progress: Progress
 ) -> ReachableSolid:
-    """The solid of a tip map that is one to one; it is rasterized when a question needs it.
+    """The solid of a tip map that is one to one.
+
+    Its convex hull is measured, and it is rasterized, when a question needs it.
 
     Args:
         rod: The tip map.
@@ -71,7 +73,6 @@ def solid_by_flux(
     tips = rod.tips(rod.box.from_free_cube(places))
     lattice = lattice_for(tips)
     even = (np.rint(places * cells) % 2 == 0).all(axis=1)
-    convex = extrapolated_hull(tips, tips[even])
     progress(len(places))
     volume = abs(flux.value)
     return ReachableSolid(
@@ -79,13 +80,12 @@ def solid_by_flux(
         cells=cells,
         volume=volume,
         volume_error=flux.error,
-        convex_volume=convex.value,
-        convex_volume_error=convex.error,
         multiplicity={1: volume},
         multiplicity_error=0.0,
         fold_volume=0.0,
         fold_volume_error=0.0,
         route="flux",
+        measure_hull=partial(extrapolated_hull, tips, tips[even]),
         rasterize=partial(_rasterized, rod, cells, lattice),
     )
 

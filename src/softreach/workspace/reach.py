@@ -149,8 +149,7 @@ def rasterized_set(
         cells=cells,
         volume=volume.value,
         volume_error=overlaps.multiplicity_error,
-        convex_volume=convex.value,
-        convex_volume_error=convex.error,
+        measure_hull=partial(_known, convex),
         lost_share=float(left_out.mean()),
         route="raster",
         rasterize=partial(_known, fine),
@@ -261,8 +260,7 @@ def _of_many(
         cells=0,
         volume=search.volume.value,
         volume_error=search.volume.error,
-        convex_volume=search.convex_volume.value,
-        convex_volume_error=search.convex_volume.error,
+        measure_hull=partial(_known, search.convex_volume),
         lost_share=lost_share(rod),
         route="search",
         rasterize=partial(_known, search.cells),
@@ -270,9 +268,9 @@ def _of_many(
     )
 
 
-def _known(image: T) -> T:
-    """An image that is there already, where it might be made when asked for."""
-    return image
+def _known(result: T) -> T:
+    """A result that is there already, where it might be made when asked for."""
+    return result
 
 
 class _Grid(NamedTuple):

@@ -26,6 +26,7 @@ from softreach.workspace.boundary import (
 )
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
+from softreach.workspace.measure import Estimate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,8 +57,6 @@ class ReachableSolid(ReachableSet):
     cells: int
     volume: float
     volume_error: float
-    convex_volume: float
-    convex_volume_error: float
     lost_share: float = 0.0
     multiplicity: Mapping[int, float]
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
@@ -75,10 +74,22 @@ class ReachableSolid(ReachableSet):
     flows through the images of the six faces of the activation box. "raster": the image folds or
     overlaps, or this is not clear; it is rasterized, and a signed volume by flux makes it exact
     elsewhere. "search": more than three free bundles."""
+    measure_hull: Callable[[], Estimate] = field(repr=False)
+    """Measures the convex hull [m³]."""
     rasterize: Callable[[], Image | ReachedCells] = field(repr=False)
     """Makes `image`."""
     coarse_image: Image | None = field(default=None, repr=False)
     """The image of half as fine a grid, for the route "raster"."""
+
+    @property
+    def convex_volume(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Volume of the convex hull [m³]; for the route "flux" measured when first asked for."""
+        return self._hull.value
+
+    @property
+    def convex_volume_error(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Error of `convex_volume`, estimated from two grids [m³]."""
+        return self._hull.error
 
     @lazy
     def image(self) -> Image | ReachedCells:
@@ -203,6 +214,10 @@ class ReachableSolid(ReachableSet):
         return dataset.assign_coords(activations=list(self.multiplicity)).assign(
             multiplicity=volumes
         )
+
+    @lazy
+    def _hull(self) -> Estimate:
+        return self.measure_hull()
 
     @lazy
     def _field(self) -> Array:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.vector import row
 
-__all__ = ["SpaceTree", "leaf_at", "listed", "may_meet", "sort_into_children"]
+__all__ = ["SpaceTree", "leaf_at", "listed", "sort_into_children"]
 
 
 class SpaceTree(NamedTuple):
@@ -28,17 +29,6 @@ class SpaceTree(NamedTuple):
     """Number of its tetrahedra."""
     item: np.ndarray
     """Tetrahedra, leaf after leaf."""
-
-
-@inline
-def may_meet(planes, k, p, half):
-    """True if a box round p, of half-sizes, meets tetrahedron k as far as its face planes tell."""
-    for i in range(4):
-        a, b, c = planes[k, i, 0], planes[k, i, 1], planes[k, i, 2]
-        reach = abs(a) * half[0] + abs(b) * half[1] + abs(c) * half[2]
-        if a * p[0] + b * p[1] + c * p[2] + reach < planes[k, i, 3]:
-            return False
-    return True
 
 
 @inline
@@ -83,38 +73,69 @@ def _is_beyond(planes, k, i, p):
 
 
 @kernel
-def sort_into_children(planes, boxes, centers, half, first, count, item, counts, starts, out):
-    """Sort the items of nodes into their eight children.
+def sort_into_children(planes, boxes, corner, edge, first, count, item, meets, counts, starts, out):
+    """Sort the items of nodes into their eight children: first counted, then listed.
 
     Args:
         planes: Faces of the tetrahedra.
         boxes: Boxes round them, shape (tetrahedron, 2, 3).
-        centers: Centers of the nodes' children, shape (node, 8, 3).
-        half: Half the edge of a child.
+        corner: Lowest corners of the nodes, shape (node, 3).
+        edge: Edge of a child.
         first: Beginning of each node's items in `item`.
         count: Number of each node's items.
         item: Items of the nodes.
+        meets: A bit for each child that an item may meet, of uint8; filled when counting.
         counts: Filled with the items of each child, shape (node, 8).
         starts: Beginning of each child's items in `out`, shape (node, 8).
-        out: Receives the items; empty to count only.
+        out: Receives the items, with room for one more; empty to count only.
     """
-    for n in range(centers.shape[0]):
+    for n in range(corner.shape[0]):
+        p, begin, end = row(corner, n), first[n], first[n] + count[n]
+        if not out.shape[0]:
+            for entry in range(begin, end):
+                meets[entry] = _children_met(planes, boxes, item[entry], p, edge)
         for o in range(8):
-            p = (centers[n, o, 0], centers[n, o, 1], centers[n, o, 2])
             size = 0
-            for entry in range(first[n], first[n] + count[n]):
-                k = item[entry]
-                if _boxes_meet(boxes, k, p, half) and may_meet(planes, k, p, (half, half, half)):
-                    if out.shape[0]:
-                        out[starts[n, o] + size] = k
-                    size += 1
+            for entry in range(begin, end):
+                if out.shape[
+                    0
+                ]:  # without a branch: the next item takes the place of one that misses
+                    out[starts[n, o] + size] = item[entry]
+                size += meets[entry] >> o & 1
             counts[n, o] = size
 
 
 @inline
-def _boxes_meet(boxes, k, p, half):
-    """True if the box of tetrahedron k meets the cube round p."""
-    for axis in range(3):
-        if p[axis] + half < boxes[k, 0, axis] or p[axis] - half > boxes[k, 1, axis]:
-            return False
-    return True
+def _children_met(planes, boxes, k, p, edge):
+    """A bit for each child that tetrahedron k may meet as far as its box and faces tell.
+
+    The products of its normals with the children's centers are shared.
+    """
+    half = 0.5 * edge
+    x, y = _sides_met(boxes, k, 0, p, edge), _sides_met(boxes, k, 1, p, edge)
+    z = _sides_met(boxes, k, 2, p, edge)
+    met = 0
+    for o in range(8):
+        met |= (x >> (o >> 2) & y >> (o >> 1 & 1) & z >> (o & 1) & 1) << o
+    for i in range(4):
+        a, b, c = planes[k, i, 0], planes[k, i, 1], planes[k, i, 2]
+        reach = half * (abs(a) + abs(b) + abs(c)) - planes[k, i, 3]
+        low = a * (p[0] + half) + b * (p[1] + half) + c * (p[2] + half) + reach
+        a, b, c = a * edge, b * edge, c * edge
+        beyond = 0
+        for o in range(8):
+            inward = low + (o >> 2) * a + (o >> 1 & 1) * b + (o & 1) * c
+            beyond |= int(inward >= 0.0) << o
+        met &= beyond
+        if not met:
+            break
+    return met
+
+
+@inline
+def _sides_met(boxes, k, axis, p, edge):
+    """Two bits: a box meets the lower and the upper half of a cube along an axis."""
+    low, high = boxes[k, 0, axis], boxes[k, 1, axis]
+    lower = int(low <= p[axis] + edge) & int(high >= p[axis])
+    upper = int(low <= p[axis] + 2.0 * edge) & int(high >= p[axis] + edge)
+    return lower | upper << 1
