@@ -21,6 +21,8 @@ __all__ = ["Polished", "can_polish", "point_of", "polished"]
 
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
+_MOST_DESIGNS = 60
+_HOPELESS = 0.5  # over L or relative: what a start may miss
 _TOLERANCE = 0.003  # of the accuracy
 _GENTLE = 0.1  # of the cost: the first step is along its slope, and as long
 _WORSE = 10.0  # times the cost of the start: a design that cannot exist
@@ -32,7 +34,7 @@ class Polished(NamedTuple):
     candidate: Candidate
     """The better of both ends, judged as its start was."""
     designs: int
-    """Designs that were looked at."""
+    """Designs that were looked at; none for a start that is too far from what is required."""
 
 
 def can_polish(problem: Problem) -> bool:
@@ -68,6 +70,8 @@ def polished(
         floors: Costs of all goals that are not to be exceeded, but for that one.
         iterations: Most quadratic programs.
     """
+    if start.excess > _HOPELESS:
+        return Polished(start, 0)
     program = _Program(problem, start, accuracy or problem.coarse, goal, floors)
     try:
         first = program.begin()
@@ -99,16 +103,23 @@ def _solved(program: _Program, first: Array, iterations: int) -> Array:
         if parts:
             fun, jac = program.asked(kind, stacked), program.asked(kind, stacked_slopes)
             constraints.append({"type": kind, "fun": fun, "jac": jac})
-    result = minimize(
-        program.cost,
-        first,
-        jac=program.cost_slope,
-        bounds=[(0.0, 1.0)] * len(first),
-        constraints=constraints,
-        method="SLSQP",
-        options={"maxiter": iterations, "ftol": program.tolerance},
-    )
-    return np.clip(result.x, 0.0, 1.0) if np.isfinite(result.x).all() else first
+    try:
+        end = minimize(
+            program.cost,
+            first,
+            jac=program.cost_slope,
+            bounds=[(0.0, 1.0)] * len(first),
+            constraints=constraints,
+            method="SLSQP",
+            options={"maxiter": iterations, "ftol": program.tolerance},
+        ).x
+    except _Spent:
+        end, program.accepted = program.accepted, np.empty(0)
+    return np.clip(end, 0.0, 1.0) if np.isfinite(end).all() else first
+
+
+class _Spent(Exception):
+    """A polish has looked at as many designs as it may."""
 
 
 class _Program:
@@ -124,6 +135,8 @@ class _Program:
     ) -> None:
         self.designs = 0
         """Designs made so far."""
+        self.accepted = np.empty(0)
+        """Unknowns at which the last quadratic program was set up."""
         self._problem, self._start, self._accuracy = problem, start, accuracy
         self._goal, self._floors = goal, floors
         self._shape, self._scale = (0, 0), 1.0
@@ -174,6 +187,8 @@ class _Program:
                 (p.design for p in self._points.values() if (p.reals == reals).all()), None
             )
             if design is None:
+                if self.designs >= _MOST_DESIGNS and len(self.accepted):
+                    raise _Spent
                 self.designs += 1
                 values = self.values_of(unknowns)
                 design = DesignPoint(self._problem, values, self._accuracy, self._like)
@@ -192,6 +207,7 @@ class _Program:
 
     def cost_slope(self, unknowns: Array) -> Array:
         """Its derivatives."""
+        self.accepted = unknowns.copy()
         try:
             return np.nan_to_num(self.point(unknowns).cost[1] / self._scale)
         except (InvalidDesign, InvalidInput):

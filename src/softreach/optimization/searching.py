@@ -235,6 +235,8 @@ class _Run:
         room = max(1, (self._designs - self._spent) // _DESIGNS_OF_POLISH)
         starts = self._chosen(study.candidates(), min(_POLISHES, room))
         for end in parallel.in_order(partial(self._polished, start) for start in starts):
+            if not end.designs:
+                continue
             candidate = end.candidate.with_designs(end.designs)
             study.add(candidate)
             self._note(candidate)
