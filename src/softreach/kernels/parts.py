@@ -143,7 +143,7 @@ def _prepare_target() -> None:
 
     ensure, linalg.ensure_blas = linalg.ensure_blas, _installed_with_softreach
     try:
-        cpu_target.target_context.refresh()
+        cast(Any, cpu_target.target_context).refresh()
     finally:
         linalg.ensure_blas = ensure
 
