@@ -148,7 +148,7 @@ def places(seeds: int = 10) -> Iterator[str]:
             )
             runs.setdefault(method, []).append((log, time.process_time() - cpu))
     best = min(least(log)[-1] for each in runs.values() for log, _ in each)
-    yield "| method | least effort, median of ten seeds | designs to 1 % of the best | CPU |"
+    yield "| method | least effort, median | designs to 1 % of the best | CPU |"
     yield "|---|---|---|---|"
     for method, each in runs.items():
         ends = np.median([least(log)[-1] for log, _ in each])

@@ -11,7 +11,7 @@ A fence in `README.md` or `docs/` is one of these, or the test fails:
   `softreach studio` is ended once it serves its page. Other lines set up a machine and are not
   executed.
 - `python` or `bash` that begins with `# takes a minute` is executed by `make test-all` only.
-- `toml`: read as a design; with `[[reach]]`, as requirements.
+- `toml`: read as a design; with `[[reach]]` or `[search]`, as requirements.
 - `text` right after one of these: what it printed. Numbers may differ by 0.1 %; `...` stands for
   anything up to the end of the line.
 - `bibtex`: data.
@@ -225,7 +225,7 @@ def read_design(example):
 
     One of requirements is `needs.toml` to them.
     """
-    if "[[reach]]" in example.parsed:
+    if "[[reach]]" in example.parsed or "[search]" in example.parsed:
         sr.Requirements.from_toml(example.parsed)
         Path("needs.toml").write_text(example.parsed, encoding="utf-8")
         example.namespace["_printed"] = None
