@@ -143,7 +143,7 @@ def _prepare_target() -> None:
 
     ensure, linalg.ensure_blas = linalg.ensure_blas, _installed_with_softreach
     try:
-        cpu_target.target_context.refresh()
+        cpu_target.target_context.refresh()  # pyright: ignore[reportAttributeAccessIssue]
     finally:
         linalg.ensure_blas = ensure
 
