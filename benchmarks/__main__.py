@@ -15,6 +15,7 @@ from softreach.support import parallel
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks.md"
 PARTS = (
+    "waits",
     "cold",
     "kernels",
     "arms",

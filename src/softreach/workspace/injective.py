@@ -200,11 +200,17 @@ class RegularWindows:
 
 def _spectral_bound(matrices: Array) -> Array:
     """An upper bound of the spectral radius of matrices without negative entries (Collatz)."""
-    vector = np.ones((len(matrices), 3, 1))
+    columns = np.moveaxis(matrices, 0, 2).copy()  # long axis last: short sums cost the most
+    vector = np.ones((3, len(matrices)))
     for _ in range(_POWERS):
-        vector = matrices @ vector
-        vector = vector / vector.max(axis=1, keepdims=True, initial=1e-300) + 1e-6
-    return ((matrices @ vector) / vector).max(axis=(1, 2))
+        vector = _times(columns, vector)
+        vector = vector / vector.max(axis=0, initial=1e-300) + 1e-6
+    return (_times(columns, vector) / vector).max(axis=0)
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Products of matrices (3, 3, n) and vectors (3, n)."""
+    return matrices[:, 0] * vectors[0] + matrices[:, 1] * vectors[1] + matrices[:, 2] * vectors[2]
 
 
 class _Patches(NamedTuple):
@@ -255,17 +261,29 @@ def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     bulge = 0.5 * np.einsum("ij,jk,ik->i", patches.half, bend, patches.half)
     radius = np.linalg.norm(sides, axis=1).sum(axis=1) + bulge
     between = patches.tips[b] - patches.tips[a]
-    mask = np.linalg.norm(between, axis=1) > radius[a] + radius[b]
+    mask = _lengths(between) > radius[a] + radius[b]
     normal = _normals(patches)
     # Along its own plane a patch reaches no farther than by its bend.
-    for direction, tilted in ((between, (a, b)), (normal[a], (b,)), (normal[b], (a,))):
+    for direction, of, tilted in ((between, None, (a, b)), (normal, a, (b,)), (normal, b, (a,))):
         left = np.flatnonzero(~mask)
-        unit = direction[left] / np.linalg.norm(direction[left], axis=1).clip(1e-300)[:, None]
+        unit = direction[left if of is None else of[left]]
+        unit /= _lengths(unit).clip(1e-300)[:, None]
         reach = bulge[a[left]] + bulge[b[left]]
         for each in tilted:
-            reach += np.abs(unit[:, None, :] @ sides[each[left]]).sum(axis=(1, 2))
-        mask[left] = np.abs((unit * between[left]).sum(axis=1)) > reach
+            reach += sum(
+                abs(_products(unit, side[each[left]])) for side in np.moveaxis(sides, 2, 0)
+            )
+        mask[left] = np.abs(_products(unit, between[left])) > reach
     return mask
+
+
+def _products(a: Array, b: Array) -> Array:
+    """Scalar products of rows (n, 3), without a sum over so short an axis, which takes longer."""
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
+def _lengths(vectors: Array) -> Array:
+    return np.sqrt(_products(vectors, vectors))
 
 
 def _normals(patches: _Patches) -> Array:

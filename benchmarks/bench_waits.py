@@ -1,0 +1,208 @@
+"""Waits for everything that a user can call, commands by the examples of their help.
+
+Functions are called as in `tests/abuse/public_calls.py`, whose arguments are small: what they cost
+at the sizes that matter is told by the other parts.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.memory import peak_bytes, reset_peak
+from softreach.support.errors import SoftreachError
+
+ROOT = Path(__file__).parent.parent
+CLI = ROOT / "src" / "softreach" / "cli"
+
+_LONG = 1.0, 10.0  # seconds, warm and cold, above which a wait is explained
+_TURNS = 2
+_KEPT = "arm.toml", "trunk.zarr"  # what commands make for others
+
+FILES = {
+    "check": {"arm.toml": "three_fibers.toml", "needs.toml": "five_places.toml"},
+    "calibrate": {"arm.toml": "tentacle.toml", "poses.csv": "tentacle.csv"},
+    "plan-poses": {"arm.toml": "tentacle.toml"},
+}
+"""Files of `examples/` that stand for those of a command's example."""
+
+FEWER = {"atlas": ["--n", "20000"], "cloud": ["--overwrite"]}
+"""Options that make an example end sooner, or more than once."""
+
+BEFORE = {
+    "equilibria": "design lce_arm --payload 1g --out arm.toml",
+    "show": "cloud minimal_trunk --out trunk.zarr",
+    "volume": "cloud minimal_trunk --out trunk.zarr",
+}
+"""Commands that make the files of others."""
+
+LEFT_OUT = {
+    "import": "reads a file of another program",
+    "paper": "computes for minutes: it says so itself",
+    "search": "computes for as long as it is given",
+    "studio": "serves until it is ended: part `studio`",
+    "warmup": "compiles what the others do",
+}
+
+WHY = {
+    "forces.blocked_force": "the force grows in 160 steps, each solved for equilibria",
+    "plot.plot_opposite_sides": "a cloud is drawn four times",
+    "atlas": "eighteen designs, each with all its metrics",
+    "calibrate": "cold: the kernels of loads; warm: predictions of the fit",
+    "check": "solved with and without payloads, then drawn by Matplotlib",
+    "cloud": "half is the import of xarray, the rest 400,000 samples written",
+    "demo": "clouds in four views, drawn by Matplotlib; their hull",
+    "equilibria": "cold: the kernels of loads; warm: imports and the figure",
+    "export": "imports of xarray and trimesh",
+    "gradient": "imports, the set and two hulls by Qhull",
+    "payload": "a set under loads for every payload that is tried",
+    "plan-poses": "predictions for thousands of candidates",
+    "reach": "surface, slices and imports of their libraries; the set itself is a fifth",
+    "show": "400,000 points drawn by Matplotlib, with its import",
+    "solve": "imports of Numba, and the octree over all cells of the activation box",
+    "volume": "400,000 points are triangulated with exact predicates",
+    "track": "import of xarray, and the octree as in `solve`",
+}
+"""Reasons of long waits, by command or function."""
+
+
+class Wait(NamedTuple):
+    """Cost of one call."""
+
+    wall: float
+    cpu: float
+    """Of all threads and of processes that it waited for [s]."""
+    peak: float
+    """Largest memory; of functions, beyond that before the call [MB]."""
+
+
+def main() -> None:
+    """Print both tables."""
+    print("## What a user waits for\n")
+    print("### Commands, by the example of their help\n")
+    print(
+        "A process each; cold with an empty kernel cache. Example files are those of `examples/`.\n"
+    )
+    print("| command | cold, wall [s] | CPU [s] | warm, wall [s] | CPU [s] | peak [MB] | why |")
+    print("|---|--:|--:|--:|--:|--:|---|")
+    for name, words in _examples():
+        print(_command_row(name, words), flush=True)
+    print(f"\nLeft out: {'; '.join(f'`{name}` ({why})' for name, why in LEFT_OUT.items())}.\n")
+    print("### Functions, on small arguments\n")
+    print("The first call of a process with a full kernel cache, and the best of two later ones.\n")
+    print("| function | first, wall [s] | warm, wall [s] | CPU [s] | adds [MB] | why |")
+    print("|---|--:|--:|--:|--:|---|")
+    for line in _function_rows():
+        print(line, flush=True)
+
+
+def _examples() -> Iterator[tuple[str, list[str]]]:
+    """The first example of every command."""
+    seen = set(LEFT_OUT)
+    for file in sorted(CLI.glob("*.py")):
+        for text in re.findall(r"^ +Example: softreach (.+)$", file.read_text("utf-8"), re.M):
+            words = shlex.split(text)
+            if words[0] not in seen:
+                seen.add(words[0])
+                yield words[0], words + FEWER.get(words[0], [])
+
+
+def _command_row(name: str, words: list[str]) -> str:
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        _provide(name, folder)
+        cold = _command(words, folder)
+        warm = min(_command(words, folder) for _ in range(_TURNS))
+    why = _why(name, warm.wall, cold.wall)
+    sizes = f"{cold.wall:.1f} | {cold.cpu:.1f} | {warm.wall:.2f} | {warm.cpu:.2f}"
+    return f"| `{shlex.join(words)}` | {sizes} | {warm.peak:.0f} | {why} |"
+
+
+def _provide(name: str, folder: Path) -> None:
+    """The files that a command's example reads."""
+    for to, source in FILES.get(name, {}).items():
+        shutil.copy(ROOT / "examples" / source, folder / to)
+    rows = [f"0.2,{0.02 * k:.2f},0.6" for k in range(6)]
+    (folder / "path.csv").write_text("\n".join(["x,y,z", *rows, ""]), encoding="utf-8")
+    if name in BEFORE:
+        _command(BEFORE[name].split(), folder)
+        shutil.rmtree(folder / "cache")
+
+
+def _command(words: list[str], folder: Path) -> Wait:
+    """Run the command line in a process of its own; what no other command reads is removed."""
+    before = {*folder.iterdir()}
+    cache = folder / "cache"
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "NUMBA_CACHE_DIR": str(cache)}
+    start = time.perf_counter()
+    with (folder / "said").open("w") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "softreach", *words],
+            cwd=folder,
+            env=environment,
+            stdout=said,
+            stderr=said,
+        )
+        _, status, used = os.wait4(process.pid, 0)
+    if os.waitstatus_to_exitcode(status) not in (0, 1):  # 1: a requirement is missed
+        raise RuntimeError(f"softreach {shlex.join(words)}: {(folder / 'said').read_text()}")
+    for made in {*folder.iterdir()} - before - {cache, *map(folder.joinpath, _KEPT)}:
+        shutil.rmtree(made) if made.is_dir() else made.unlink()
+    peak = used.ru_maxrss * (1e-6 if sys.platform == "darwin" else 1e-3)
+    return Wait(time.perf_counter() - start, used.ru_utime + used.ru_stime, peak)
+
+
+def _function_rows() -> Iterator[str]:
+    """Every public function, in this process; those that cost next to nothing share a line."""
+    from tests.abuse.public_calls import CALLS
+    from tests.test_names import FUNCTIONS
+
+    warnings.simplefilter("ignore")
+    quick, refused = [], []
+    with tempfile.TemporaryDirectory() as place:
+        for number, (name, call) in enumerate(CALLS.items()):
+            function = call.function or FUNCTIONS[name]
+            turns = [Path(place) / f"{number}_{turn}" for turn in range(1 + _TURNS)]
+            try:
+                first, *later = [_timed(function, dict(call.good()), turn) for turn in turns]
+            except (OSError, SoftreachError, TypeError):
+                refused.append(f"`{name}`")
+                continue
+            warm = min(later)
+            if first.wall < 0.02 and warm.wall < 0.01:
+                quick.append(f"`{name}`")
+                continue
+            sizes = f"{first.wall:.2f} | {warm.wall:.3f} | {warm.cpu:.3f} | {first.peak:.0f}"
+            yield f"| `{name}` | {sizes} | {_why(name, warm.wall, first.wall)} |"
+    yield f"\nBelow 10 ms: {', '.join(quick)}."
+    yield f"\nNot timed, as their call there names no file that exists: {', '.join(refused)}."
+
+
+def _timed(function: Callable[..., object], arguments: dict[str, object], place: Path) -> Wait:
+    """One call; what it writes goes to a place of its own."""
+    for name in ("path", "out"):
+        if isinstance(arguments.get(name), str):
+            place.mkdir()
+            arguments[name] = place / Path(str(arguments[name])).name
+    before, wall, cpu = reset_peak(), time.perf_counter(), time.process_time()
+    function(**arguments)
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return Wait(wall, cpu, (peak_bytes() - before) / 1e6)
+
+
+def _why(name: str, warm: float, cold: float) -> str:
+    return WHY.get(name, "**not explained**") if warm > _LONG[0] or cold > _LONG[1] else ""
+
+
+if __name__ == "__main__":
+    main()
