@@ -20,7 +20,7 @@ from benchmarks.memory import peak_bytes
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.command import Command
-from softreach.atlas.design_task import Intermediates
+from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Need
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.store import AtlasStore, Result

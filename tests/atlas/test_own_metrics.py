@@ -107,7 +107,7 @@ def test_what_metrics_share_is_computed_once_for_each_design(tmp_path, monkeypat
 
     shared = ("delaunay", "stream_statistics")
     for name in shared:
-        counting(import_module("softreach.atlas.design_task"), name)
+        counting(import_module("softreach.atlas.intermediates"), name)
     counting(import_module("softreach.workspace"), "reachable_set")
     counting(TipMap, "tips_and_status")
     options = SMALL | {"metrics": tuple(METRIC_GROUPS), "accuracy": 0.1}

@@ -9,7 +9,7 @@ import pytest
 
 import softreach as sr
 from softreach.atlas import DesignSpace, StoreFailed, atlas_status, build_atlas
-from softreach.atlas.design_task import Intermediates
+from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.store import AtlasStore
 from softreach.rod import TipMap
 from softreach.support.errors import InvalidInput, SoftreachWarning

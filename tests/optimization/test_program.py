@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.optimization.design_point import DesignPoint
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.objectives import goals
 from softreach.optimization.polish import point_of
 from softreach.optimization.problem import Problem
-from softreach.optimization.program import DesignPoint, Point, stacked, stacked_slopes
+from softreach.optimization.program import Point, stacked, stacked_slopes
 from softreach.requirements import Box, Keep, Limits, Requirements, Sphere, Target
 
 ARM = sr.designs.minimal_trunk(revolution=np.radians(40), taper=np.radians(2))
@@ -81,8 +82,8 @@ def start():
 def test_efforts_are_differentiated_to_a_millionth(name):
     of = problem(NEEDS, minimize=name)
     point = point_of(of, of.judge(of.parameters.start()), 0.03)
-    wanted = differences(point, lambda each: each.cost[0])
-    np.testing.assert_allclose(point.cost[1], wanted, atol=1e-6 * np.abs(wanted).max())
+    wanted = differences(point, lambda each: each.cost)
+    np.testing.assert_allclose(point.cost_slope, wanted, atol=1e-6 * np.abs(wanted).max())
 
 
 def test_tips_at_the_places_are_differentiated_to_a_millionth(start):
@@ -99,15 +100,39 @@ def test_rooms_are_differentiated(start):
 
 
 def test_coverage_of_a_region_is_differentiated_by_what_the_boundary_sweeps(monkeypatch):
-    monkeypatch.setattr("softreach.optimization.program._PLACES", 1 << 16)  # for the differences
+    # as many places as the differences need
+    monkeypatch.setattr("softreach.optimization.design_point._PLACES", 1 << 16)
     needs = Requirements(targets=[Target(region=Sphere(tuple(PLACES[0]), 0.3), share=0.1)])
     of = problem(needs, {"length": (0.8, 1.2), "lower": (-2.0, -1.0)}, maximize="coverage")
     values = {"length": 1.0, "lower": -5.0 / 3.0}
     design = DesignPoint(of, values, 0.003)
-    share, slopes = design.of_coverage()
+    share, slopes = design.of_coverage(), design.coverage_slope()
     assert 0.1 < share < 0.95
     for k, (name, step) in enumerate((("length", 0.02), ("lower", 0.1))):
         ends = [DesignPoint(of, values | {name: values[name] + s}, 0.003) for s in (step, -step)]
-        there, back = (end.of_coverage()[0] for end in ends)
+        there, back = (end.of_coverage() for end in ends)
         wanted = (there - back) / (2 * step) * np.ptp(of.parameters.bounds[k])
         assert slopes[k] == pytest.approx(wanted, abs=0.05 * np.abs(slopes).max())
+
+
+def test_poses_and_shares_are_those_of_the_arm_under_each_payload():
+    rubber = sr.Material(young_modulus=1e6, density=1000.0)
+    arm = sr.designs.minimal_trunk(length=0.3, material=rubber)
+    needs = Requirements(targets=[Target(region=Sphere((0, 0, 0.2), 0.1))], payloads=(0.0, 0.1))
+    of = Problem(
+        parameters=free_parameters(arm, {"taper": (0.0, 0.05)}),
+        requirements=needs,
+        goals=goals("coverage", (), needs),
+        accuracy=0.1,
+        coarse=0.1,
+    )
+    design = DesignPoint(of, {"taper": 0.01}, 0.1)
+    gamma = np.array([[-0.4, -0.7, -0.2]])
+    for rod, payload in zip(design.rods, needs.payloads, strict=True):
+        loads = sr.Loads(payload=payload) if payload else None
+        expected = sr.tip_positions(design.case.arm.replace(loads=loads), gamma)
+        np.testing.assert_allclose(rod.tips(gamma), expected, atol=1e-6)
+    checked = [each.share for each in design.case.check.coverages]
+    shares = [design.share(number, needs.targets[0].region) for number in range(2)]
+    assert shares[0] != shares[1]
+    np.testing.assert_allclose(shares, checked, atol=0.15)

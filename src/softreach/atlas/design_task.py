@@ -1,95 +1,29 @@
-"""Task of one design, start to end: tips, what its metrics are computed from, and its store."""
+"""Task of one design, start to end: its metrics computed, and stored."""
 
 from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.atlas.command import Command
+from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import UNSTABLE, AtlasStore, Result
-from softreach.cloud.curvature import stream_statistics
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay
-from softreach.geometry.hull import convex_hull
-from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, TipStatus, no_equilibrium_message
+from softreach.rod.tip_map import no_equilibrium_message
 from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.files.damage import StoreFailed
 from softreach.support.plugins import Imports
 
-_BLOCK = 65_536  # samples at a time, where not all of them are needed at once
 Values = dict[str, Array]
 Outcome = tuple[int, str]
 """Number of a design, and why it failed; empty if it did not."""
 
 _opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
-
-
-class Intermediates(Mapping[Need, Any]):
-    """Need -> its value for one design, computed at first use.
-
-    Args:
-        arm: The design.
-        cube: Unit activations that all designs share, shape (n, bundles).
-        command: Radius, accuracy, tolerance, stations and quantiles.
-        metrics: The metrics that will be computed.
-    """
-
-    def __init__(
-        self, arm: Manipulator, cube: Array, command: Command, metrics: Sequence[Metric]
-    ) -> None:
-        self.arm, self.cube, self.command = arm, cube, command
-        self.needs = frozenset(need for metric in metrics for need in metric.needs)
-        self._cache: dict[Need, Any] = {}
-
-    @cached_property
-    def rod(self) -> TipMap:
-        """The tip map of the design, to the tolerance of the command."""
-        return tip_map(self.arm, self.command.tol)
-
-    @cached_property
-    def tips(self) -> Array:
-        """Tips of all samples [m], shape (n, 3); NaN where there is no equilibrium."""
-        return self._samples[0]
-
-    @cached_property
-    def stable(self) -> NDArray[np.bool_]:
-        """Mask of the samples that have a stable equilibrium, shape (n,)."""
-        return self._samples[1] == TipStatus.STABLE
-
-    @cached_property
-    def _samples(self) -> tuple[Array, NDArray[np.int8]]:
-        return self.rod.tips_and_status(activations_of(self.rod, self.cube))
-
-    def __getitem__(self, need: Need) -> Any:
-        if need not in self._cache:
-            self._cache[need] = _COMPUTE[need](self)
-        return self._cache[need]
-
-    def __iter__(self) -> Iterator[Need]:
-        return iter(_COMPUTE)
-
-    def __len__(self) -> int:
-        return len(_COMPUTE)
-
-    def forget(self, *needs: Need) -> None:
-        """Free the memory of results that are no longer needed."""
-        for need in needs:
-            self._cache.pop(need, None)
-
-
-def activations_of(rod: TipMap, cube: Array) -> Array:
-    """The shared unit activations in the bounds of a tip map, shape (n, bundles)."""
-    return rod.box.from_cube(cube[:, : rod.box.bundles])
 
 
 @no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
@@ -105,7 +39,7 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
         if not intermediates.stable.any():  # found now, by all threads
             return partial(_put_unstable, store, metrics, index, intermediates)
         threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
-        values = _values(threaded, intermediates)
+        values = _values(threaded, intermediates, store.command.profile_sizes)
         intermediates.forget(Need.REACHABLE_SET)
     except StoreFailed:
         raise
@@ -164,37 +98,6 @@ def run_remotely(remote: Remote, index: int) -> Outcome:
         raise StoreFailed(str(error)) from None  # this one can be sent back
 
 
-def _stable(of: Intermediates, values: Array) -> Array:
-    """Those of the samples that have a stable equilibrium; not copied if all have."""
-    return values if of.stable.all() else values[of.stable]
-
-
-def _alpha_complex(of: Intermediates) -> AlphaComplex:
-    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
-
-
-def _convex_volume(of: Intermediates) -> float:
-    """From the triangulation, if one is needed anyway."""
-    if Need.ALPHA_COMPLEX in of.needs:
-        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
-    return convex_hull(of[Need.TIPS]).volume
-
-
-def _reachable_set(of: Intermediates) -> Any:
-    from softreach.workspace import reachable_set
-
-    return reachable_set(of.rod, accuracy=of.command.accuracy)
-
-
-def _strain_statistics(of: Intermediates) -> Any:
-    rod, cube = of.rod, of.cube
-    if rod.supports_unstable:
-        cube = cube[of.stable]
-    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
-    stations = np.array(of.command.stations) * rod.length
-    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
-
-
 @no_warnings()
 def _finish(
     store: AtlasStore,
@@ -205,7 +108,8 @@ def _finish(
 ) -> Outcome:
     try:
         rest = [metric for metric in metrics if metric.name not in values]
-        result = Result(values | _values(rest, intermediates), _kept_tips(store, intermediates))
+        values |= _values(rest, intermediates, store.command.profile_sizes)
+        result = Result(values, _kept_tips(store, intermediates))
     except Exception as error:
         return _fail(store, index, error)
     store.write(index, result)
@@ -216,7 +120,7 @@ def _put_unstable(
     store: AtlasStore, metrics: Sequence[Metric], index: int, intermediates: Intermediates
 ) -> Outcome:
     """Store a design of which no sample is stable: it has no other metric than that."""
-    sizes = intermediates.command.profile_sizes
+    sizes = store.command.profile_sizes
     values = {
         metric.name: np.full([sizes[dim] for dim in metric.over], np.nan) for metric in metrics
     }
@@ -227,8 +131,9 @@ def _put_unstable(
     return index, ""
 
 
-def _values(metrics: Sequence[Metric], intermediates: Intermediates) -> Values:
-    sizes = intermediates.command.profile_sizes
+def _values(
+    metrics: Sequence[Metric], intermediates: Intermediates, sizes: Mapping[str, int]
+) -> Values:
     return {metric.name: metric.value(intermediates, sizes) for metric in metrics}
 
 
@@ -240,18 +145,3 @@ def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:
     message = f"{type(error).__name__}: {error}"
     store.write_failure(index, message)
     return index, message
-
-
-_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
-    Need.ARM: lambda of: of.arm,
-    Need.LENGTH: lambda of: of.arm.length,
-    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
-    Need.TIPS: lambda of: _stable(of, of.tips),
-    Need.BASE_TIPS: lambda of: of.arm.base.to_base(of[Need.TIPS]),
-    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
-    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
-    Need.ALPHA_COMPLEX: _alpha_complex,
-    Need.CONVEX_VOLUME: _convex_volume,
-    Need.REACHABLE_SET: _reachable_set,
-    Need.STRAIN_STATISTICS: _strain_statistics,
-}

@@ -11,7 +11,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.shown import from_written, written_name
 from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
-from softreach.atlas.design_task import activations_of
+from softreach.atlas.intermediates import activations_of
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
 from softreach.atlas.store import (
     DAMAGED,

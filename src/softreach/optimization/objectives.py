@@ -11,15 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.command import Command
-from softreach.atlas.design_task import Intermediates
-from softreach.atlas.metric import Metric, Need
-from softreach.atlas.metrics import chosen_metrics, known_metric
-from softreach.atlas.space import DesignSpace
-from softreach.requirements.checks import Check, check, quick_check
+from softreach.atlas.intermediates import Intermediates
+from softreach.atlas.metric import Metric
+from softreach.atlas.metrics import known_metric
+from softreach.requirements.checks import Check, Sets, checked, quick_check, sets_to
 from softreach.requirements.requirements import Requirements
-from softreach.rod.rods import tip_map
-from softreach.sampling import cube_blocks
 from softreach.support.arguments import as_given, as_names
 from softreach.support.errors import InvalidInput, did_you_mean, no_warnings
 from softreach.support.lazy import lazy
@@ -72,20 +68,22 @@ class DesignCase:
     """Clouds have as many samples as numbers that are reported need."""
 
     @lazy
-    @no_warnings()
     def reached(self) -> ReachableSet:
         """The reachable set."""
-        from softreach.workspace import reachable_set
+        return self.set_of(self.arm)
 
-        return reachable_set(self.arm, accuracy=self.accuracy)
+    @lazy
+    def set_of(self) -> Sets:
+        """Reachable sets of the design and of it under payloads."""
+        return sets_to(self.accuracy)
 
     @lazy
     @no_warnings()
     def check(self) -> Check:
         """What is met and what is missed; on the way by poses that few descents find."""
         if self.fine:
-            return check(self.arm, self.requirements, accuracy=self.accuracy)
-        return quick_check(self.arm, self.requirements, self.accuracy)
+            return checked(self.arm, self.requirements, self.accuracy, self.set_of)
+        return quick_check(self.arm, self.requirements, self.accuracy, self.set_of)
 
     @lazy
     @no_warnings()
@@ -103,25 +101,13 @@ class DesignCase:
     @no_warnings()
     def metric(self, metric: Metric) -> float:
         """A metric of the atlas."""
-        if metric.needs == (Need.REACHABLE_SET,):
-            return float(metric.value({Need.REACHABLE_SET: self.reached}, {}))
         return float(metric.value(self._intermediates, {}))
 
     @lazy
     def _intermediates(self) -> Intermediates:
-        (cube,) = cube_blocks("sobol", self.samples, tip_map(self.arm).box.bundles, 0, self.samples)
-        command = Command(
-            space=DesignSpace.grid(self.arm, length=[self.arm.length]),
-            n=self.samples,
-            seed=0,
-            sampler="sobol",
-            tol=1e-6,
-            alpha_over_length=4.0 / np.cbrt(self.samples),
-            accuracy=self.accuracy,
-            metrics=chosen_metrics(["extent"]),
-            keep_clouds=False,
+        return Intermediates.of_one(
+            self.arm, self.samples, self.accuracy, partial(self.set_of, self.arm)
         )
-        return Intermediates(self.arm, cube, command, ())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from softreach.optimization.design_point import DesignPoint
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
+from softreach.optimization.program import Part, Point, stacked, stacked_slopes
 from softreach.requirements.parts import POSE_LIMITS
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
@@ -21,7 +22,7 @@ __all__ = ["Polished", "can_polish", "point_of", "polished"]
 
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
-_MOST_DESIGNS = 60
+MOST_DESIGNS = 60
 _HOPELESS = 0.5  # over L or relative: what a start may miss
 _TOLERANCE = 0.003  # of the accuracy
 _GENTLE = 0.1  # of the cost: the first step is along its slope, and as long
@@ -58,7 +59,7 @@ def polished(
     accuracy: float | None = None,
     goal: int = 0,
     floors: Sequence[float] = (),
-    iterations: int = _ITERATIONS,
+    designs: int = MOST_DESIGNS,
 ) -> Polished:
     """The local optimum of one goal next to a design; poses at the targets move along with it.
 
@@ -68,14 +69,14 @@ def polished(
         accuracy: Relative error of volumes, instead of that of coarse sets.
         goal: Number of the goal that is optimized.
         floors: Costs of all goals that are not to be exceeded, but for that one.
-        iterations: Most quadratic programs.
+        designs: Most designs that are made.
     """
     if start.excess > _HOPELESS:
         return Polished(start, 0)
-    program = _Program(problem, start, accuracy or problem.coarse, goal, floors)
+    program = _Program(problem, start, accuracy or problem.coarse, goal, floors, designs)
     try:
         first = program.begin()
-        end = _solved(program, first, iterations)
+        end = _solved(program, first)
         candidate = problem.judged(program.values_of(end), program.point(end).design.case)
     except (InvalidDesign, InvalidInput):
         return Polished(start, max(1, program.designs))
@@ -94,7 +95,7 @@ def point_of(problem: Problem, candidate: Candidate, accuracy: float, goal: int 
     return program.point(program.begin())
 
 
-def _solved(program: _Program, first: Array, iterations: int) -> Array:
+def _solved(program: _Program, first: Array) -> Array:
     from scipy.optimize import minimize
 
     point = program.point(first)
@@ -111,7 +112,7 @@ def _solved(program: _Program, first: Array, iterations: int) -> Array:
             bounds=[(0.0, 1.0)] * len(first),
             constraints=constraints,
             method="SLSQP",
-            options={"maxiter": iterations, "ftol": program.tolerance},
+            options={"maxiter": _ITERATIONS, "ftol": program.tolerance},
         ).x
     except _Spent:
         end, program.accepted = program.accepted, np.empty(0)
@@ -132,8 +133,9 @@ class _Program:
         accuracy: float,
         goal: int,
         floors: Sequence[float],
+        most: int = MOST_DESIGNS,
     ) -> None:
-        self.designs = 0
+        self.designs, self._most = 0, most
         """Designs made so far."""
         self.accepted = np.empty(0)
         """Unknowns at which the last quadratic program was set up."""
@@ -162,7 +164,7 @@ class _Program:
         first = np.concatenate([np.clip(reals, 0.0, 1.0), poses.ravel()])
         if len(poses):
             self._like = self.point(first).design.rods
-        self._scale = (abs(self.point(first).cost[0]) or 1.0) / _GENTLE
+        self._scale = (abs(self.point(first).cost) or 1.0) / _GENTLE
         return first
 
     @property
@@ -187,7 +189,7 @@ class _Program:
                 (p.design for p in self._points.values() if (p.reals == reals).all()), None
             )
             if design is None:
-                if self.designs >= _MOST_DESIGNS and len(self.accepted):
+                if self.designs >= self._most and len(self.accepted):
                     raise _Spent
                 self.designs += 1
                 values = self.values_of(unknowns)
@@ -200,7 +202,7 @@ class _Program:
     def cost(self, unknowns: Array) -> float:
         """Cost over that of the start; that of a design that cannot exist is large."""
         try:
-            cost = self.point(unknowns).cost_value / self._scale
+            cost = self.point(unknowns).cost / self._scale
         except (InvalidDesign, InvalidInput):
             return _WORSE
         return cost if math.isfinite(cost) else _WORSE
@@ -209,7 +211,7 @@ class _Program:
         """Its derivatives."""
         self.accepted = unknowns.copy()
         try:
-            return np.nan_to_num(self.point(unknowns).cost[1] / self._scale)
+            return np.nan_to_num(self.point(unknowns).cost_slope / self._scale)
         except (InvalidDesign, InvalidInput):
             return np.zeros(len(unknowns))
 

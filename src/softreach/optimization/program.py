@@ -9,196 +9,26 @@ from functools import cache, partial
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import find_parameters
-from softreach.arm.parameters.changes import parameters_by_every_name
-from softreach.arm.summary import load_number, mass
-from softreach.optimization.free_parameters import Values
-from softreach.optimization.objectives import SETS, DesignCase, Goal
-from softreach.optimization.problem import Problem
-from softreach.optimization.robust import margin
-from softreach.requirements.checks import effort_scales
+from softreach.optimization.design_point import OF_ARM, STEP, DesignPoint
+from softreach.optimization.objectives import SETS, Goal
+from softreach.requirements.chosen_poses import effort_scales
 from softreach.requirements.poses import PoseRules
-from softreach.requirements.regions import Region
-from softreach.rod.rods import in_steps, refined, tip_map
+from softreach.rod.rods import in_steps
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-from softreach.workspace import ReachableSet, ReachableSolid, reachable_set
-from softreach.workspace.boundary_samples import boundary_samples
-from softreach.workspace.gradient import VolumeGradient, volume_gradient
-from softreach.workspace.tip_derivatives import TipDerivatives
 
-__all__ = ["DesignPoint", "Point"]
+__all__ = ["Point"]
 
 COVERAGE = "coverage"
 EFFORTS = ("mean_effort", "worst_effort")
-_OF_ARM: dict[str, Callable[[Manipulator], float]] = {
-    "mass": lambda arm: mass(arm) or 0.0,
-    "load_number": lambda arm: load_number(arm) or 0.0,
-    "actuators": lambda arm: float(arm.inputs),
-}
-_TOL = 1e-7  # of tips at the targets, in L
-_STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
 _FAR = 0.1  # over L or relative: room beyond which a rule is not differentiated
 _ROOM = 0.98  # of the distance within which a tip must come to a place
 _SPARE = 1e-4  # over L or relative, by which limits are kept
-_WIDE_STEP = 0.02  # of a range, for what is rough
 _TOUCHES = 1e-12
-_PLACES = 8192  # of a region, whose share is covered
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
-
-
-@dataclass(eq=False)
-class DesignPoint:
-    """One design on the way of a polish; derivatives are by real parameters over their ranges."""
-
-    problem: Problem
-    values: Values
-    accuracy: float
-    like: Sequence[TipMap] = ()
-    """Tip maps of a design nearby, in as many steps."""
-
-    @lazy
-    def case(self) -> DesignCase:
-        """The design, to be asked."""
-        return self.problem.case(self.values, self.accuracy)
-
-    @lazy
-    def rods(self) -> tuple[TipMap, ...]:
-        """Its tip map under each payload."""
-        arms = _laden(self.problem, self.case.arm)
-        if not self.like:
-            return tuple(refined(tip_map(arm), _TOL) for arm in arms)
-        pairs = zip(arms, self.like, strict=True)
-        return tuple(in_steps(arm, rod.steps, rod) for arm, rod in pairs)
-
-    @lazy
-    def derivatives(self) -> tuple[TipDerivatives, ...]:
-        """∂r/∂p of each of these, by parameters of the arm."""
-        known = [find_parameters(rod.arm, self._paths[0]) for rod in self.rods]
-        return tuple(
-            TipDerivatives(rod, [each[name] for name in self._paths[0]])
-            for rod, each in zip(self.rods, known, strict=True)
-        )
-
-    @lazy
-    def chain(self) -> Array:
-        """Change of parameters of the arm by unknowns: ranges and ties, shape (paths, reals)."""
-        return self._paths[1]
-
-    @lazy
-    def sets(self) -> VolumeGradient:
-        """Derivatives of the reachable set."""
-        return volume_gradient(self.case.arm, self._paths[0], accuracy=self.accuracy)
-
-    def of_set(self, name: str) -> tuple[float, Array]:
-        """A number of the reachable set and its derivatives by the reals."""
-        value = float(getattr(self.case.reached, SETS[name]))
-        return value, getattr(self.sets, SETS[name]) @ self.chain
-
-    def of_coverage(self) -> tuple[float, Array]:
-        """Mean share of the regions that the tip reaches, and its derivatives by the reals."""
-        pairs = [
-            (number, target.region)
-            for number in range(len(self.rods))
-            for target in self.problem.requirements.targets
-            if target.region is not None
-        ]
-        shares, slopes = zip(*(self.share(*pair) for pair in pairs), strict=True)
-        return float(np.mean(shares)), np.mean(slopes, axis=0)
-
-    def share(self, number: int, region: Region) -> tuple[float, Array]:
-        """Share of a region that the tip reaches under a payload, and its derivatives.
-
-        They are what the part of the boundary that is in the region sweeps, theory (98).
-        """
-        solid = self._solids[number]
-        if not isinstance(solid, ReachableSolid):
-            return 0.0, np.zeros(self.chain.shape[1])
-        nodes = boundary_samples(solid.image)
-        inside = (region.distance(nodes.places) <= 0.0).astype(float)
-        swept = nodes.derivative(self.derivatives[number].at(nodes.cube), inside)
-        share = float(solid.contains(region.places(_PLACES)).mean())
-        return share, swept @ self.chain / region.volume
-
-    @lazy
-    def _solids(self) -> tuple[ReachableSet, ...]:
-        """Reachable sets under each payload."""
-        if len(self.rods) == 1:
-            return (self.case.reached,)
-        return tuple(reachable_set(rod.arm, accuracy=self.accuracy) for rod in self.rods)
-
-    def of_arm(self, name: str) -> tuple[float, Array]:
-        """A number that follows from the design alone, and its derivatives by differences."""
-        of = _OF_ARM[name]
-        slopes = [(of(ahead) - of(behind)) / step for step, ahead, behind in self.neighbors]
-        return of(self.case.arm), np.array(slopes)
-
-    def margin(self, goal: Goal) -> float:
-        """Distance of a robust goal from that of the design itself."""
-        if goal.name not in self._margins:
-            self._margins[goal.name] = goal.sense * margin(goal, self.case)
-        return self._margins[goal.name]
-
-    def margin_slope(self, goal: Goal) -> Array:
-        """Its derivatives by the reals: differences to one side."""
-        parameters = self.problem.parameters
-        reals, (low, high) = parameters.reals(self.values), parameters.bounds.T
-        slopes = []
-        for k, step in enumerate(_WIDE_STEP * (high - low)):
-            moved = reals.copy()
-            moved[k] += step if reals[k] + step <= high[k] else -step
-            case = self.problem.case(parameters.moved(self.values, moved), self.accuracy)
-            change = goal.sense * margin(goal, case) - self.margin(goal)
-            slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
-        return np.array(slopes)
-
-    @lazy
-    def _margins(self) -> dict[str, float]:
-        return {}
-
-    @lazy
-    def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:
-        """Designs on both sides along each real parameter, and how far they are apart."""
-        parameters, pairs = self.problem.parameters, []
-        reals, (low, high) = parameters.reals(self.values), parameters.bounds.T
-        for k in range(len(reals)):
-            ends = np.clip(reals[k] + np.array([1, -1]) * _STEP * (high - low)[k], low[k], high[k])
-            arms = []
-            for end in ends:
-                moved = reals.copy()
-                moved[k] = end
-                arms.append(parameters.arm(parameters.moved(self.values, moved)))
-            pairs.append((float((ends[0] - ends[1]) / (high - low)[k]), *arms))
-        return pairs
-
-    @lazy
-    def _paths(self) -> tuple[tuple[str, ...], Array]:
-        """Parameters of the arm that move, and the chain."""
-        parameters = self.problem.parameters
-        known = parameters_by_every_name(self.case.arm)
-        widths = np.ptp(parameters.bounds, axis=1)
-        names = [each.name for each in parameters.real]
-        rows = {
-            name: widths[k] * np.eye(len(names))[k] for k, name in enumerate(names) if name in known
-        }
-        for tie in parameters.ties:
-            if tie.of in names and tie.name in known:
-                k = names.index(tie.of)
-                rows[tie.name] = tie.factor * widths[k] * np.eye(len(names))[k]
-        return tuple(rows), np.array(list(rows.values())).reshape(-1, len(names))
-
-
-def _laden(problem: Problem, arm: Manipulator) -> list[Manipulator]:
-    """The arm under each payload of the requirements, or as it is."""
-    loads = arm.loads
-    if not problem.requirements.payloads or loads is None:
-        return [arm]
-    return [
-        arm.replace(loads=loads.replace(payload=mass)) for mass in problem.requirements.payloads
-    ]
 
 
 @dataclass(eq=False)
@@ -217,20 +47,16 @@ class Point:
     floors: Sequence[float]
 
     @lazy
-    def cost_value(self) -> float:
-        """Cost of the goal alone, for which sets need not be differentiated."""
+    def cost(self) -> float:
+        """Cost of the goal."""
         goals = self.design.problem.goals
-        if not goals or goals[self.goal].name not in SETS:
-            return self.cost[0]
-        goal = goals[self.goal]
-        cost = -goal.sense * float(getattr(self.design.case.reached, SETS[goal.name]))
-        return cost + self.design.margin(goal) if goal.objective.sigmas else cost
+        return self._cost(goals[self.goal]) if goals else 0.0
 
     @lazy
-    def cost(self) -> tuple[float, Array]:
-        """Cost of the goal and its derivatives."""
+    def cost_slope(self) -> Array:
+        """Its derivatives."""
         goals = self.design.problem.goals
-        return self._cost_of(goals[self.goal]) if goals else (0.0, np.zeros(self._size))
+        return self._cost_slope(goals[self.goal]) if goals else np.zeros(self._size)
 
     @lazy
     def equations(self) -> tuple[Part, ...]:
@@ -247,21 +73,31 @@ class Point:
     def _size(self) -> int:
         return len(self.reals) + self.poses.size
 
-    def _cost_of(self, goal: Goal) -> tuple[float, Array]:
-        slope = np.zeros(self._size)
+    def _cost(self, goal: Goal) -> float:
         if goal.name in EFFORTS:
-            value, slope = self._effort(goal.name)
+            value = self._effort(goal.name)[0]
         elif goal.name == COVERAGE:
-            value, slope[: len(self.reals)] = self.design.of_coverage()
+            value = self.design.of_coverage()
         elif goal.name in SETS:
-            value, slope[: len(self.reals)] = self.design.of_set(goal.name)
+            value = self.design.of_set(goal.name)
         else:
-            value, slope[: len(self.reals)] = self.design.of_arm(goal.name)
-        cost, slope = -goal.sense * value, -goal.sense * slope
+            value = self.design.of_arm(goal.name)
+        return -goal.sense * value + (self.design.margin(goal) if goal.objective.sigmas else 0.0)
+
+    def _cost_slope(self, goal: Goal) -> Array:
+        slope, reals = np.zeros(self._size), slice(0, len(self.reals))
+        if goal.name in EFFORTS:
+            slope = self._effort(goal.name)[1]
+        elif goal.name == COVERAGE:
+            slope[reals] = self.design.coverage_slope()
+        elif goal.name in SETS:
+            slope[reals] = self.design.set_slope(goal.name)
+        else:
+            slope[reals] = self.design.arm_slope(goal.name)
+        slope = -goal.sense * slope
         if goal.objective.sigmas:
-            cost += self.design.margin(goal)
-            slope[: len(self.reals)] += self.design.margin_slope(goal)
-        return cost, slope
+            slope[reals] += self.design.margin_slope(goal)
+        return slope
 
     def _effort(self, name: str) -> tuple[float, Array]:
         """Mean of |γ|, each over its largest bound; of a high power for the largest of them."""
@@ -283,7 +119,7 @@ class Point:
     def _tips(self) -> list[Part]:
         """Tip less place over L of each pose."""
         needs, parts = self.design.problem.requirements, []
-        within = _within(needs.targets)
+        within = needs.within
         for number, (rod, cube) in enumerate(self._by_payload()):
             tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
             gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
@@ -327,7 +163,7 @@ class Point:
         keeps = [keep for keep in needs.keeps if keep.when == "targets"]
 
         def rules_of(arm: Manipulator, number: int) -> PoseRules:
-            laden = _laden(self.design.problem, arm)[number]
+            laden = needs.under_payloads(arm)[number]
             like = self.design.rods[number]
             rod = like if arm is self.design.case.arm else in_steps(laden, like.steps, like)
             return PoseRules.of(laden, keeps, needs.limits, np.inf, rod)
@@ -358,7 +194,7 @@ class Point:
             slope[:, near, k] = (ahead - behind) / apart
         for j, column in enumerate(self._columns(number)):
             ends = np.repeat(cube[None], 2, axis=0)
-            ends[:, :, j] = np.clip(cube[:, j] + np.array([[_STEP], [-_STEP]]), 0.0, 1.0)
+            ends[:, :, j] = np.clip(cube[:, j] + np.array([[STEP], [-STEP]]), 0.0, 1.0)
             ahead, behind = (_room(rules.some(near), end) for end in ends)
             apart = (ends[0, :, j] - ends[1, :, j])[:, None]
             for place, at in enumerate(column):
@@ -371,24 +207,25 @@ class Point:
             if (region := target.region) is None:
                 continue
             for number in range(len(self.design.rods)):
-                share = partial(self.design.share, number, region)
-                yield self._limit(target.name, -1.0, share()[0], target.share, share)
+                share = self.design.share(number, region)
+                slope = partial(self.design.share_slope, number, region)
+                yield self._limit(target.name, -1.0, share, target.share, slope)
 
     def _of_design(self) -> Iterator[Part]:
         """Limits and measures that follow from the design or its set."""
         needs = self.design.problem.requirements
         for name, (low, high) in needs.measures.items():
             if name in SETS:
-                value = float(getattr(self.design.case.reached, SETS[name]))
-                slope = partial(self.design.of_set, name)
+                value = self.design.of_set(name)
+                slope = partial(self.design.set_slope, name)
                 for sense, limit in ((1.0, high), (-1.0, low)):
                     if limit is not None:
                         yield self._limit(name, sense, value, limit, slope)
-        for name in _OF_ARM:
+        for name in OF_ARM:
             most = needs.limits.given.get(name)
             if most is not None:
-                value = _OF_ARM[name](self.design.case.arm)
-                yield self._limit(name, 1.0, value, most, partial(self.design.of_arm, name))
+                value = self.design.of_arm(name)
+                yield self._limit(name, 1.0, value, most, partial(self.design.arm_slope, name))
 
     def _limit(
         self,
@@ -396,14 +233,14 @@ class Point:
         sense: float,
         value: float,
         limit: float,
-        derived: Callable[[], tuple[float, Array]],
+        derived: Callable[[], Array],
     ) -> Part:
         """Room below a limit (sense 1) or above it (-1), relative."""
         scale = abs(limit) or 1.0
 
         def slope() -> Array:
             row = np.zeros((1, self._size))
-            row[0, : len(self.reals)] = -sense * derived()[1] / scale
+            row[0, : len(self.reals)] = -sense * derived() / scale
             return row
 
         room = np.array([sense * (limit - value) / scale - _SPARE])
@@ -414,11 +251,12 @@ class Point:
         goals = self.design.problem.goals
         for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
             if k != self.goal:
-                cost, slope = self._cost_of(goal)
                 scale = abs(floor) or 1.0
-                value = np.array([(floor - cost) / scale])
-                row = partial(np.multiply, -1.0 / scale, slope[None])
-                yield Part(goal.name, value, row, scale=scale)
+                value = np.array([(floor - self._cost(goal)) / scale])
+                yield Part(goal.name, value, partial(self._floor_slope, goal, scale), scale=scale)
+
+    def _floor_slope(self, goal: Goal, scale: float) -> Array:
+        return -self._cost_slope(goal)[None] / scale
 
 
 @dataclass(frozen=True)
@@ -488,13 +326,3 @@ def _room(rules: PoseRules, cube: Array) -> Array:
     )
     room = np.nan_to_num((most - value) / scale, nan=-1.0, neginf=-1.0, posinf=1.0)
     return np.where(np.abs(room) < _TOUCHES, 0.0, room - _SPARE)
-
-
-def _within(targets: Sequence[object]) -> Array:
-    """How near the tip must come to each place [m]."""
-    each = [
-        np.full(len(target.places), target.within)  # pyright: ignore
-        for target in targets
-        if target.places is not None  # pyright: ignore
-    ]
-    return np.concatenate([np.empty(0), *each])

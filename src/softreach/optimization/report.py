@@ -67,7 +67,11 @@ def verdict(search: Search) -> str:
         return "Search: no design that can be judged was found"
     if not search.met:
         return f"Search: requirements missed, {len(best.missed)} of {count} by the best design"
-    front = f"front of {len(search.front)} designs" if len(search.goals) > 1 else "best design"
+    front = (
+        f"front of {counted(len(search.front), 'design')}"
+        if len(search.goals) > 1
+        else "best design"
+    )
     return f"Search: {front}" + (f", {counted(count, 'requirement')} met" if count else "")
 
 

@@ -16,7 +16,7 @@ from softreach.atlas.metric import Metric
 from softreach.optimization.deviations import deviations_of
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.objectives import goals
-from softreach.optimization.polish import Polished, can_polish, polished
+from softreach.optimization.polish import MOST_DESIGNS, Polished, can_polish, polished
 from softreach.optimization.problem import Candidate, Problem
 from softreach.optimization.result import Search
 from softreach.optimization.robust import robust_goals, spreads_of
@@ -47,6 +47,8 @@ _FIRST_SHARE = 0.25  # of all designs, before anything is known
 _ROUND_SHARE = 0.15  # of all designs, between polishes
 _POLISHES = 4  # side by side
 _DESIGNS_OF_POLISH = 30  # at most, as a rule
+_LEAST_OF_POLISH = 4  # designs, with which one begins
+_LAST_SHARE, _MOST_LAST = 0.2, 20  # of all designs, kept for the polish to full accuracy
 _APART = 0.08  # of the ranges, in the mean: designs nearer to each other lead to the same end
 _LAST = 3  # designs that are judged to full accuracy
 
@@ -137,10 +139,10 @@ def search(
     run = _Run(
         problem,
         as_integer("designs", designs, 1, 1_000_000),
+        polishes=as_flag("polish", polish) and can_polish(problem),
         follow=(lambda _: None) if follow is None else as_function("follow", follow),
         progress=as_progress(progress),
     )
-    run.polishes = as_flag("polish", polish) and can_polish(problem)
     study = Study(
         problem,
         storage=None if storage is None else as_path("storage", storage),
@@ -163,13 +165,14 @@ class _Run:
         problem: Problem,
         designs: int,
         *,
+        polishes: bool,
         follow: Callable[[Candidate], object],
         progress: Progress,
     ) -> None:
-        self.problem, self._designs = problem, designs
+        self.problem, self._designs, self._polishes = problem, designs, polishes
         self._follow, self._progress = follow, progress
-        self.polishes = True
-        """Whether designs are polished."""
+        last = polishes and len(problem.goals) < 2
+        self._kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
         self._spent = 0
         self._begun = time.perf_counter()
         self._starts: list[Array] = []
@@ -193,7 +196,7 @@ class _Run:
             self._polish(study)
             if not self._is_over(study):
                 part = max(_BATCH, int(_ROUND_SHARE * self._designs))
-                self._sample(study, min(part, self._designs - self._spent))
+                self._sample(study, min(part, self._left))
         every = study.candidates()
         finalists = self._at_full_accuracy(every)
         return Search(
@@ -207,10 +210,15 @@ class _Run:
             sampler=study.kind,
         )
 
+    @property
+    def _left(self) -> int:
+        """Designs that are left, but for the polish to full accuracy."""
+        return self._designs - self._kept - self._spent
+
     def _is_over(self, study: Study) -> bool:
         known = study.candidates()
         self._spent = max(self._spent, sum(each.designs for each in known))
-        if self._spent >= self._designs:
+        if self._left <= 0:
             return True
         return not self.problem.goals and any(each.is_feasible for each in known)
 
@@ -230,11 +238,13 @@ class _Run:
 
     def _polish(self, study: Study) -> None:
         """Local optima next to the best designs that no polish has begun at."""
-        if not self.polishes:
+        if not self._polishes or self._left < _LEAST_OF_POLISH:
             return
-        room = max(1, (self._designs - self._spent) // _DESIGNS_OF_POLISH)
+        room = max(1, self._left // _DESIGNS_OF_POLISH)
         starts = self._chosen(study.candidates(), min(_POLISHES, room))
-        for end in parallel.in_order(partial(self._polished, start) for start in starts):
+        most = min(MOST_DESIGNS, self._left // max(1, len(starts)))
+        tasks = (partial(self._polished, start, most) for start in starts)
+        for end in parallel.in_order(tasks):
             if not end.designs:
                 continue
             candidate = end.candidate.with_designs(end.designs)
@@ -242,15 +252,15 @@ class _Run:
             self._note(candidate)
             self._starts.append(self._place(candidate))
 
-    def _polished(self, start: Candidate) -> Polished:
+    def _polished(self, start: Candidate, designs: int) -> Polished:
         with parallel.undivided():
             if len(self.problem.goals) < 2:
-                return polished(self.problem, start)
+                return polished(self.problem, start, designs=designs)
             # One goal at a time, in turn, while the others stay as good as they are.
             moving = [k for k, goal in enumerate(self.problem.goals) if goal.name != "actuators"]
             goal = (moving or [0])[len(self._starts) % max(1, len(moving))]
             floors = self.problem.costs(start) if start.is_feasible else ()
-            return polished(self.problem, start, goal=goal, floors=floors)
+            return polished(self.problem, start, goal=goal, floors=floors, designs=designs)
 
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best designs that lie apart from each other and from ends of polishes."""
@@ -292,8 +302,9 @@ class _Run:
         if not several:
             judged = [each for each in candidates if np.isfinite(each.excess)]
             best = sorted(judged, key=problem.score)[:_LAST] or list(candidates[:1])
-            if self.polishes and best:
-                end = polished(problem, best[0], accuracy=problem.accuracy)
+            left = min(MOST_DESIGNS, self._designs - self._spent)
+            if self._polishes and best and left >= _LEAST_OF_POLISH:
+                end = polished(problem, best[0], accuracy=problem.accuracy, designs=left)
                 best.append(end.candidate)
                 self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]

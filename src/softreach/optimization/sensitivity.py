@@ -236,7 +236,7 @@ def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
 
 def _with_poses(point: Point) -> Array:
     """Slope of the cost by the reals, while poses keep the tips where they are."""
-    count, (_, slope) = len(point.reals), point.cost
+    count, slope = len(point.reals), point.cost_slope
     equations = _equations(point)
     if not len(equations) or not np.any(slope[count:]):
         return slope[:count]
@@ -269,7 +269,7 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     if not problem.goals or not problem.goals[0].objective.smooth or not problem.parameters.real:
         return (), math.nan
     point = point_of(problem, candidate, problem.accuracy)
-    slope, equations = point.cost[1], _equations(point)
+    slope, equations = point.cost_slope, _equations(point)
     size = float(np.linalg.norm(slope))
     bounds = [*_rooms(point), *_ends(problem, point)]
     columns = [*equations, *-equations, *(each.slope for each in bounds)]
@@ -303,7 +303,7 @@ def _rooms(point: Point) -> list[_Condition]:
 def _equations(point: Point) -> Array:
     """Derivatives of all equations, three for each place."""
     parts = point.equations
-    return stacked_slopes(parts) if parts else np.empty((0, len(point.cost[1])))
+    return stacked_slopes(parts) if parts else np.empty((0, len(point.cost_slope)))
 
 
 def _ends(problem: Problem, point: Point) -> list[_Condition]:

@@ -58,6 +58,7 @@ class Study:
         self.problem, self._first = problem, first
         self._sampler = as_one_of("sampler", sampler, SAMPLERS)
         self.seed = seed
+        self._judged: dict[int, Candidate] = {}  # by the number of its trial
         self._optuna = _library()
         with _quiet():
             self._study = self._opened(storage)
@@ -99,11 +100,11 @@ class Study:
         """All designs that were judged, by this process or another, in their order."""
         with _quiet():
             trials = self._study.get_trials(deepcopy=False, states=self._complete)
-        return [
-            Candidate.from_dict(trial.params, trial.user_attrs[_JUDGED])
-            for trial in trials
-            if _JUDGED in trial.user_attrs
-        ]
+        for trial in trials:
+            if trial.number not in self._judged and _JUDGED in trial.user_attrs:
+                candidate = Candidate.from_dict(trial.params, trial.user_attrs[_JUDGED])
+                self._judged[trial.number] = candidate
+        return [self._judged[number] for number in sorted(self._judged)]
 
     def focus(self) -> None:
         """Let a sampler that begins at one place begin where the best of the known designs are."""

@@ -19,8 +19,7 @@ from softreach.optimization.deviations import (
     deviations_of,
     probabilities,
 )
-from softreach.requirements.findings import with_payload
-from softreach.requirements.requirements import Requirements, Target
+from softreach.requirements.requirements import Requirements, Target, with_payload
 from softreach.rod.rods import tip_map
 from softreach.sampling import sample_cube
 from softreach.schema import provenance

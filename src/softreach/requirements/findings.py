@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.summary import load_number, mass
 from softreach.arm.tables import ends_over, quadrature, tables
-from softreach.atlas.design_task import Intermediates
+from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metrics import known_metric
 from softreach.requirements.parts import LIMIT_UNITS
-from softreach.requirements.requirements import Requirements
-from softreach.sampling import sample_cube
+from softreach.requirements.requirements import Requirements, with_payload
 from softreach.support.arguments import as_instance
 from softreach.support.errors import counted, no_warnings
 from softreach.support.units import LengthUnit, as_unit, handy_unit
 
+if TYPE_CHECKING:
+    from softreach.workspace import ReachableSet
+
 __all__ = ["Finding", "quick_excess"]
 
 _SAMPLES = 2**15
-_STATIONS = (0.5, 1.0)
 _PIECES = 8
 _ROUNDING = 1e-9
 _WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": "actuators"}
@@ -104,17 +103,6 @@ def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
                 yield Finding(target.name, "cover", False, target.share, text)
 
 
-def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
-    """The arm with a mass at its tip [kg]; as it is for None, and for 0 without loads.
-
-    Raises:
-        InvalidDesign: A layer without Young's modulus or density.
-    """
-    if payload is None or (payload == 0.0 and arm.loads is None):
-        return arm
-    return arm.replace(loads=(arm.loads or Loads()).replace(payload=payload))
-
-
 def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:
     """A limit against its value."""
     unit, symbol = shown_unit(arm), LIMIT_UNITS[name]
@@ -147,21 +135,15 @@ def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
         yield limit_finding("load_number", value, limits.load_number, arm, "")
 
 
-def measure_findings(arm: Manipulator, needs: Requirements, accuracy: float) -> Iterator[Finding]:
+def measure_findings(
+    arm: Manipulator, needs: Requirements, accuracy: float, known: Callable[[], ReachableSet]
+) -> Iterator[Finding]:
     """Measures against their least and largest values, of the design with its own loads."""
     if not needs.measures:
         return
     metrics = [metric for name in needs.measures if (metric := known_metric(name))]
-    command: Any = SimpleNamespace(
-        tol=1e-6,
-        accuracy=accuracy,
-        alpha_over_length=0.05,
-        stations=_STATIONS,
-        quantiles=(0.5,),
-    )
-    cube = sample_cube("sobol", _SAMPLES, max(arm.inputs, 1))
     with no_warnings():
-        source = Intermediates(arm, cube, command, metrics)
+        source = Intermediates.of_one(arm, _SAMPLES, accuracy, known)
         for metric in metrics:
             low, high = needs.measures[metric.name]
             value = float(metric.value(source, {}))

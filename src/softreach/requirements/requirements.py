@@ -12,6 +12,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from softreach.arm.loads import Loads
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
 from softreach.requirements.parts import LONGEST, MOST_PLACES, Keep, Limits, Target
 from softreach.requirements.requirements_file import read, written
@@ -83,6 +85,16 @@ class Requirements:
         """Places of all targets that have some, one after the other [m], shape (n, 3)."""
         each = [target.places for target in self.targets if target.places is not None]
         return np.concatenate([np.empty((0, 3)), *each])
+
+    @property
+    def within(self) -> Array:
+        """Distance to which each of these must be reached [m], shape (n,)."""
+        each = [np.full(len(t.places), t.within) for t in self.targets if t.places is not None]
+        return np.concatenate([np.empty(0), *each])
+
+    def under_payloads(self, arm: Manipulator) -> list[Manipulator]:
+        """An arm under each payload, or as it is where there are none."""
+        return [with_payload(arm, payload) for payload in self.payloads or (None,)]
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one."""
@@ -166,6 +178,17 @@ class Requirements:
             f"{len(self.measures)} measures",
         ]
         return f"Requirements: {'; '.join(parts)}"
+
+
+def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
+    """The arm with a mass at its tip [kg]; as it is for None, and for 0 without loads.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus or density.
+    """
+    if payload is None or (payload == 0.0 and arm.loads is None):
+        return arm
+    return arm.replace(loads=(arm.loads or Loads()).replace(payload=payload))
 
 
 def _named(parts: Sequence[Any]) -> Iterator[Any]:

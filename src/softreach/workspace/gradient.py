@@ -18,8 +18,9 @@ from softreach.schema import provenance
 from softreach.support.arguments import as_names, as_number
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
-from softreach.support.progress import Progress, as_progress
+from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.quantity import quantity
+from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.boundary_samples import (
     BoundarySamples,
     boundary_samples,
@@ -95,8 +96,26 @@ def volume_gradient(
         raise InvalidInput("parameters", "none", "the name of one or more")
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("parameters", twice[0], "given once")
-    parameter_of = find_parameters(arm, names)
-    solid = _solid(arm, accuracy)
+    find_parameters(arm, names)  # refused before the set is computed
+    if (free := tip_map(arm).box.dimension) < 3:
+        raise InvalidInput("arm", f"{free} free bundles", "three of them or more")
+    return gradient_of(reachable_set(arm, accuracy=accuracy), names, accuracy, progress)
+
+
+def gradient_of(
+    solid: ReachableSet, names: tuple[str, ...], accuracy: float, progress: Progress = silent
+) -> VolumeGradient:
+    """As `volume_gradient`, of a reachable set that is known.
+
+    Args:
+        solid: Reachable set of three free bundles or more.
+        names: Names of parameters.
+        accuracy: That to which the set was computed.
+        progress: Called with the number of parameters done since its last call.
+    """
+    if not isinstance(solid, ReachableSolid):
+        raise InvalidInput("arm", "a set without a volume", "one of three free bundles or more")
+    parameter_of = find_parameters(solid.arm, names)
     wanted = [parameter_of[name] for name in names]
     if solid.lost_share > 0.0:
         volume, convex = _by_differences(solid, wanted, accuracy, progress)
@@ -169,15 +188,6 @@ class VolumeGradient:
             for name, unit, value, error in rows
         ]
         return "\n  ".join([f"VolumeGradient: route {self.route}", *lines])
-
-
-def _solid(arm: Manipulator, accuracy: float) -> ReachableSolid:
-    free = tip_map(arm).box.dimension
-    if free < 3:
-        raise InvalidInput("arm", f"{free} free bundles", "three of them or more")
-    solid = reachable_set(arm, accuracy=accuracy)
-    assert isinstance(solid, ReachableSolid)
-    return solid
 
 
 class _Swept(NamedTuple):

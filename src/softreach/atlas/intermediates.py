@@ -1,0 +1,172 @@
+"""What the metrics of a design are computed from: each result at its first use, and only once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.command import Command
+from softreach.atlas.metric import Metric, Need
+from softreach.cloud.curvature import stream_statistics
+from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.geometry.delaunay import delaunay
+from softreach.geometry.hull import convex_hull
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.sampling import sample_cube
+from softreach.support.arrays import Array
+
+__all__ = ["Intermediates", "Settings", "activations_of"]
+
+_BLOCK = 65_536  # samples at a time, where not all of them are needed at once
+_TOL = 1e-6  # of tips, in L
+_SPACINGS = 1.6  # of samples that fill the box evenly, over L: radius of the alpha shape
+
+
+class Settings(NamedTuple):
+    """What the metrics of a single design are computed to, as a `Command` has it for many."""
+
+    tol: float
+    """Error of tips over L."""
+    accuracy: float
+    """Relative error of volumes of reachable sets."""
+    alpha_over_length: float
+    """Radius of alpha shapes over L."""
+    stations: tuple[float, ...] = (1.0,)
+    """Over L, where curvatures are taken."""
+    quantiles: tuple[float, ...] = (0.5,)
+    """Of these."""
+
+
+class Intermediates(Mapping[Need, Any]):
+    """Need -> its value for one design, computed at first use.
+
+    Args:
+        arm: The design.
+        cube: Unit activations that all designs share, shape (n, bundles).
+        command: Radius, accuracy, tolerance, stations and quantiles.
+        metrics: The metrics that will be computed.
+        sets: Source of the reachable set, if it is known elsewhere.
+    """
+
+    def __init__(
+        self,
+        arm: Manipulator,
+        cube: Array,
+        command: Command | Settings,
+        metrics: Sequence[Metric] = (),
+        sets: Callable[[], Any] | None = None,
+    ) -> None:
+        self.arm, self.cube, self.command = arm, cube, command
+        self.needs = frozenset(need for metric in metrics for need in metric.needs)
+        self.known_set = sets
+        self._cache: dict[Need, Any] = {}
+
+    @classmethod
+    def of_one(
+        cls, arm: Manipulator, samples: int, accuracy: float, sets: Callable[[], Any]
+    ) -> Self:
+        """Of a single design, with a radius of alpha shapes that its samples allow.
+
+        Args:
+            arm: The design.
+            samples: Number of samples, a power of two.
+            accuracy: Relative error of volumes of reachable sets.
+            sets: Source of the reachable set.
+        """
+        cube = sample_cube("sobol", samples, max(arm.inputs, 1))
+        alpha = _SPACINGS / float(np.cbrt(samples))
+        return cls(arm, cube, Settings(_TOL, accuracy, alpha), sets=sets)
+
+    @cached_property
+    def rod(self) -> TipMap:
+        """The tip map of the design, to the tolerance of the command."""
+        return tip_map(self.arm, self.command.tol)
+
+    @cached_property
+    def tips(self) -> Array:
+        """Tips of all samples [m], shape (n, 3); NaN where there is no equilibrium."""
+        return self._samples[0]
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Mask of the samples that have a stable equilibrium, shape (n,)."""
+        return self._samples[1] == TipStatus.STABLE
+
+    @cached_property
+    def _samples(self) -> tuple[Array, NDArray[np.int8]]:
+        return self.rod.tips_and_status(activations_of(self.rod, self.cube))
+
+    def __getitem__(self, need: Need) -> Any:
+        if need not in self._cache:
+            self._cache[need] = _COMPUTE[need](self)
+        return self._cache[need]
+
+    def __iter__(self) -> Iterator[Need]:
+        return iter(_COMPUTE)
+
+    def __len__(self) -> int:
+        return len(_COMPUTE)
+
+    def forget(self, *needs: Need) -> None:
+        """Free the memory of results that are no longer needed."""
+        for need in needs:
+            self._cache.pop(need, None)
+
+
+def activations_of(rod: TipMap, cube: Array) -> Array:
+    """The shared unit activations in the bounds of a tip map, shape (n, bundles)."""
+    return rod.box.from_cube(cube[:, : rod.box.bundles])
+
+
+def _stable(of: Intermediates, values: Array) -> Array:
+    """Those of the samples that have a stable equilibrium; not copied if all have."""
+    return values if of.stable.all() else values[of.stable]
+
+
+def _alpha_complex(of: Intermediates) -> AlphaComplex:
+    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
+
+
+def _convex_volume(of: Intermediates) -> float:
+    """From the triangulation, if one is needed anyway."""
+    if Need.ALPHA_COMPLEX in of.needs:
+        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
+    return convex_hull(of[Need.TIPS]).volume
+
+
+def _reachable_set(of: Intermediates) -> Any:
+    if of.known_set is not None:
+        return of.known_set()
+    from softreach.workspace import reachable_set
+
+    return reachable_set(of.rod, accuracy=of.command.accuracy)
+
+
+def _strain_statistics(of: Intermediates) -> Any:
+    rod, cube = of.rod, of.cube
+    if rod.supports_unstable:
+        cube = cube[of.stable]
+    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
+    stations = np.array(of.command.stations) * rod.length
+    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
+
+
+_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
+    Need.ARM: lambda of: of.arm,
+    Need.LENGTH: lambda of: of.arm.length,
+    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
+    Need.TIPS: lambda of: _stable(of, of.tips),
+    Need.BASE_TIPS: lambda of: of.arm.base.to_base(of[Need.TIPS]),
+    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
+    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
+    Need.ALPHA_COMPLEX: _alpha_complex,
+    Need.CONVEX_VOLUME: _convex_volume,
+    Need.REACHABLE_SET: _reachable_set,
+    Need.STRAIN_STATISTICS: _strain_statistics,
+}
