@@ -2,51 +2,33 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.solve import solve_inverse
+from softreach.optimization.arms_made import ArmsMade, arms_made, tried, with_places, with_region
 from softreach.optimization.deviations import (
-    NORMAL,
-    Deviations,
     Spread,
     deviations_of,
-    probabilities,
 )
-from softreach.requirements.requirements import Requirements, Target, with_payload
+from softreach.optimization.first_order import FirstOrder
+from softreach.requirements.requirements import Requirements
 from softreach.rod.rods import tip_map
-from softreach.sampling import sample_cube
 from softreach.schema import provenance
-from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
-from softreach.support.arrays import Array, Index, Mask
-from softreach.support.errors import InvalidDesign, InvalidInput, counted, no_warnings
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput, counted, no_warnings
 from softreach.support.progress import Progress, as_progress
-from softreach.workspace.gradient import volume_gradient
-from softreach.workspace.moving_boundary import MovingBoundary
-from softreach.workspace.reach import ACCURACIES, reachable_set
-from softreach.workspace.search import nearest_tips
-from softreach.workspace.solid import ReachableSolid
+from softreach.workspace.reach import ACCURACIES
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["TargetTolerance", "Tolerance", "tolerance"]
 
-_TOL = 1e-6  # of tips at targets, in L
-_POOL = 1 << 17  # places of space among which those are that are followed
-_FOLLOWED = 1 << 13  # near the boundary, and as many away from it
-_NEAR = 4.0  # deviations of the boundary
-_IN_REGION = 2048  # places of a region
-_MOST_TRIED = 1024  # places of targets that arms are made for
-_BLOCK = 1 << 22  # numbers at once
-_STARTS = 8  # of searches for a place, beside the solutions of the design
 _MOST = 1_000_000
 
 
@@ -123,8 +105,8 @@ def tolerance(
     if tip_map(deviations.arm).box.dimension < 3:
         raise InvalidInput("arm", "fewer than three free bundles", "three of them or more")
     with no_warnings():
-        first = _FirstOrder(deviations, needs, accuracy, deviations.draws(samples, seed))
-        arms = _arms_made(first, checked, seed, progress)
+        first = FirstOrder(deviations, needs, accuracy, deviations.draws(samples, seed))
+        arms = arms_made(first, checked, seed, progress)
         return _tolerance(first, arms)
 
 
@@ -224,296 +206,18 @@ def _target_text(target: TargetTolerance) -> str:
     return f"{target.name} reached  {text}{which}"
 
 
-class _FirstOrder:
-    """Sets, their boundaries and what deviations do to them, to first order."""
-
-    def __init__(
-        self, deviations: Deviations, needs: Requirements, accuracy: float, changes: Array
-    ) -> None:
-        self.deviations, self.needs, self.accuracy = deviations, needs, accuracy
-        self.changes = changes
-        self.gradient = volume_gradient(deviations.arm, deviations.names, accuracy=accuracy)
-        self.solid = self.gradient.solid
-        self.boundary = MovingBoundary.of(self.solid, deviations.parameters)
-        self.loaded = [self._under(payload) for payload in needs.payloads or (None,)]
-
-    def _under(self, payload: float | None) -> tuple[ReachableSolid | None, MovingBoundary | None]:
-        """Set under a payload, and its boundary; none of either where nothing is stable."""
-        arm = with_payload(self.deviations.arm, payload)
-        if arm is self.deviations.arm or not self.needs.targets:
-            return self.solid, self.boundary
-        try:
-            solid = reachable_set(arm, accuracy=self.accuracy)
-        except InvalidInput as error:
-            if error.name != "loads":
-                raise
-            return None, None
-        assert isinstance(solid, ReachableSolid)
-        return solid, MovingBoundary.of(solid, deviations_of(arm, self.sigmas).parameters)
-
-    @property
-    def sigmas(self) -> dict[str, float]:
-        """Deviations by name."""
-        return dict(zip(self.deviations.names, self.deviations.sigmas.tolist(), strict=True))
-
-    def kept(self) -> Spread:
-        """Share of the volume that is kept."""
-        volume, sigmas = self.solid.volume, self.deviations.sigmas
-        shares = 1.0 - self.boundary.lost(self.changes) / volume
-        # The triangles sweep what the gradient, which is more exact, says to be swept in all.
-        off = np.linalg.norm((self.boundary.growth - self.gradient.volume) * sigmas)
-        return Spread(
-            name="reach kept",
-            unit="1",
-            nominal=1.0,
-            mean=1.0 - self.boundary.mean_lost(sigmas) / volume,
-            deviation=float(shares.std()),
-            quantile=float(max(0.0, np.quantile(shares, 0.05))),
-            error=float(off) / volume / math.sqrt(2.0 * math.pi),
-        )
-
-    def costs(self) -> Array:
-        """Share lost by each parameter alone."""
-        each = np.diag(self.deviations.sigmas)
-        return np.array([self.boundary.mean_lost(row) for row in each]) / self.solid.volume
-
-    def of_set(self, name: str, unit: str, sense: float) -> Spread:
-        """A number of the set, by its gradient."""
-        nominal = float(getattr(self.solid, name))
-        slopes, errors = (getattr(self.gradient, part) for part in (name, f"{name}_error"))
-        deviation = float(np.linalg.norm(slopes * self.deviations.sigmas))
-        return Spread(
-            name=name,
-            unit=unit,
-            nominal=nominal,
-            mean=nominal,
-            deviation=deviation,
-            quantile=nominal - sense * NORMAL * deviation,
-            error=float(np.linalg.norm(errors * self.deviations.sigmas)),
-            sense=sense,
-        )
-
-    def depths(self, places: Array, within: float) -> Iterator[tuple[Array, Array]]:
-        """Depth of places within reach [m], and how the boundary there moves, by payloads."""
-        for solid, boundary in self.loaded:
-            if solid is None or boundary is None:
-                yield np.full(len(places), -np.inf), np.zeros((len(places), len(self.sigmas)))
-            else:
-                yield within - solid.distance(places), boundary.speed_at(places)
-
-    def probability(self, target: Target) -> Array:
-        """Probability that each place is reached, under the worst payload."""
-        assert target.places is not None
-        sigmas, within = self.deviations.sigmas, max(target.within, _TOL * self.solid.arm.length)
-        return np.min(
-            [
-                probabilities(depth, np.linalg.norm(speed * sigmas, axis=1))
-                for depth, speed in self.depths(target.places, within)
-            ],
-            axis=0,
-        )
-
-    def covered(self, target: Target) -> Spread:
-        """Share of a region that is covered, under the worst payload."""
-        places = region_places(target)
-        shares, nominal = np.ones(len(self.changes)), 1.0
-        for depth, speed in self.depths(places, target.within):
-            nominal = min(nominal, float((depth >= 0.0).mean()))
-            for block in parallel.blocks(len(shares), max(1, _BLOCK // len(places))):
-                held = (depth + self.changes[block] @ speed.T >= 0.0).mean(axis=1)
-                shares[block] = np.minimum(shares[block], held)
-        return Spread(
-            name=target.name,
-            unit="1",
-            nominal=nominal,
-            mean=float(shares.mean()),
-            deviation=float(shares.std()),
-            quantile=float(np.quantile(shares, 0.05)),
-            error=math.sqrt(max(nominal * (1.0 - nominal), 1.0 / len(places)) / len(places)),
-        )
-
-
-def region_places(target: Target) -> Array:
-    """Places of a region by which its share is measured."""
-    assert target.region is not None
-    return target.region.places(_IN_REGION)
-
-
-class _Followed(NamedTuple):
-    """Places within the reach of the design, more of them near its boundary."""
-
-    places: tuple[Array, Array]
-    """Near the boundary, and away from it."""
-    shares: tuple[float, float]
-    """Share of the volume that each stands for."""
-
-    @classmethod
-    def of(cls, first: _FirstOrder, seed: int) -> _Followed:
-        """Places, evenly spread in each part."""
-        solid, boundary = first.solid, first.boundary
-        low, high = boundary.places.min(axis=0), boundary.places.max(axis=0)
-        pool = low + (high - low) * sample_cube("sobol", _POOL, 3, seed)
-        pool = pool[solid.contains(pool)]
-        moves = np.linalg.norm(boundary.speed_at(pool) * first.deviations.sigmas, axis=1)
-        width = math.sqrt(float(boundary.area.mean()))
-        near = boundary.distance(pool) < _NEAR * moves + width
-        parts = pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED]
-        return cls(parts, (float(near.mean()), float((~near).mean())))
-
-    def kept(self, contains: Callable[[Array], Mask]) -> float:
-        """Share of the volume that another set contains."""
-        return sum(
-            share * float(contains(part).mean())
-            for part, share in zip(self.places, self.shares, strict=True)
-            if len(part)
-        )
-
-    def error(self, kept: float) -> float:
-        """Standard error of such a share, as if the places were random."""
-        share, count = self.shares[0], max(1, len(self.places[0]))
-        lost = min(1.0, (1.0 - kept) / max(share, 1e-9))
-        return share * math.sqrt(lost * (1.0 - lost) / count)
-
-
-class _Made(NamedTuple):
-    """Numbers of an arm that was made."""
-
-    kept: float
-    volume: float
-    unreachability: float
-    reached: tuple[Mask, ...]
-    """Of the places tried, for each target that has places."""
-    covered: tuple[float, ...]
-    """Of each region."""
-
-
-class _Arms(NamedTuple):
-    """All arms that were made."""
-
-    made: list[_Made]
-    impossible: int
-    error_of_kept: float
-
-
-def _arms_made(first: _FirstOrder, count: int, seed: int, progress: Progress) -> _Arms:
-    if not count:
-        return _Arms([], 0, math.nan)
-    followed = _Followed.of(first, seed)
-    starts = [
-        _starts(first, places[_tried(len(places))])
-        for target in _with_places(first.needs)
-        if (places := target.places) is not None
-    ]
-    tasks = (partial(_made, first, followed, starts, change) for change in first.changes[:count])
-    made, impossible = [], 0
-    for each in parallel.in_order(tasks):
-        progress(1)
-        if each is None:
-            impossible += 1
-        else:
-            made.append(each)
-    kept = float(np.mean([each.kept for each in made])) if made else math.nan
-    return _Arms(made, impossible, followed.error(kept))
-
-
-def _made(
-    first: _FirstOrder, followed: _Followed, starts: list[list[Array]], change: Array
-) -> _Made | None:
-    """An arm with deviations; None if there is no such arm."""
-    with parallel.undivided(), no_warnings():
-        try:
-            arm = first.deviations.made(change)
-            solid = reachable_set(arm, accuracy=first.accuracy)
-            if not isinstance(solid, ReachableSolid):
-                return None
-            return _Made(
-                followed.kept(solid.contains),
-                solid.volume,
-                solid.unreachability,
-                tuple(
-                    _reached(arm, first, target, start)
-                    for target, start in zip(_with_places(first.needs), starts, strict=True)
-                ),
-                tuple(_share(arm, solid, first, t) for t in _with_region(first.needs)),
-            )
-        except InvalidDesign:
-            return None
-        except InvalidInput as error:
-            if error.name != "loads":
-                raise
-            return None
-
-
-def _with_places(needs: Requirements) -> list[Target]:
-    return [target for target in needs.targets if target.places is not None]
-
-
-def _with_region(needs: Requirements) -> list[Target]:
-    return [target for target in needs.targets if target.region is not None]
-
-
-def _tried(count: int) -> Index:
-    """Numbers of the places that arms are made for, evenly spread over all."""
-    return np.unique(np.linspace(0, count - 1, min(count, _MOST_TRIED)).astype(np.int64))
-
-
-def _starts(first: _FirstOrder, places: Array) -> list[Array]:
-    """Places of the cube to search from: of all solutions of the design, and of a grid."""
-    box, count = tip_map(first.deviations.arm).box, len(places)
-    solutions = solve_inverse(first.deviations.arm, places)
-    rows = [solutions.nearest_activations]
-    for number in range(int(solutions.counts.max(initial=0))):
-        has = solutions.counts > number
-        row = solutions.nearest_activations.copy()
-        row[has] = solutions.activations[solutions.offsets[:-1][has] + number]
-        rows.append(row)
-    known = [np.nan_to_num(box.to_cube(row)[:, box.free], nan=0.5) for row in rows]
-    grid = sample_cube("sobol", _STARTS, box.dimension)
-    return [*known, *(np.tile(start, (count, 1)) for start in grid)]
-
-
-def _reached(arm: Manipulator, first: _FirstOrder, target: Target, starts: list[Array]) -> Mask:
-    """Places that an arm reaches under every payload, of those that are tried: by searches."""
-    assert target.places is not None
-    places = target.places[_tried(len(target.places))]
-    within, held = max(target.within, _TOL * arm.length), np.ones(len(places), bool)
-    for payload in first.needs.payloads or (None,):
-        rod, gaps = tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
-        for start in starts:
-            left = np.flatnonzero(gaps > within)
-            if len(left):
-                gamma = rod.box.from_free_cube(start[left])
-                nearest = nearest_tips(rod, gamma, places[left], within)
-                gaps[left] = np.fmin(gaps[left], nearest.distance)
-        held &= gaps <= within
-    return held
-
-
-def _share(arm: Manipulator, solid: ReachableSolid, first: _FirstOrder, target: Target) -> float:
-    """Share of a region that an arm covers under every payload."""
-    places, share = region_places(target), 1.0
-    for payload in first.needs.payloads or (None,):
-        loaded = with_payload(arm, payload)
-        own = solid if loaded is arm else reachable_set(loaded, accuracy=first.accuracy)
-        if not isinstance(own, ReachableSolid):
-            return 0.0
-        inside = own.distance(places) <= target.within if target.within else own.contains(places)
-        share = min(share, float(inside.mean()))
-    return share
-
-
-def _tolerance(first: _FirstOrder, arms: _Arms) -> Tolerance:
+def _tolerance(first: FirstOrder, arms: ArmsMade) -> Tolerance:
     made, deviations = arms.made, first.deviations
 
     def column(name: str) -> Array:
         return np.array([getattr(each, name) for each in made], float)
 
     targets = []
-    for k, target in enumerate(_with_places(first.needs)):
+    for k, target in enumerate(with_places(first.needs)):
         probability = first.probability(target)
         share = np.full(len(probability), np.nan)
         if made:
-            share[_tried(len(share))] = np.mean([each.reached[k] for each in made], axis=0)
+            share[tried(len(share))] = np.mean([each.reached[k] for each in made], axis=0)
         targets.append(TargetTolerance(target.name, probability, share, len(made)))
     return Tolerance(
         arm=deviations.arm,
@@ -528,7 +232,7 @@ def _tolerance(first: _FirstOrder, arms: _Arms) -> Tolerance:
         targets=tuple(targets),
         regions=tuple(
             first.covered(target).with_made(np.array([each.covered[k] for each in made], float))
-            for k, target in enumerate(_with_region(first.needs))
+            for k, target in enumerate(with_region(first.needs))
         ),
         costs=first.costs(),
         made=len(made),
