@@ -32,6 +32,8 @@ COMMANDS = {
     "gradient": "gradient lce_arm taper upper --accuracy 3e-4",
     "calibrate": "calibrate tentacle.toml tentacle.csv --free pose --free rings*modulus "
     "--report report.html --table missed.csv --out bench.toml",
+    "check": "check three_fibers.toml five_places.toml --accuracy 1e-3 --out check.png",
+    "search": "search five_places.toml --out best",
     "atlas": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000",
     "atlas, 2 workers": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000 --workers 2",
     "paper": "paper --out paper --quick",
@@ -91,8 +93,10 @@ def prepare(folder: Path) -> None:
     (folder / "targets.csv").write_text("\n".join(50 * targets))
     path = [f"0.2,{0.1 + 2e-5 * k},0.6" for k in range(5_000)]
     (folder / "path.csv").write_text("\n".join(path))
-    for file in (Path(__file__).parent.parent / "examples").glob("tentacle.*"):
-        shutil.copy(file, folder)
+    examples = Path(__file__).parent.parent / "examples"
+    for pattern in ("tentacle.*", "five_places.toml", "three_fibers.toml"):
+        for file in examples.glob(pattern):
+            shutil.copy(file, folder)
 
 
 def started(name: str, folder: Path) -> subprocess.Popen[bytes]:

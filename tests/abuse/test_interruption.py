@@ -41,7 +41,14 @@ def _draw(name: str) -> tuple[signal.Signals, float]:
     return draw.choice(list(SAID)), draw.uniform(0.0, longest)
 
 
-USUAL = {"cloud", "cloud, while it writes", "atlas, 2 workers", "warmup, empty cache", "studio"}
+USUAL = {
+    "cloud",
+    "cloud, while it writes",
+    "search",
+    "atlas, 2 workers",
+    "warmup, empty cache",
+    "studio",
+}
 """Commands that compute, write, have workers, compile and serve."""
 
 
