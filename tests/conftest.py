@@ -20,7 +20,7 @@ from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 pytest_plugins = ["tests.durations"]
 
-for profile, examples in {"usual": 12, "large": 25}.items():
+for profile, examples in {"usual": 8, "large": 25}.items():
     settings.register_profile(
         profile,
         derandomize=True,
@@ -60,12 +60,8 @@ def rng() -> np.random.Generator:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests in the browser, which are long and wait much, begin the shares of two workers."""
-    long = [item for item in items if item.path.stem.endswith("in_browser")]
-    short = [item for item in items if not item.path.stem.endswith("in_browser")]
-    half = len(long) // 2
-    first = max(0, len(items) // 2 - half)
-    items[:] = [*long[:half], *short[:first], *long[half:], *short[first:]]
+    """Tests in the browser begin the share of one worker, so that there is one page."""
+    items.sort(key=lambda item: not item.path.stem.endswith("in_browser"))
 
 
 def pytest_collection_finish() -> None:

@@ -18,7 +18,7 @@ from softreach.support.errors import InvalidDesign, SoftreachError
 from tests.abuse.refusals import raised_by, refusal_of, within_memory
 
 TRUNK = sr.designs.minimal_trunk().to_toml()
-SOME = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def with_value(key: str, value: str) -> str:

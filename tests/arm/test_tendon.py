@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import softreach as sr
@@ -110,7 +110,6 @@ def test_beyond_its_anchor_a_tendon_leaves_the_arm_straight(end):
     assert np.linalg.norm(places[0, :2]) > 1e-3
 
 
-@settings(max_examples=12)
 @given(
     tension=st.floats(0.1, 3),
     revolution=st.floats(-4, 4),

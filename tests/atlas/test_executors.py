@@ -77,7 +77,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
         if __name__ == "__main__":
             import warnings
             warnings.simplefilter("ignore")
-            build(sys.argv[1], executor=worker_processes(2), metrics=("extent",))
+            build(sys.argv[1], executor=worker_processes(1), metrics=("extent",))
     """
     assert ended(run_script(tmp_path, deadly(body, True), str(store))) == (None, "")
     status = atlas_status(store)
@@ -127,8 +127,8 @@ def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
             from distributed import Client
             options = {"log_directory": sys.argv[2], "local_directory": sys.argv[2]}
             options |= {"scheduler_options": {"dashboard_address": ":0"}, "interface": "lo"}
-            queue = SLURMCluster(cores=2, processes=2, memory="4GB", walltime="1:00:00", **options)
-            queue.scale(2)
+            queue = SLURMCluster(cores=1, processes=1, memory="4GB", walltime="1:00:00", **options)
+            queue.scale(1)
             with queue, Client(queue) as client:
                 build(sys.argv[1], executor=client)
     """

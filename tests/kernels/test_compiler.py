@@ -21,6 +21,7 @@ import pytest
 from numba import njit
 from numba.core import caching
 from numba.core.codegen import CPUCodegen
+from numba.core.compiler_lock import global_compiler_lock as compiling
 from numba.core.dispatcher import Dispatcher
 
 import softreach
@@ -217,6 +218,14 @@ def test_code_for_other_types_is_never_run(cache):
 def test_what_was_compiled_is_loaded_by_later_processes(cache, compile_with):
     assert not was_loaded(in_a_new_process(compile_with))
     assert was_loaded(in_a_new_process(compile_with))
+
+
+def test_only_one_thread_at_a_time_readies_numba(cache, monkeypatch):
+    """Another would compile with what is half loaded, and throw its cache away."""
+    locked = []
+    monkeypatch.setattr(parts, "_prepare_target", lambda: locked.append(compiling.is_locked()))
+    assert kernel(doubled)(2.5) == 5.0
+    assert locked == [True]
 
 
 def test_a_cache_that_cannot_be_written_does_not_stop_the_computation(cache):

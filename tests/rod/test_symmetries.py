@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import softreach as sr
@@ -50,7 +50,6 @@ def in_mirror_order(arm, gamma):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_turning_all_actuators_turns_the_tips(kind):
-    @settings(max_examples=12)
     @given(arm=any_arms(kind), angle=st.floats(-4, 4))
     def law(arm, angle):
         gamma = in_box(arm, 5)
@@ -65,7 +64,6 @@ def test_turning_all_actuators_turns_the_tips(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_mirroring_all_actuators_mirrors_the_tips(kind):
-    @settings(max_examples=12)
     @given(arm=any_arms(kind))
     def law(arm):
         gamma = in_box(arm, 5)
@@ -81,7 +79,6 @@ def test_mirroring_all_actuators_mirrors_the_tips(kind):
 def test_exchanging_bundles_turns_what_they_do(kind):
     """Bundles lie evenly: giving each the activation of the one before turns by 2π/n."""
 
-    @settings(max_examples=12)
     @given(arm=any_arms(kind))
     def law(arm):
         arm = arm.replace(actuators=arm.actuators[:1])

@@ -47,7 +47,7 @@ def test_of_tabs_that_were_closed_nothing_stays(studio):
     until(lambda: not studio.sessions)
     before = own_threads()
     gone = []
-    for _ in range(4):
+    for _ in range(2):
         with page(studio) as session:
             gone.append(weakref.ref(session.reach.cloud))
             del session

@@ -10,7 +10,7 @@ import pytest
 from softreach.arm import designs
 from softreach.studio import StudioState
 from softreach.studio.start import state_link
-from tests.studio.tab import TEN_A_SECOND
+from tests.studio.tab import CHEAP
 
 STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
 QUOTED = STRIKE.replace('"', '\\"')
@@ -136,7 +136,7 @@ def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser
     with socket.create_server(("127.0.0.1", 0)) as elsewhere:
         elsewhere.setblocking(False)
         page = browser.new_page()
-        page.add_init_script(TEN_A_SECOND)
+        page.add_init_script(CHEAP)
         page.goto(f"{studio.url}/?{asked}://127.0.0.1:{elsewhere.getsockname()[1]}/x")
         page.locator("canvas").first.wait_for()
         page.wait_for_timeout(2000)  # it would have called by then

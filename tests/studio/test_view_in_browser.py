@@ -12,8 +12,8 @@ from softreach.studio.jobs.reach import FollowCamera
 from softreach.studio.scene.camera import FOV, VIEWS
 from softreach.support.palette import bundle_color
 
-BUNDLES = [bundle_color(k) for k in range(3)]
-BLUE = BUNDLES[2]
+BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
+BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
 
 
 def pixels(tab) -> np.ndarray:
