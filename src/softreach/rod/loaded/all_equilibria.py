@@ -28,7 +28,6 @@ from softreach.geometry.sphere_maps import (
     sphere_roots,
 )
 from softreach.rod.driven import inner_rod
-from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration, shape_dataset, stations_along
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
@@ -196,7 +195,7 @@ def equilibria(
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     _check_loads(loaded.tables)
-    solver = _resolving(Solver(loaded.tables, FreeRod(inner.arm, rod.tol).steps, rod.tol), at)
+    solver = _resolving(Solver(loaded.tables, loaded.unloaded_steps, rod.tol), at)
     branch = solver.find(at)
     known = branch.frame[has_tip(branch.status)]
     solver, roots = _accurate(solver, at, _search(solver, at, known))
