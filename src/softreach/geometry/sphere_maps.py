@@ -41,16 +41,20 @@ _BISECTIONS = 60
 _OFF_AXIS = 1e-6
 
 
-@lru_cache(maxsize=8)
 def icosphere(levels: int) -> tuple[Array, Indices]:
     """An icosahedron whose triangles are quartered some times.
 
     Returns:
-        Points (n, 3), and triangles (20 · 4^levels, 3), counterclockwise from outside, read-only.
+        Points (n, 3), and triangles (20 · 4^levels, 3), counterclockwise from outside.
     """
+    points, triangles = _icosphere(levels)
+    return points.copy(), triangles.copy()
+
+
+@lru_cache(maxsize=8)
+def _icosphere(levels: int) -> tuple[Array, Indices]:
     if levels:
-        points, triangles = quartered(*icosphere(levels - 1))
-        return _read_only(points, triangles)
+        return quartered(*_icosphere(levels - 1))
     golden = 0.5 * (1.0 + np.sqrt(5.0))
     pairs = np.array([[-1, golden], [1, golden], [-1, -golden], [1, -golden]])
     points = np.zeros((12, 3))
@@ -69,11 +73,6 @@ def icosphere(levels: int) -> tuple[Array, Indices]:
     )
     inward = np.linalg.det(points[triangles]) < 0
     triangles[inward] = triangles[inward][:, ::-1]
-    return _read_only(points, triangles)
-
-
-def _read_only(points: Array, triangles: Indices) -> tuple[Array, Indices]:
-    points.flags.writeable = triangles.flags.writeable = False
     return points, triangles
 
 

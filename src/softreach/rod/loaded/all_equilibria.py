@@ -33,6 +33,7 @@ from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.rods import tip_map
+from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.rod.view import PlacedRod, View
 from softreach.support.arrays import as_floats
@@ -316,8 +317,9 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
     that it follows anywhere in the box: others may bend more.
     """
     allowed = 0.5 * solver.tol * solver.tables.arm.length
-    while 2 * solver.steps <= _MOST_STEPS:
-        finer = solver.halved()
+    most = max(_MOST_STEPS, 2 * enough_for_all_breaks(solver.tables.arm))
+    while 2 * solver.steps <= most:
+        finer = solver.judge()
         again = _again(finer, gamma, roots)
         if len(again.directions) == len(roots.directions):
             apart = _tips(finer, gamma, again) - _tips(solver, gamma, roots)

@@ -33,6 +33,7 @@ from softreach.rod.loaded.shooting import (
     with_across,
 )
 from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
+from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support import parallel
 from softreach.support.lazy import lazy
@@ -100,6 +101,11 @@ class Solver:
     def halved(self) -> Solver:
         """The same with twice the steps."""
         return Solver(self.tables, 2 * self.steps, self.tol)
+
+    def judge(self) -> Solver:
+        """The same with twice the steps, or as many as let one end at every breakpoint."""
+        steps = max(2 * self.steps, enough_for_all_breaks(self.tables.arm))
+        return Solver(self.tables, steps, self.tol)
 
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""

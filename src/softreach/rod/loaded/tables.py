@@ -16,7 +16,7 @@ from softreach.kernels.loaded.explicit_rk8 import NODES
 from softreach.kernels.rod import magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.loaded.phase import LoadPhase, load_phase, phase_stations
-from softreach.rod.steps import edges_between
+from softreach.rod.steps import edges_between, ends_of_steps
 from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
@@ -147,12 +147,15 @@ class LoadTables:
         return self._made[steps]
 
     def edges(self, stations: Array, steps: int) -> Array:
-        """Boundaries S of steps from tip to base, among them stations Z [m] and all breaks.
+        """Boundaries S of steps from tip to base, among them stations Z [m] and breaks.
 
         No step is longer in S than those of `steps` uniform ones.
         """
         profile = self.arm.profile
-        breaks = [*self.arm.breakpoints, *(load.station for load in self.loads.point_loads)]
+        breaks = [
+            *ends_of_steps(self.arm, steps),
+            *(load.station for load in self.loads.point_loads),
+        ]
         z = np.unique(np.concatenate([[0.0, self.arm.length], breaks, stations]))
         return edges_between(profile, profile.slender_coordinate(z), steps)[::-1]
 
