@@ -153,10 +153,21 @@ class Growth:
         if fixed is None:
             return None
         path = [*begun[-2:-1], fixed] if begun else [fixed]
-        reach, unstable = _AGAIN_FIRST if begun else _FIRST, False
+        if end := self._followed(path, _AGAIN_FIRST if begun else _FIRST):
+            return end
+        if self.box.dimension > 3:
+            path.append(self._polished(path[-1]))
+        return self._end(path, self._program(path[-1], _LOCAL))
+
+    def _followed(self, path: list[FixedTip], reach: float) -> Grown | None:
+        """Go on along a path until steps are too short; the end, where something else stops it.
+
+        Args:
+            path: The tip so far, to which its further places are added.
+            reach: Largest change of an activation in the first step, of its range.
+        """
         for _ in range(_MOST_STEPS):
-            fixed = path[-1]
-            best = self._program(fixed, reach)
+            best = self._program(path[-1], reach)
             if best.rate <= _NO_GROWTH:
                 return self._end(path, best)
             share = _OF_ROOM * _room(path) / best.force
@@ -164,28 +175,33 @@ class Growth:
                 best = best.shortened(share)
                 reach = float(np.abs(best.gamma / self.box.scales).max())
                 if reach < _OF_SHORTEST * self._shortest:
-                    break
-            tried = self._tried(path, best)
-            share = (tried.force - fixed.force) / best.force if tried else 0.0
-            stable = self._is_stable(tried) if tried else fixed.response.margin > _NEAR_LOSS
-            if tried is None or not stable or share < _REJECTED:
-                reach, unstable = 0.5 * reach, not stable
-            else:
-                path.append(tried)
-                if self._is_too_coarse(tried):
-                    return self._end(path, self._program(tried, _LOCAL), Stop.UNFINISHED)
-                unstable = False
-                reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
-                reach = min(reach, _LONGEST)
-            if share < _REJECTED and reach < (_SHORTEST if unstable else self._shortest):
+                    return None
+            share, unstable = self._step(path, best)
+            if share > 0.0 and self._is_too_coarse(path[-1]):
                 break
-        else:
-            return self._end(path, self._program(path[-1], _LOCAL), Stop.UNFINISHED)
-        if unstable:
-            return self._end(path, self._program(path[-1], _LOCAL), Stop.UNSTABLE)
-        if self.box.dimension > 3:
-            path.append(self._polished(path[-1]))
-        return self._end(path, self._program(path[-1], _LOCAL))
+            reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
+            reach = min(reach, _LONGEST)
+            if share == 0.0 and reach < (_SHORTEST if unstable else self._shortest):
+                if unstable:
+                    return self._end(path, self._program(path[-1], _LOCAL), Stop.UNSTABLE)
+                return None
+        return self._end(path, self._program(path[-1], _LOCAL), Stop.UNFINISHED)
+
+    def _step(self, path: list[FixedTip], best: _Program) -> tuple[float, bool]:
+        """Try a step of a path.
+
+        Returns:
+            The share of the growth foreseen, 0 if the step is not taken, and True if it is not as
+            the rod would not rest stably.
+        """
+        fixed, tried = path[-1], self._tried(path, best)
+        if tried is None:
+            return 0.0, fixed.response.margin <= _NEAR_LOSS
+        share, stable = (tried.force - fixed.force) / best.force, self._is_stable(tried)
+        if not stable or share < _REJECTED:
+            return 0.0, not stable
+        path.append(tried)
+        return share, False
 
     def _is_too_coarse(self, fixed: FixedTip) -> bool:
         """True if steps along the arm err too much to go on where stability is about to be lost."""
