@@ -55,7 +55,7 @@ LEFT_OUT = {
 }
 
 WHY = {
-    "forces.blocked_force": "the force grows in 160 steps, each solved for equilibria",
+    "forces.blocked_force": "the force grows in thirty steps, each solved for equilibria",
     "plot.plot_opposite_sides": "a cloud is drawn four times",
     "atlas": "eighteen designs, each with all its metrics",
     "calibrate": "cold: the kernels of loads; warm: predictions of the fit",

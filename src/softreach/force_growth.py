@@ -25,14 +25,19 @@ __all__ = ["FixedTip", "Grown", "Growth", "Stop"]
 
 
 _FIRST, _LONGEST, _SHORTEST = 0.05, 0.2, 1e-7  # largest change of an activation, of its range
+_AGAIN_FIRST = 0.01  # the same near the end
 _LOCAL = 1e-3  # below it the largest force is near, and bounds alone do not fix it
 _TURNING = 1e-5  # the same on a curve, where the force then turns back
 _REJECTED, _CURVED, _STRAIGHT = 0.1, 0.4, 0.8  # of the growth foreseen
 _MOST_STEPS, _CORRECTIONS = 300, 8
 _AT_BOUND = 1e-9  # of the range
 _NO_GROWTH = 1e-6  # units of force per range of activation
+_OF_TOL = 1e-2  # what the search may use up of the tolerance
 _UNIT = 0.1  # L, by which the unit of force moves the tip
 _FARTHEST = 0.5  # L, by which the force of one step may move it
+_OF_ROOM = 0.7  # of the growth that is left until stability is lost, as margins foretell it
+_OF_SHORTEST = 0.3  # of the shortest step, to which steps shrink within that room
+_AGAIN = 0.98  # of the force, up to which what other steps gave is kept
 _NEAR_LOSS = 0.1  # margin of stability below which what cannot be followed has lost it
 _MULTIPLIER = 1e-4  # of the largest one, below which a bound does not count
 
@@ -71,6 +76,8 @@ class Grown(NamedTuple):
     """Mask of the bundles at a bound that keeps the force from growing, shape (bundles,)."""
     slope: float
     """By how much the force would change if the place moved [N/m]."""
+    before: list[FixedTip]
+    """The tip on the way there, up to nearly as large a force."""
 
 
 class _Program(NamedTuple):
@@ -87,6 +94,10 @@ class _Program(NamedTuple):
     slope: float
     """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
 
+    def shortened(self, share: float) -> _Program:
+        """A share of the changes."""
+        return self._replace(gamma=share * self.gamma, force=share * self.force)
+
 
 @dataclass(frozen=True, eq=False)
 class Growth:
@@ -96,13 +107,18 @@ class Growth:
         pushing: The tip that pushes.
         place: Its fixed position [m], shape (3,).
         start: Activations near those that put it there without force, shape (bundles,).
-        residual: Largest distance of the tip from its place [m].
+        allowed: Largest error of the tip [m], of which its distance from the place takes a part.
     """
 
     pushing: PushingTip
     place: Array
     start: Array
-    residual: float
+    allowed: float
+
+    @property
+    def residual(self) -> float:
+        """Largest distance of the tip from its place [m]."""
+        return _OF_TOL * self.allowed
 
     @property
     def box(self) -> ActivationBox:
@@ -127,53 +143,99 @@ class Growth:
         """A force that moves the tip by a fair part of the arm [N]."""
         return _UNIT * self.pushing.rod.length / float(np.linalg.norm(self._begun.retreat))
 
-    def grown(self) -> Grown | None:
-        """The end of the growth; None without a start."""
-        fixed, reach, unstable = self.first, _FIRST, False
+    def grown(self, begun: list[FixedTip] | None = None) -> Grown | None:
+        """The end of the growth; None without a start.
+
+        Args:
+            begun: The tip on the way there in other steps along the arm, to begin with the last.
+        """
+        fixed = self._in_these_steps(begun[-1]) if begun else self.first
         if fixed is None:
             return None
-        for _ in range(_MOST_STEPS):
-            best = self._program(fixed, reach)
-            if best.rate <= _NO_GROWTH:
-                return self._end(fixed, best)
-            tried = self._tried(fixed, best)
-            share = (tried.force - fixed.force) / best.force if tried else 0.0
-            stable = self._is_stable(tried) if tried else fixed.response.margin > _NEAR_LOSS
-            if tried is None or not stable or share < _REJECTED:
-                reach, unstable = 0.5 * reach, not stable
-            else:
-                fixed, unstable = tried, False
-                reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
-                reach = min(reach, _LONGEST)
-            if reach < (_SHORTEST if unstable else self._shortest):
-                break
-        else:
-            return self._end(fixed, self._program(fixed, _LOCAL), Stop.UNFINISHED)
-        if unstable:
-            return self._end(fixed, self._program(fixed, _LOCAL), Stop.UNSTABLE)
+        path = [*begun[-2:-1], fixed] if begun else [fixed]
+        if end := self._followed(path, _AGAIN_FIRST if begun else _FIRST):
+            return end
         if self.box.dimension > 3:
-            fixed = self._polished(fixed)
-        return self._end(fixed, self._program(fixed, _LOCAL))
+            path.append(self._polished(path[-1]))
+        return self._end(path, self._program(path[-1], _LOCAL))
+
+    def _followed(self, path: list[FixedTip], reach: float) -> Grown | None:
+        """Go on along a path until steps are too short; the end, where something else stops it.
+
+        Args:
+            path: The tip so far, to which its further places are added.
+            reach: Largest change of an activation in the first step, of its range.
+        """
+        for _ in range(_MOST_STEPS):
+            best = self._program(path[-1], reach)
+            if best.rate <= _NO_GROWTH:
+                return self._end(path, best)
+            share = _OF_ROOM * _room(path) / best.force
+            if share < 1.0:
+                best = best.shortened(share)
+                reach = float(np.abs(best.gamma / self.box.scales).max())
+                if reach < _OF_SHORTEST * self._shortest:
+                    return None
+            share, unstable = self._step(path, best)
+            if share > 0.0 and self._is_too_coarse(path[-1]):
+                break
+            reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
+            reach = min(reach, _LONGEST)
+            if share == 0.0 and reach < (_SHORTEST if unstable else self._shortest):
+                if unstable:
+                    return self._end(path, self._program(path[-1], _LOCAL), Stop.UNSTABLE)
+                return None
+        return self._end(path, self._program(path[-1], _LOCAL), Stop.UNFINISHED)
+
+    def _step(self, path: list[FixedTip], best: _Program) -> tuple[float, bool]:
+        """Try a step of a path.
+
+        Returns:
+            The share of the growth foreseen, 0 if the step is not taken, and True if it is not as
+            the rod would not rest stably.
+        """
+        fixed, tried = path[-1], self._tried(path, best)
+        if tried is None:
+            return 0.0, fixed.response.margin <= _NEAR_LOSS
+        share, stable = (tried.force - fixed.force) / best.force, self._is_stable(tried)
+        if not stable or share < _REJECTED:
+            return 0.0, not stable
+        path.append(tried)
+        return share, False
+
+    def _is_too_coarse(self, fixed: FixedTip) -> bool:
+        """True if steps along the arm err too much to go on where stability is about to be lost."""
+        if fixed.response.margin > _NEAR_LOSS or self.pushing.is_finest:
+            return False
+        return self.pushing.error(*fixed) > 0.5 * self.allowed
+
+    def _in_these_steps(self, begun: FixedTip) -> FixedTip | None:
+        """The tip at its place under the same force; None if it is not there or not stable."""
+        fixed = self._corrected(begun.gamma, begun.force, 0.0, begun.response)
+        return fixed if fixed and self._is_stable(fixed) else None
 
     @property
     def _shortest(self) -> float:
         """The step below which nothing is gained by further ones."""
         return _LOCAL if self.box.dimension > 3 else _TURNING
 
-    def _end(self, fixed: FixedTip, best: _Program, stop: Stop | None = None) -> Grown:
+    def _end(self, path: list[FixedTip], best: _Program, stop: Stop | None = None) -> Grown:
         """The end, by what stopped it; by default bounds if some cost force, else the shape."""
+        fixed = path[-1]
+        before = [each for each in path if each.force <= _AGAIN * fixed.force] or path
         cost = np.abs(best.multipliers)
         limits = self._at_bound(fixed.gamma) & (cost > _MULTIPLIER * cost.max(initial=1e-12))
         if stop is None and np.isnan(best.slope):
             stop = Stop.UNFINISHED
         if stop is None:
             stop = Stop.BOUND if limits.any() else Stop.SINGULAR
-        return Grown(fixed, stop, limits & (stop == Stop.BOUND), best.slope)
+        return Grown(fixed, stop, limits & (stop == Stop.BOUND), best.slope, before)
 
-    def _tried(self, fixed: FixedTip, best: _Program) -> FixedTip | None:
+    def _tried(self, path: list[FixedTip], best: _Program) -> FixedTip | None:
         """The tip back at its place after a step, if it can be."""
+        fixed = path[-1]
         gamma, force = self.box.clip(fixed.gamma + best.gamma), fixed.force + best.force
-        return self._corrected(gamma, force, self.unit, fixed.response)
+        return self._corrected(gamma, force, self.unit, _ahead(path, force))
 
     def _is_stable(self, fixed: FixedTip) -> bool:
         return self.pushing.is_stable(fixed.gamma, fixed.force, fixed.response)
@@ -304,6 +366,33 @@ class Growth:
         if better is None or better.force < fixed.force:
             return fixed
         return better if self._is_stable(better) else fixed
+
+
+def _room(path: list[FixedTip]) -> float:
+    """Growth of the force until the margin of stability is 0, were it to fall on evenly [N]."""
+    if len(path) < 2:
+        return np.inf
+    past, fixed = path[-2:]
+    lost = past.response.margin - fixed.response.margin
+    if lost <= 0.0:
+        return np.inf
+    return max(0.0, fixed.response.margin * (fixed.force - past.force) / lost)
+
+
+def _ahead(path: list[FixedTip], force: float) -> TipResponse:
+    """Response near that under a larger force: what the tip sees turns on evenly.
+
+    Close to the loss of stability there are two equilibria near each other, and from what the tip
+    saw before the search may come to the wrong one.
+    """
+    response = path[-1].response
+    if len(path) < 2:
+        return response
+    past, fixed = path[-2:]
+    share = (force - fixed.force) / (fixed.force - past.force)
+    before, now = (each.response.equilibrium.frame for each in (past, fixed))
+    equilibrium = response.equilibrium._replace(frame=now + share * (now - before))
+    return response._replace(equilibrium=equilibrium)
 
 
 def _remembered(respond: Callable[[Array], TipResponse]) -> Callable[[Array], TipResponse]:

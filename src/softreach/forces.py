@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -32,8 +33,6 @@ __all__ = ["Stop", "blocked_force"]
 
 
 _MEANINGS = " ".join(f"{stop.value}={stop.name.lower()}" for stop in Stop)
-_OF_TOL = 1e-2  # what the search may use up of the tolerance
-_MOST_STEPS = 256  # along the arm
 
 
 def blocked_force(
@@ -135,16 +134,17 @@ def _starts(
 def _grown(rod: LoadedRod, direction: Array, place: Array, start: Array) -> _Best | None:
     """The end of the growth from one start, with steps along the arm that `tol` needs there."""
     pushing, allowed = PushingTip(rod, direction, rod.steps), rod.tol * rod.length
-    while True:
-        growth = Growth(pushing, place, start, _OF_TOL * allowed)
-        end = growth.grown()
-        if end is None or growth.first is None:
-            return None
+    growth = Growth(pushing, place, start, allowed)
+    first, end = growth.first, growth.grown()
+    while first is not None and end is not None:
         error = pushing.error(*end.fixed)
-        if error <= 0.5 * allowed or pushing.steps >= _MOST_STEPS:
+        if error <= 0.5 * allowed or pushing.is_finest:
             settles = pushing.settles(*end.fixed)
-            return _Best(growth.first.gamma, end, error + growth.residual, settles)
+            return _Best(first.gamma, end, error + growth.residual, settles)
         pushing = pushing.finer()
+        growth = replace(growth, pushing=pushing)
+        end = growth.grown(end.before) or growth.grown()
+    return None
 
 
 def _rows(best: list[_Best | None]) -> Iterator[tuple[int, _Best]]:

@@ -28,6 +28,7 @@ from softreach.arm import (
 from softreach.arm.tables import tables
 from softreach.kernels.rod import tips as rod
 from softreach.rod.free import FreeRod
+from softreach.rod.rods import in_steps, tip_map
 from tests.kinds import any_arms, driven
 from tests.laws import in_box
 
@@ -279,3 +280,32 @@ def test_a_breakpoint_where_nothing_changes_changes_nothing(trunk):
         apart = sr.tip_positions(cut, gamma, tol=tol) - sr.tip_positions(trunk, gamma, tol=tol)
         assert np.linalg.norm(apart, axis=1).max() <= 2 * tol
     assert FreeRod(cut).steps <= FreeRod(trunk).steps + len(places)
+
+
+@pytest.mark.parametrize(
+    ("kind", "loads"),
+    [(SampledTaper, None), (PiecewiseTaper, None), (SampledTaper, sr.Loads())],
+    ids=["sampled", "piecewise", "loaded"],
+)
+def test_many_samples_of_a_radius_cost_no_more_steps_than_tips_need(kind, loads):
+    """A step ends where a bundle does, but at no sample of a smooth profile."""
+    stations = np.linspace(0.0, 1.0, 202)
+    radii = 0.05 - 0.02 * stations + 0.002 * np.sin(9.0 * stations)
+    profile = kind(
+        length=1.0, stations_over_length=tuple(stations.tolist()), radii=tuple(radii.tolist())
+    )
+    fibers = [
+        FiberArchitecture(revolution=1.0, extent=0.8, name="long"),
+        FiberArchitecture(
+            revolution=0.0, extent=0.8, offset=2.0, name="short", end_over_length=0.6123
+        ),
+    ]
+    material = Material(young_modulus=1e7, poisson_ratio=0.5, density=1000.0)
+    section = Section(rings=(Ring(inner_ratio=0.5, material=material),))
+    arm = Manipulator(profile=profile, section=section, actuators=tuple(fibers), loads=loads)
+    rod = tip_map(arm)
+    assert rod.steps < 50
+    assert arm.profile.slender_coordinate(0.6123) in FreeRod(arm, 1e-6).rule.edges(rod.steps)
+    gamma = in_box(arm, 30)
+    exact = in_steps(arm, 400, rod)
+    np.testing.assert_allclose(rod.tips(gamma), exact.tips(gamma), rtol=0, atol=1e-6)

@@ -33,6 +33,7 @@ __all__ = [
     "compliance",
     "ends_over",
     "extension_range",
+    "jumps",
     "quadrature",
     "strain_stations",
     "tables",
@@ -43,6 +44,7 @@ Array = NDArray[np.float64]
 _STATIONS = 101
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _PIECES = 32
+_JUMP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +193,23 @@ def both_sides(arm: Manipulator, stations: Array) -> Array:
         return stations
     breaks = np.array(arm.breakpoints)
     return np.union1d(stations, np.append(breaks, np.nextafter(breaks, 0.0)))
+
+
+@lru_cache(maxsize=64)
+def jumps(arm: Manipulator) -> tuple[float, ...]:
+    """Breakpoints [m] at which strains or stiffnesses jump by over a thousandth of their largest.
+
+    At the others it is their slopes that jump, as at the samples of a measured profile.
+    """
+    breaks = np.array(arm.breakpoints)
+    sides = np.concatenate([breaks, np.nextafter(breaks, 0.0)])
+    table, stiffness = tables(arm, sides), arm.stiffness_at(sides)
+    jumping = np.zeros(len(breaks), bool)
+    for values in (table.extension, table.growth, table.curvature, *stiffness):
+        after, before = np.reshape(values, (2, len(breaks), -1))
+        largest = np.abs(values).max(initial=0.0)
+        jumping |= (np.abs(after - before) > _JUMP * largest).any(axis=1)
+    return tuple(breaks[jumping].tolist())
 
 
 def strain_stations(arm: Manipulator) -> Array:

@@ -7,11 +7,13 @@ passes the pole, a whole circle of latitude goes there.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.kernels.points.sphere_triangles import FLAT, OPEN, judge
 from softreach.support.arrays import Array, Index, Mask
 
 Indices = Index
@@ -45,6 +47,14 @@ def icosphere(levels: int) -> tuple[Array, Indices]:
     Returns:
         Points (n, 3), and triangles (20 · 4^levels, 3), counterclockwise from outside.
     """
+    points, triangles = _icosphere(levels)
+    return points.copy(), triangles.copy()
+
+
+@lru_cache(maxsize=8)
+def _icosphere(levels: int) -> tuple[Array, Indices]:
+    if levels:
+        return quartered(*_icosphere(levels - 1))
     golden = 0.5 * (1.0 + np.sqrt(5.0))
     pairs = np.array([[-1, golden], [1, golden], [-1, -golden], [1, -golden]])
     points = np.zeros((12, 3))
@@ -63,8 +73,6 @@ def icosphere(levels: int) -> tuple[Array, Indices]:
     )
     inward = np.linalg.det(points[triangles]) < 0
     triangles[inward] = triangles[inward][:, ::-1]
-    for _ in range(levels):
-        points, triangles = quartered(points, triangles)
     return points, triangles
 
 
@@ -74,8 +82,9 @@ def quartered(points: Array, triangles: Indices) -> tuple[Array, Indices]:
     Returns:
         All points, the old ones first, and the new triangles only.
     """
-    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    keys, which = np.unique(sides @ [len(points), 1], return_inverse=True)
+    after = triangles[:, [1, 2, 0]]
+    sides = np.minimum(triangles, after) * len(points) + np.maximum(triangles, after)
+    keys, which = np.unique(sides, return_inverse=True)
     middles = points[keys // len(points)] + points[keys % len(points)]
     middles /= np.linalg.norm(middles, axis=1, keepdims=True)
     a, b, c = triangles.T
@@ -125,48 +134,21 @@ def _candidates(seen: Map, levels: int, caution: float, most: int) -> tuple[Arra
     """Centers of the triangles that may hold a root, and whether they were not too many."""
     points, triangles = icosphere(levels)
     images, centers, few_enough = seen(points), [np.empty((0, 3))], False
-    for _ in range(_MOST_LEVELS):
+    for level in range(levels, levels + _MOST_LEVELS):
         before, parents = len(points), triangles
-        points, triangles = quartered(points, triangles)
+        cut = icosphere(level + 1) if level == levels else quartered(points, triangles)
+        points, triangles = cut
         images = np.concatenate([images, seen(points[before:])])
-        sag = np.tile(_sags(images, parents, triangles[3 * len(parents) :]), 4)
-        corners = images[triangles]
-        near = _distances(corners[..., :2]) <= caution * sag + 1e-12
-        near &= corners[..., 2].max(axis=1) + sag > 0
-        flat = _altitudes(corners[..., :2]) >= _FLAT * sag
-        centers.append(points[triangles[near & flat]].mean(axis=1))
-        triangles = triangles[near & ~flat]
+        verdicts = np.empty(len(triangles), np.int8)
+        judge(images, parents, triangles, caution, _FLAT, verdicts)
+        centers.append(points[triangles[verdicts == FLAT]].mean(axis=1))
+        triangles = triangles[verdicts == OPEN]
         few_enough = len(triangles) < _MOST_TRIANGLES and len(points) + 3 * len(triangles) < most
         if not few_enough or not len(triangles):
             break
     few = triangles[:: 1 + len(triangles) // _MOST_STARTS]
     starts = _unit(np.concatenate([*centers, points[few].mean(axis=1)]))
     return starts, few_enough
-
-
-def _sags(images: Array, triangles: Index, middles: Index) -> Array:
-    """Distances from the images of the middles of sides to the middles of their images."""
-    corners = images[triangles]
-    halfway = 0.5 * (corners + np.roll(corners, -1, axis=1))
-    return np.linalg.norm(images[middles] - halfway, axis=2).max(axis=1)
-
-
-def _distances(corners: Array) -> Array:
-    """Of the origin from triangles in the plane, shape (n, 3, 2); 0 inside."""
-    sides = np.roll(corners, -1, axis=1) - corners
-    size = np.maximum((sides**2).sum(axis=2), 1e-300)
-    along = np.clip(-(corners * sides).sum(axis=2) / size, 0.0, 1.0)
-    apart = np.linalg.norm(corners + along[..., None] * sides, axis=2).min(axis=1)
-    turns = corners[..., 0] * sides[..., 1] - corners[..., 1] * sides[..., 0]
-    inside = (turns > 0).all(axis=1) | (turns < 0).all(axis=1)
-    return np.where(inside, 0.0, apart)
-
-
-def _altitudes(corners: Array) -> Array:
-    """Smallest ones of triangles in the plane, shape (n, 3, 2)."""
-    sides = np.roll(corners, -1, axis=1) - corners
-    doubled = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
-    return np.abs(doubled) / np.maximum(np.linalg.norm(sides, axis=2).max(axis=1), 1e-300)
 
 
 def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
@@ -180,8 +162,10 @@ def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
         missing[working] = np.linalg.norm(ahead - value, axis=1)
         step = _newton(slopes[working], -(ahead @ across.T))
         points[working] = _moved(points[working], step)
-        last[working] = np.linalg.norm(step, axis=1)
-        working = working[last[working] > 1e-14]
+        before, last[working] = last[working], np.linalg.norm(step, axis=1)
+        # Where the map is nearly singular, rounding alone keeps steps from becoming any smaller.
+        at_noise = (last[working] >= before) & (missing[working] < _RESIDUAL)
+        working = working[(last[working] > 1e-14) & ~at_noise]
         if not len(working):
             break
     good = (last < _SETTLED) | (missing < _RESIDUAL)

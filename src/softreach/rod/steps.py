@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.profile import Profile
-from softreach.arm.tables import both_sides, tables
+from softreach.arm.tables import both_sides, jumps, tables
 from softreach.kernels.rod import frames, magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
@@ -40,6 +41,8 @@ _HEADINGS = 16
 _PROBED_STATIONS = 9
 _SEARCHED = 8  # corners from which larger errors are searched
 _ROUNDS = 24
+_FEW_BREAKS = 64
+"""Breakpoints at all of which steps end, however few the arm needs otherwise."""
 
 
 class Nodes(NamedTuple):
@@ -60,7 +63,8 @@ class StepRule:
     """Steps along an arm, uniform in the slender coordinate S, in which bending is even.
 
     Wherever the arm is not smooth, a step ends: within a step everything is, so that the order of
-    the integrator stays.
+    the integrator stays. Of more breakpoints than steps only those count at which strains jump; it
+    is then measured on tips in steps that end at all of them how many are enough.
     """
 
     arm: Manipulator
@@ -68,13 +72,12 @@ class StepRule:
 
     def edges(self, steps: int) -> Array:
         """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones."""
-        return edges_between(self.arm.profile, self._breaks, steps)
+        return edges_between(self.arm.profile, self._marks(steps), steps)
 
-    @lazy
-    def _breaks(self) -> Array:
-        """S at the base, at every breakpoint and at the tip."""
+    def _marks(self, steps: int) -> Array:
+        """S at the base, at every breakpoint where a step ends and at the tip."""
         profile = self.arm.profile
-        inside = profile.slender_coordinate(np.array(self.arm.breakpoints))
+        inside = profile.slender_coordinate(np.array(ends_of_steps(self.arm, steps)))
         return np.array([0.0, *inside, profile.slender_length])
 
     def nodes(self, edges: ArrayLike) -> Nodes:
@@ -115,8 +118,8 @@ class StepRule:
         No step is longer in S than those of `steps` uniform ones, so their tolerance holds.
         """
         s = self.arm.profile.slender_coordinate(stations)
-        inside = self._breaks[self._breaks < s[-1]]
-        marks = np.unique(np.concatenate([inside, s]))
+        inside = self._marks(steps)
+        marks = np.unique(np.concatenate([inside[inside < s[-1]], s]))
         profile = self.arm.profile
         ends = np.cumsum(np.append(0, step_counts(profile, np.diff(marks), steps)))
         return self.nodes(edges_between(profile, marks, steps)), ends[np.searchsorted(marks, s)]
@@ -142,17 +145,39 @@ class StepRule:
             InvalidInput: `tol` below 1e-12, or not reached within 4,096 steps.
         """
         check_tol(tol)
-        return self._fewest(tol, self._tip_differences, MOST_TURN_OF_STEP)
+        at_all = enough_for_all_breaks(self.arm)
+        exact = self._fewest(tol, self._tip_differences, MOST_TURN_OF_STEP, at_all)
+        if at_all:
+            differences = partial(self._differences_from, self.packed_nodes(exact))
+            return self._search(tol, differences, MOST_TURN_OF_STEP, 0, at_all - 1) or exact
+        return exact
 
     def steps_for_shapes(self, tol: float) -> int:
         """As `steps_for`, for the largest error of the centerline anywhere along the arm."""
-        return self._fewest(tol, self._shape_differences, _FRAME_TURN)
+        at_all = enough_for_all_breaks(self.arm)
+        return self._fewest(tol, self._shape_differences, _FRAME_TURN, at_all)
 
-    def _fewest(self, tol: float, halving: Callable[[int], Differences], turn: float) -> int:
+    def _fewest(
+        self, tol: float, halving: Callable[[int], Differences], turn: float, least: int
+    ) -> int:
+        """The fewest steps, `least` at least, whose differences are allowed."""
+        most = max(_MOST_STEPS, 4 * least)
+        if steps := self._search(tol, halving, turn, least, most):
+            return steps
+        raise InvalidInput("tol", tol, f"reachable within {most} steps", "use a larger one")
+
+    def _search(
+        self,
+        tol: float,
+        halving: Callable[[int], Differences],
+        turn: float,
+        least: int,
+        most: int,
+    ) -> int | None:
         """The fewest steps whose differences on the pilot, and on what it leads to, are allowed."""
         allowed = tol * self.arm.length / _SAFETY
-        steps, pilot = self._fewest_steps(turn), self.pilot
-        while steps <= _MOST_STEPS:
+        steps, pilot = max(least, self._fewest_steps(turn)), self.pilot
+        while steps <= most:
             difference = halving(steps)
             errors = difference(pilot)
             error = float(errors.max())
@@ -164,7 +189,7 @@ class StepRule:
                 pilot = np.concatenate([pilot, worse])
             # Undershoot the sixth-order prediction a little, so that the smallest number is found.
             steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 6)))
-        raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "use a larger one")
+        return None
 
     def _fewest_steps(self, turn: float) -> int:
         """Steps of which none turns by more than `turn`: |ω| = η |u| R2 dS at the pilot samples."""
@@ -193,15 +218,11 @@ class StepRule:
 
     def _tip_differences(self, steps: int) -> Differences:
         """Distances [m] between the tips with `steps` and with twice as many."""
-        coarse, fine = self._halves(steps)
+        return _tips_apart(*self._halves(steps))
 
-        def difference(gamma: Array) -> Array:
-            places = np.empty((2, len(gamma), 3))
-            rod.tips(coarse, gamma, places[0])
-            rod.tips(fine, gamma, places[1])
-            return np.linalg.norm(places[0] - places[1], axis=-1)
-
-        return difference
+    def _differences_from(self, fine: Array, steps: int) -> Differences:
+        """Distances [m] between the tips with `steps` and those of other packed tables."""
+        return _tips_apart(self.packed_nodes(steps), fine)
 
     def _shape_differences(self, steps: int) -> Differences:
         """Largest distances [m] along the centerlines with `steps` and with twice as many."""
@@ -221,6 +242,30 @@ class StepRule:
             return np.concatenate([of_block(gamma[block]) for block in rows])
 
         return difference
+
+
+def _tips_apart(coarse: Array, fine: Array) -> Differences:
+    """Distances [m] between the tips by two packed tables."""
+
+    def difference(gamma: Array) -> Array:
+        places = np.empty((2, len(gamma), 3))
+        rod.tips(coarse, gamma, places[0])
+        rod.tips(fine, gamma, places[1])
+        return np.linalg.norm(places[0] - places[1], axis=-1)
+
+    return difference
+
+
+def ends_of_steps(arm: Manipulator, steps: int) -> tuple[float, ...]:
+    """Breakpoints [m] at which a step ends where there are `steps` uniform ones beside."""
+    breaks = arm.breakpoints
+    return breaks if len(breaks) <= max(_FEW_BREAKS, steps) else jumps(arm)
+
+
+def enough_for_all_breaks(arm: Manipulator) -> int:
+    """The steps from which on one ends at every breakpoint; 0 if one always does."""
+    breaks = len(arm.breakpoints)
+    return breaks if breaks > _FEW_BREAKS else 0
 
 
 def edges_between(profile: Profile, marks: Array, steps: int) -> Array:

@@ -48,8 +48,7 @@ def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Mask:
         return np.zeros((cells,) * m, bool)
     field = tips.reshape(*(cells + 1,) * m, 3)
     lost: Mask = np.any(corner_values(~np.isfinite(field[..., 0])), axis=-1)
-    for axis in range(m):
-        torn = _torn_edges(rod, field, axis)
+    for axis, torn in enumerate(_torn_edges(rod, field)):
         others = [other for other in range(m) if other != axis]
         lost = lost | np.any(corner_values(torn, others), axis=-1)
     return lost
@@ -126,12 +125,20 @@ def finer(cells: Mask) -> Mask:
     return cells
 
 
-def _torn_edges(rod: TipMap, field: Array, axis: int) -> Mask:
-    """Edges along an axis that are torn, in the order of the grid."""
-    apart = np.linalg.norm(np.diff(field, axis=axis), axis=-1)  # NaN where an end is not stable
-    suspect = np.argwhere(_suspects(apart, axis) & (apart > _NOISE * rod.tol * rod.length))
-    torn = np.zeros(apart.shape, bool)
-    torn[tuple(suspect[_stay_apart(rod, suspect, axis, field)].T)] = True
+def _torn_edges(rod: TipMap, field: Array) -> list[Mask]:
+    """Edges along each axis that are torn, in the order of the grid."""
+    axes = range(field.ndim - 1)
+    apart = [np.linalg.norm(np.diff(field, axis=axis), axis=-1) for axis in axes]
+    noise = _NOISE * rod.tol * rod.length
+    suspects = [
+        np.argwhere(_suspects(each, axis) & (each > noise))  # NaN where an end is not stable
+        for axis, each in enumerate(apart)
+    ]
+    along = np.repeat(axes, [len(each) for each in suspects])
+    stay = _stay_apart(rod, np.concatenate(suspects), along, field)
+    torn = [np.zeros(each.shape, bool) for each in apart]
+    for axis in axes:
+        torn[axis][tuple(suspects[axis][stay[along == axis]].T)] = True
     return torn
 
 
@@ -145,10 +152,17 @@ def _suspects(apart: Array, axis: int) -> Mask:
     return np.moveaxis(suspects, 0, axis)
 
 
-def _stay_apart(rod: TipMap, edges: Index, axis: int, field: Array) -> Mask:
-    """Mask of edges, given by their first vertex, whose tips stay apart as these are halved."""
-    m, cells = edges.shape[1], field.shape[0] - 1
-    step = np.eye(m, dtype=int)[axis]
+def _stay_apart(rod: TipMap, edges: Index, along: Index, field: Array) -> Mask:
+    """Mask of edges whose tips stay apart as these are halved.
+
+    Args:
+        rod: The tip map.
+        edges: First vertex of each, shape (n, m).
+        along: Axis of each, shape (n,).
+        field: Tips of the grid [m], shape (cells + 1, ..., 3).
+    """
+    cells = field.shape[0] - 1
+    step = np.eye(edges.shape[1], dtype=int)[along]
     low, high = edges / cells, (edges + step) / cells
     at_low, at_high = field[tuple(edges.T)], field[tuple((edges + step).T)]
     first = np.linalg.norm(at_high - at_low, axis=1)

@@ -28,12 +28,12 @@ from softreach.geometry.sphere_maps import (
     sphere_roots,
 )
 from softreach.rod.driven import inner_rod
-from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration, shape_dataset, stations_along
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.rods import tip_map
+from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.rod.view import PlacedRod, View
 from softreach.support.arrays import as_floats
@@ -196,7 +196,7 @@ def equilibria(
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     _check_loads(loaded.tables)
-    solver = _resolving(Solver(loaded.tables, FreeRod(inner.arm, rod.tol).steps, rod.tol), at)
+    solver = _resolving(Solver(loaded.tables, loaded.unloaded_steps, rod.tol), at)
     branch = solver.find(at)
     known = branch.frame[has_tip(branch.status)]
     solver, roots = _accurate(solver, at, _search(solver, at, known))
@@ -317,8 +317,9 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
     that it follows anywhere in the box: others may bend more.
     """
     allowed = 0.5 * solver.tol * solver.tables.arm.length
-    while 2 * solver.steps <= _MOST_STEPS:
-        finer = solver.halved()
+    most = max(_MOST_STEPS, 2 * enough_for_all_breaks(solver.tables.arm))
+    while 2 * solver.steps <= most:
+        finer = solver.judge()
         again = _again(finer, gamma, roots)
         if len(again.directions) == len(roots.directions):
             apart = _tips(finer, gamma, again) - _tips(solver, gamma, roots)

@@ -23,6 +23,7 @@ __all__ = ["PushingTip", "TipResponse"]
 
 Array = NDArray[np.float64]
 
+_MOST_STEPS = 256
 _DOUBTFUL = 0.05  # margin of stability below which a quick search decides nothing
 
 
@@ -103,6 +104,11 @@ class PushingTip:
         branch = self._solver(force, self.steps).find(gamma[None])
         apart = float(np.linalg.norm(branch.tips[0] - response.tip))
         return apart <= self.rod.tol * self.rod.length
+
+    @property
+    def is_finest(self) -> bool:
+        """True if steps are not made any shorter."""
+        return self.steps >= _MOST_STEPS
 
     def finer(self) -> PushingTip:
         """The same with steps half as long."""

@@ -110,7 +110,12 @@ class LoadedRod(ArmRod):
     def _fewest(self, steps: int, differences: Differences) -> int | None:
         gamma = pilot_activations(self.arm, self.box)
         enough = fewest_steps(self._solver_of, gamma, steps, differences)
-        return max(steps, FreeRod(self.arm, self.tol).steps) if enough == UNJUDGED else enough
+        return max(steps, self.unloaded_steps) if enough == UNJUDGED else enough
+
+    @lazy
+    def unloaded_steps(self) -> int:
+        """Steps that `tol` needs without loads."""
+        return FreeRod(self.arm, self.tol).steps
 
     def _solver_of(self, steps: int) -> Solver:
         return Solver(self.tables, steps, self.tol)

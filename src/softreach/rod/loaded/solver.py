@@ -33,6 +33,7 @@ from softreach.rod.loaded.shooting import (
     with_across,
 )
 from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
+from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support import parallel
 from softreach.support.lazy import lazy
@@ -89,13 +90,22 @@ class Solver:
         return self.tables.uniform(max(fewest, (self.steps + 1) // 2))
 
     @lazy
-    def _along_one(self) -> tuple[OneDirection, OneDirection]:
-        """Coarse and fine tables for the kernel of loads along one direction."""
-        return self._coarse.for_one_direction, self._fine.for_one_direction
+    def _fine_along_one(self) -> OneDirection:
+        """Fine tables for the kernel of loads along one direction."""
+        return self._fine.for_one_direction
+
+    @lazy
+    def _coarse_along_one(self) -> OneDirection:
+        return self._coarse.for_one_direction
 
     def halved(self) -> Solver:
         """The same with twice the steps."""
         return Solver(self.tables, 2 * self.steps, self.tol)
+
+    def judge(self) -> Solver:
+        """The same with twice the steps, or as many as let one end at every breakpoint."""
+        steps = max(2 * self.steps, enough_for_all_breaks(self.tables.arm))
+        return Solver(self.tables, steps, self.tol)
 
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
@@ -198,9 +208,8 @@ class Solver:
         limits = (search.increment, search.widest, small, max(_OF_TOL * self.tol, 1e-13))
         most = (search.walks, 10)
         if self.tables.one_direction:
-            coarse, fine = self._along_one
-            if search is not DIRECT:
-                coarse = fine
+            fine = self._fine_along_one
+            coarse = self._coarse_along_one if search is DIRECT else fine
             return shoot_along_one(gamma, self.tables, guesses, coarse, fine, limits, most)
         coarse, fine = self._coarse if search is DIRECT else self._fine, self._fine
         return shoot(gamma, self.tables.axes, guesses, coarse, fine, (*limits, 0.0), most).shots
@@ -210,7 +219,7 @@ class Solver:
 
         Both as the base of the unloaded arm sees them; loads along one direction only.
         """
-        return base_directions(gamma, self.tables, directions, self._along_one[1])
+        return base_directions(gamma, self.tables, directions, self._fine_along_one)
 
     def shapes_facing(
         self, gamma: Array, directions: Array, stations: Array
@@ -221,7 +230,9 @@ class Solver:
         of loads along one direction.
         """
         edges = self.tables.edges(stations, self.steps)
-        table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
+        z = self.tables.arm.profile.station(edges)
+        is_uniform = len(edges) == len(self._fine.lengths) + 1  # stations at ends of steps alone
+        table = self._fine if is_uniform else self.tables.of_edges(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
         walked = self._walk(gamma, with_across(directions), table, ONE_WALK, trace=True)
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
+from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidInput
 
@@ -31,10 +32,11 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Differences = Callable[[Solver, Array, Equilibria], Array]
-"""Distances [m] between what a solver and one of twice its steps find, near known equilibria."""
+"""Distances [m] between what a solver and its judge find, near known equilibria."""
 
 _SAFETY = 2.0
 _FEWEST_STEPS, _MOST_STEPS = 4, 256
+_FINER = 8  # times as many as let one end at every breakpoint are tried
 UNJUDGED = 0
 """Instead of a number of steps: no activation can judge any."""
 _CRITICAL = 0.02
@@ -74,8 +76,8 @@ def _enough(
     solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
 ) -> int | None:
     """As `fewest_steps`, by these activations."""
-    tol = solver_of(steps).tol
-    while steps <= _MOST_STEPS:
+    tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
+    while steps <= max(_MOST_STEPS, _FINER * at_all):
         solver = solver_of(steps)
         allowed = tol * solver.tables.arm.length / _SAFETY
         errors = _bulk(differences(solver, *_settled(solver, gamma)))
@@ -85,6 +87,8 @@ def _enough(
         if error <= allowed:
             return steps
         steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
+        if steps > _MOST_STEPS:
+            steps = max(steps, at_all)
     return None
 
 
@@ -105,13 +109,13 @@ def _bulk(distances: Array) -> Array:
 
 def tip_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
     """Between tips."""
-    return _distances(known.tips, solver.halved().near(gamma, known).tips)
+    return _distances(known.tips, solver.judge().near(gamma, known).tips)
 
 
 def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
     """Between centerlines, along the arm."""
     stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
-    shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.halved())]
+    shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.judge())]
     return _distances(*(shape.frames.position for shape in shapes)).max(axis=1, initial=0.0)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -16,7 +16,7 @@ from softreach.kernels.loaded.explicit_rk8 import NODES
 from softreach.kernels.rod import magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.loaded.phase import LoadPhase, load_phase, phase_stations
-from softreach.rod.steps import edges_between
+from softreach.rod.steps import edges_between, ends_of_steps
 from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
@@ -135,23 +135,29 @@ class LoadTables:
         mass = self.body.mass_per_length(z)
         return load_phase(self.arm, self.loads, self.body.compliance(z), mass)
 
+    @lazy
+    def _made(self) -> dict[int, StepTables]:
+        """Tables by their number of steps; searches ask for the same ones again."""
+        return {}
+
     def uniform(self, steps: int) -> StepTables:
         """At least `steps` steps, with boundaries where the arm or its loads are not smooth."""
-        return self.between(np.array([]), steps)
+        if steps not in self._made:
+            self._made[steps] = self.of_edges(self.edges(np.array([]), steps))
+        return self._made[steps]
 
     def edges(self, stations: Array, steps: int) -> Array:
-        """Boundaries S of steps from tip to base, among them stations Z [m] and all breaks.
+        """Boundaries S of steps from tip to base, among them stations Z [m] and breaks.
 
         No step is longer in S than those of `steps` uniform ones.
         """
         profile = self.arm.profile
-        breaks = [*self.arm.breakpoints, *(load.station for load in self.loads.point_loads)]
+        breaks = [
+            *ends_of_steps(self.arm, steps),
+            *(load.station for load in self.loads.point_loads),
+        ]
         z = np.unique(np.concatenate([[0.0, self.arm.length], breaks, stations]))
         return edges_between(profile, profile.slender_coordinate(z), steps)[::-1]
-
-    def between(self, stations: Array, steps: int) -> StepTables:
-        """Tables with a boundary at every station Z [m] too."""
-        return self.of_edges(self.edges(stations, steps))
 
     def of_edges(self, edges: Array) -> StepTables:
         """Tables of steps between boundaries S, tip first."""
@@ -250,16 +256,11 @@ class TipForceTables(LoadTables):
     """[N]."""
     origin: TipForceTables | None = None
     """The tables of another size of the force, with which all that does not change is shared."""
-    steps_made: dict[int, StepTables] = field(default_factory=dict)
-    """Tables without the force, by their number of steps."""
 
     def under(self, force: float) -> TipForceTables:
         """The same with another size of the force [N]."""
         kept = self.origin or self
-        made = self.steps_made
-        return TipForceTables(
-            self.arm, self.loads, self.body, self.direction, force, origin=kept, steps_made=made
-        )
+        return TipForceTables(self.arm, self.loads, self.body, self.direction, force, origin=kept)
 
     @lazy
     def _given(self) -> LoadTables:
@@ -285,11 +286,14 @@ class TipForceTables(LoadTables):
         along = np.abs(self.axes[1:] @ self.direction).max() <= 1e-14
         return bool(along) and self._given.one_direction
 
+    @lazy
+    def phase(self) -> LoadPhase:
+        """Phase that the other loads give the tangents."""
+        return self._given.phase if self.origin is None else self.origin.phase
+
     def uniform(self, steps: int) -> StepTables:
         """At least `steps` steps, with boundaries where the arm or its loads are not smooth."""
-        if steps not in self.steps_made:
-            self.steps_made[steps] = super().uniform(steps)
-        made = self.steps_made[steps]
+        made = super(TipForceTables, self.origin or self).uniform(steps)
         scalars = made.scalars.copy()
         scalars[..., 3:] += self.force * (self.axes @ self.direction)
         return made._replace(scalars=scalars)
