@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
-from softreach.geometry.delaunay import delaunay
+from softreach.geometry.delaunay import METHODS, delaunay
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, as_flag, as_given, plain
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_one_of, plain
 from softreach.support.arrays import Mask, as_floats, as_points
 from softreach.support.errors import InvalidInput, warn
 
@@ -207,6 +207,7 @@ def _shape(
     positions: np.ndarray, radius: float | str, part: Mask | None, method: Method
 ) -> tuple[Hull, float]:
     """The alpha shape, and the volume of that of a part; box by box if the radius is known."""
+    as_one_of("method", method, METHODS)
     if radius != "critical" and method != "qhull":
         return alpha_hull(positions, float(radius), part=part)
     clouds = [positions] if part is None else [positions, positions[part]]
