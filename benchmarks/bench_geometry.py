@@ -48,8 +48,10 @@ def scipy_route(points: np.ndarray) -> float:
 
 
 def ours_hull(points: np.ndarray) -> float:
-    """The same with surface, regions and area."""
-    return _shape(points, "numba").hull(ALPHA).volume
+    """The same with surface, regions and area, box by box on all threads."""
+    from softreach.geometry.alpha_shape import alpha_hull
+
+    return alpha_hull(points, ALPHA)[0].volume
 
 
 def ours_with_bias(points: np.ndarray) -> float:

@@ -183,6 +183,30 @@ def atlas_tasks() -> dict[str, Task]:
     }
 
 
+def hull_tasks() -> dict[str, Task]:
+    """Alpha shapes of one radius."""
+    import softreach as sr
+
+    arm = sr.designs.minimal_trunk()
+
+    def hull(n: int, alpha: float, *, bias: bool = False) -> Task:
+        tips = sr.compute_cloud(arm, n).tip.values
+
+        def task() -> Results:
+            found = sr.concave_hull(tips, alpha, bias=bias)
+            numbers = [found.volume, found.area, found.regions, found.volume_corrected or 0.0]
+            return {"numbers": np.array(numbers), "vertices": found.vertices}
+
+        return task
+
+    return {
+        "α-shape of 400,000 points": hull(400_000, 0.05),
+        "α-shape of 400,000 points, with bias": hull(400_000, 0.05, bias=True),
+        "α-shape of 2,000,000 points": hull(2_000_000, 0.03),
+        "α-shape of 20,000 points": hull(20_000, 0.1),
+    }
+
+
 def picture_tasks() -> dict[str, Task]:
     """Pictures of clouds and hulls, and the demo from the start of its process to its end."""
     import softreach as sr
@@ -244,6 +268,7 @@ PARTS: dict[str, Callable[[], dict[str, Task]]] = {
     "inverse": inverse_tasks,
     "redundancy": redundancy_tasks,
     "atlas": atlas_tasks,
+    "hulls": hull_tasks,
     "pictures": picture_tasks,
     "studio": studio_tasks,
 }

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from softreach.cloud.volume import concave_hull, convex_hull, unreachability, volume_curve
+from softreach.geometry import alpha_shape
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.geometry.clouds import FLAT, arc_tips, random_points
 
@@ -129,6 +130,18 @@ def test_a_radius_below_three_spacings_warns_with_both_numbers():
     points = random_points(1000)
     with pytest.warns(SoftreachWarning, match=r"alpha = 0.15 m is 1.\d+ mean spacings.*0.09"):
         concave_hull(points, alpha=0.15)
+
+
+def test_threads_change_nothing(tips, monkeypatch):
+    monkeypatch.setattr(alpha_shape, "FEWEST", 1000)
+    hulls = []
+    for threads in ("1", "2", "3"):
+        monkeypatch.setenv("SOFTREACH_NUM_THREADS", threads)
+        hulls.append(concave_hull(tips, 0.2, bias=True))
+    for hull in hulls[1:]:
+        assert hull.volume == hulls[0].volume
+        assert hull.volume_corrected == hulls[0].volume_corrected
+        np.testing.assert_array_equal(hull.vertices[hull.faces], hulls[0].vertices[hulls[0].faces])
 
 
 def test_where_the_quarter_is_too_sparse_there_is_no_estimate_but_a_warning():

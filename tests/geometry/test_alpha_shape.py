@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay
-from softreach.geometry.hull import convex_hull
+from softreach.geometry import alpha_shape
+from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
+from softreach.geometry.delaunay import Delaunay, delaunay
+from softreach.geometry.hull import Hull, convex_hull
 from softreach.geometry.surface import enclosed_volume
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import rational
@@ -36,6 +37,27 @@ def regions_by_scipy(shape: AlphaComplex, kept: np.ndarray) -> int:
     graph = coo_array((np.ones(both.sum()), (t[both], u[both])), shape=(len(kept), len(kept)))
     _, labels = connected_components(graph, directed=False)
     return len(np.unique(labels[kept]))
+
+
+def lattice_of_octahedra(k: int) -> np.ndarray:
+    """Face-centered cubes: the centers of octahedra have the coordinates of points."""
+    points = np.stack(np.meshgrid(*[np.arange(float(k))] * 3), axis=-1).reshape(-1, 3)
+    return points[points.sum(axis=1) % 2 == 0]
+
+
+BOXED = {
+    **DEGENERATE,
+    **FLAT,
+    "arm": arc_tips(700),
+    "centers on borders": lattice_of_octahedra(7),
+    "clusters": np.concatenate([0.05 * random_points(90, k) + k % 3 for k in range(6)]),
+}
+
+
+def assert_equal_hulls(hull: Hull, other: Hull) -> None:
+    """Every number and every corner, to the last bit."""
+    for name in ("vertices", "faces", "volume", "area", "alpha", "regions", "n"):
+        np.testing.assert_array_equal(getattr(hull, name), getattr(other, name), err_msg=name)
 
 
 def encloses_all_as_one(shape: AlphaComplex, alpha: float) -> bool:
@@ -171,3 +193,57 @@ def test_scaling_the_cloud_scales_radii_areas_and_volumes(scale):
     small, large = shape.hull(0.4), scaled.hull(0.4 * scale)
     assert large.volume == pytest.approx(scale**3 * small.volume, rel=1e-12, abs=0)
     assert large.area == pytest.approx(scale**2 * small.area, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("name", BOXED)
+def test_box_by_box_the_shape_is_that_of_the_whole_triangulation(name, monkeypatch):
+    """Radii from where it falls apart to beyond all, and some that cells have exactly."""
+    monkeypatch.setattr(alpha_shape, "WORTHWHILE", np.inf)
+    shape = alpha_complex(BOXED[name])
+    radii = np.unique(shape.radii[np.isfinite(shape.radii)]) if len(shape.radii) else [1.0]
+    for alpha in (*np.quantile(radii, [0.0, 0.2, 0.6, 0.95], method="nearest"), 2 * radii[-1]):
+        for boxes in (1, 2, 5):
+            hull, _ = alpha_hull(BOXED[name], alpha, boxes=boxes)
+            assert_equal_hulls(hull, shape.hull(alpha))
+
+
+@given(st.integers(5, 300), st.integers(0, 2**32 - 1), st.floats(0.01, 1.0), st.integers(2, 9))
+def test_no_number_of_boxes_changes_the_shape(n, seed, alpha, boxes):
+    points = random_points(n, seed)
+    assert_equal_hulls(alpha_hull(points, alpha, boxes=boxes)[0], alpha_complex(points).hull(alpha))
+
+
+@pytest.mark.parametrize("boxes", [1, 3])
+@pytest.mark.parametrize("count", [0, 3, 5, 500, 2000])
+def test_a_part_measured_on_the_way_has_the_volume_that_it_has_alone(count, boxes):
+    points = arc_tips(2000)
+    part = np.random.default_rng(1).permutation(2000) < count
+    for alpha in (0.05, 0.2) if boxes > 1 else (0.05, 0.2, np.inf):
+        hull, volume = alpha_hull(points, alpha, part=part, boxes=boxes)
+        assert volume == alpha_complex(points[part]).hull(alpha).volume
+        assert_equal_hulls(hull, alpha_complex(points).hull(alpha))
+
+
+def test_a_flat_part_has_no_volume():
+    points = np.concatenate([random_points(40) * [1, 1, 0], random_points(40)])
+    assert alpha_hull(points, 9.0, part=points[:, 2] == 0)[1] == 0.0
+
+
+def test_a_curve_has_no_volume_in_boxes_either():
+    turn = np.linspace(0.0, 40.0, 3000)
+    helix = np.stack([np.cos(turn), np.sin(turn), 0.01 * turn**1.5], axis=1)
+    assert alpha_hull(helix, 0.1, boxes=3)[0].volume == alpha_hull(helix, 0.1)[0].volume == 0.0
+
+
+@given(st.permutations(range(4)), st.integers(0, 1000))
+def test_radii_and_volumes_do_not_depend_on_the_order_of_vertices(order, seed):
+    mesh = delaunay(random_points(30, seed))
+    turned = Delaunay(
+        points=mesh.points,
+        tetrahedra=np.ascontiguousarray(mesh.tetrahedra[:, order]),
+        neighbors=np.ascontiguousarray(mesh.neighbors[:, order]),
+        duplicate_of=mesh.duplicate_of,
+    )
+    shape, same = AlphaComplex(triangulation=mesh), AlphaComplex(triangulation=turned)
+    np.testing.assert_array_equal(shape.radii, same.radii)
+    np.testing.assert_array_equal(shape.volumes, same.volumes)

@@ -106,6 +106,7 @@ def _hulls() -> None:
     from softreach.cloud.clouds import compute_cloud
     from softreach.cloud.redundancy import activation_distance
     from softreach.cloud.volume import concave_hull
+    from softreach.geometry.alpha_shape import alpha_hull
     from softreach.geometry.surface import Surface
 
     cloud = compute_cloud(designs.minimal_trunk(), 2000)
@@ -113,6 +114,7 @@ def _hulls() -> None:
     hull = concave_hull(cloud.tip, alpha="critical")
     Surface(vertices=hull.vertices, faces=hull.faces).distance(hull.vertices[:2])
     tips = cloud.tip.values
+    alpha_hull(tips, 0.1, boxes=2)
     concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
     for design in (designs.minimal_trunk(), designs.redundant_trunk()):
         activation_distance(compute_cloud(design, 2000), 0.1)

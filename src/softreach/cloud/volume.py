@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.geometry import hull as hulls
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay
+from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
+from softreach.geometry.delaunay import METHODS, delaunay
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, as_flag, as_given, plain
-from softreach.support.arrays import as_floats, as_points
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_one_of, plain
+from softreach.support.arrays import Mask, as_floats, as_points
 from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __all__ = ["Hull", "concave_hull", "convex_hull", "unreachability", "volume_curv
 
 DEFAULT_RADIUS = 0.05  # of the arm's length
 SPACINGS = 3.0  # a smaller ball falls through between the points
+SPARSE = 0.6  # of the spacing that points would have if they filled their convex hull
 QUARTER_SPACINGS = 2.5  # below, V(N/4) leaves the law N^-1/2: design/triangulation.md
 
 Method = Literal["auto", "numba", "qhull"]
@@ -42,7 +43,7 @@ def concave_hull(
 
     The volume of a random cloud of N points falls short of that of infinitely many by an amount
     that shrinks as N^-1/2 (2 to 3 % for 400,000 tips), the same in every repetition. With
-    ``bias=True`` the shape of a quarter of the points is computed too, for a quarter of the time,
+    ``bias=True`` the shape of a quarter of the points is measured too, on the way to that of all,
     and gives the estimate ``Hull.volume_corrected`` = 2 V(N) - V(N/4); it stays None, with a
     warning, if alpha is too small for the quarter. It is meant for random clouds: a grid has less
     bias than this takes it to have. It estimates the alpha shape of infinitely many points, which
@@ -77,12 +78,12 @@ def concave_hull(
     bias = as_flag("bias", bias)
     positions = _positions(points)
     radius = _radius(alpha, points)
-    shape, *quarter = _alpha_complexes(
-        [positions, _quarter(positions)] if bias else [positions], method
-    )
-    hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
-    _warn_if_fine(hull, float(shape.volumes.sum()))
-    return _corrected(hull, quarter[0].hull(hull.alpha)) if bias else hull
+    quarter = _quarter(len(positions)) if bias else None
+    hull, volume_of_quarter = _shape(positions, radius, quarter, method)
+    _warn_if_fine(hull, positions)
+    if quarter is None:
+        return hull
+    return _corrected(hull, replace(hull, volume=volume_of_quarter, n=int(quarter.sum())))
 
 
 def convex_hull(points: np.ndarray | xr.DataArray) -> Hull:
@@ -108,7 +109,7 @@ def unreachability(
 ) -> float:
     """The part of the convex hull that the cloud does not fill, UNR = 1 - V_conc / V_conv [-].
 
-    Both volumes come from one triangulation. Both are smaller than those of infinitely many points,
+    Both volumes are smaller than those of infinitely many points,
     the first by more, so that the share is a few percent too large: `concave_hull` estimates the
     bias of the volume, and `reachable_set` needs no points. NaN for a cloud without volume, as 0/0
     says nothing.
@@ -127,10 +128,10 @@ def unreachability(
     """
     positions = _positions(points)
     radius = _radius(alpha, points)
-    shape = _alpha_complex(positions, method)
-    convex = float(shape.volumes.sum()) or hulls.convex_hull(positions).volume
-    hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
-    _warn_if_fine(hull, convex)
+    with parallel.meanwhile(partial(hulls.convex_hull, positions)) as convex_hull:
+        hull, _ = _shape(positions, radius, None, method)
+        convex = convex_hull().volume or alpha_hull(positions, np.inf)[0].volume  # almost flat
+    _warn_if_fine(hull, positions)
     return 1.0 - hull.volume / convex if convex > 0 else np.nan  # theory (37)
 
 
@@ -202,29 +203,46 @@ def _alpha_complex(positions: np.ndarray, method: Method) -> AlphaComplex:
     return AlphaComplex(triangulation=delaunay(positions, method))
 
 
-def _alpha_complexes(clouds: list[np.ndarray], method: Method) -> list[AlphaComplex]:
-    """Triangulate and measure several clouds, each on a thread of its own."""
-    return list(parallel.in_order(partial(_alpha_complex, cloud, method) for cloud in clouds))
+def _shape(
+    positions: np.ndarray, radius: float | str, part: Mask | None, method: Method
+) -> tuple[Hull, float]:
+    """The alpha shape, and the volume of that of a part; box by box if the radius is known."""
+    as_one_of("method", method, METHODS)
+    if radius != "critical" and method != "qhull":
+        return alpha_hull(positions, float(radius), part=part)
+    clouds = [positions] if part is None else [positions, positions[part]]
+    shape, *of_part = parallel.in_order(partial(_alpha_complex, cloud, method) for cloud in clouds)
+    hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
+    return hull, sum(each.hull(hull.alpha).volume for each in of_part)
 
 
-def _quarter(positions: np.ndarray) -> np.ndarray:
-    """A fixed random quarter of a cloud.
+def _quarter(n: int) -> Mask:
+    """A fixed random quarter of a cloud of n points.
 
     Not every fourth point: in a Sobol sequence those all lie in one quarter of the box.
     """
-    pick = np.random.default_rng(0).permutation(len(positions))[: len(positions) // 4]
-    return positions[np.sort(pick)]
+    mask = np.zeros(n, bool)
+    mask[np.random.default_rng(0).permutation(n)[: n // 4]] = True
+    return mask
 
 
-def _warn_if_fine(hull: Hull, convex_volume: float) -> None:
+def _warn_if_fine(hull: Hull, positions: np.ndarray) -> None:
     """Warn if the radius is too small for the density of the points.
 
     A shape that has fallen apart has hardly any volume, hence no spacing of its own to judge by:
     the convex hull bounds it from below, for clouds that fill a fifth of their hull or more.
     """
-    sparse = 0.6 * float(np.cbrt(convex_volume / max(hull.n, 1)))
-    if hull.alpha < SPACINGS * max(hull.spacing, sparse):
-        spacing = max(hull.spacing, sparse)
+    if hull.n == 0:
+        return
+    in_box = float(np.cbrt(np.ptp(positions, axis=0) / hull.n ** (1 / 3)).prod())
+    if hull.alpha >= SPACINGS * max(hull.spacing, SPARSE * in_box):
+        return  # the convex hull is no larger than the box
+    if hull.volume > 0:
+        convex_volume = hulls.convex_hull(positions).volume
+    else:  # nor has it any on a curve
+        convex_volume = alpha_hull(positions, np.inf)[0].volume
+    spacing = max(hull.spacing, SPARSE * float(np.cbrt(convex_volume / hull.n)))
+    if hull.alpha < SPACINGS * spacing:
         warn(
             f"alpha = {_in_spacings(hull, spacing)}: below {SPACINGS:g} the shape has holes "
             "between points and its volume is too small; use more points or a larger alpha",

@@ -1,24 +1,41 @@
-"""Alpha shapes of every radius from one triangulation."""
+"""Alpha shapes: of every radius from one triangulation, of one radius box by box.
+
+A tetrahedron whose circumscribed sphere has a radius R <= α and its center in a box is Delaunay if
+and only if it is so among the points within α of the box. So boxes that together are all of space
+give the whole shape of radius α, each on a thread of its own. Points enter every triangulation in
+the same order, which decides how cospherical ones are cut (`kernels.points.bowyer_watson`): the
+tetrahedra are those of one triangulation, to the last, whatever the boxes. So are volume and
+surface, as sums are taken and faces listed in an order of their own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from softreach.geometry.delaunay import Delaunay, unit_scale
+from softreach.geometry.delaunay import Delaunay, lies_on_curve, unit_scale
 from softreach.geometry.hull import Hull
 from softreach.geometry.surface import compact_surface, surface_area
 from softreach.kernels.points import alpha as kernels
+from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.expansions import scratch
+from softreach.kernels.points.spatial_sort import insertion_order
 from softreach.support import parallel
+from softreach.support.arrays import Array, Faces, Index, Mask, Points
 from softreach.support.lazy import lazy
 
-__all__ = ["AlphaComplex"]
+__all__ = ["AlphaComplex", "alpha_hull"]
 
 BLOCK = 200_000  # cells measured by one thread at a time
+FEWEST = 10_000  # points of a box, on average: fewer are triangulated before threads pay
+SAMPLED = 4096  # points by which boxes are cut
+WORTHWHILE = 1.4  # times as many points in a box as without overlap, at most
+WHOLE = np.array([[-np.inf] * 3, [np.inf] * 3])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,40 +111,221 @@ class AlphaComplex:
         neighbors = self.triangulation.neighbors
         return parent, int(kernels.join_regions(neighbors, self.radii <= alpha, parent))
 
-    def _boundary(self, kept: np.ndarray) -> np.ndarray:
-        """The faces between kept tetrahedra and the rest, normals outwards, shape (f, 3)."""
-        cells, neighbors = self.triangulation.tetrahedra, self.triangulation.neighbors
-        faces = np.empty((0, 3), cells.dtype)
-        count = kernels.boundary_faces(cells, neighbors, kept, faces)
-        faces = np.empty((count, 3), cells.dtype)
-        kernels.boundary_faces(cells, neighbors, kept, faces)
-        return faces
-
     def hull(self, alpha: float) -> Hull:
         """The shape of one radius [m]: surface, volume, area and regions."""
         mesh, kept = self.triangulation, self.radii <= alpha
-        vertices, faces = compact_surface(mesh.points, self._boundary(kept))
-        return Hull(
-            vertices=vertices,
-            faces=faces,
-            volume=float(self.volumes[kept].sum()),
-            area=surface_area(vertices, faces),
-            alpha=float(alpha),
-            regions=self.regions(alpha),
-            n=len(mesh.points),
-        )
+        faces, _ = _boundary(mesh.tetrahedra, mesh.neighbors, kept)
+        volume = _sum(self.volumes[kept])
+        return _hull(mesh.points, faces, volume, alpha, self.regions(alpha))
 
 
-def _measure(mesh: Delaunay) -> tuple[np.ndarray, np.ndarray]:
+def alpha_hull(
+    points: Points, alpha: float, *, part: Mask | None = None, boxes: int | None = None
+) -> tuple[Hull, float]:
+    """`AlphaComplex.hull` of one radius on all threads, and the volume [m³] of that of a part.
+
+    The part comes first into the triangulation and is measured on the way.
+
+    Args:
+        points: Positions [m], shape (n, 3).
+        alpha: Radius [m].
+        part: Mask of the points to be measured by themselves, shape (n,).
+        boxes: Largest number of boxes; as many as there are threads if left out.
+    """
+    scaled, exponent = unit_scale(points)
+    radius = float(np.ldexp(alpha, -exponent))
+    most = min(parallel.threads_here(), len(points) // FEWEST) if boxes is None else boxes
+    pieces = _pieces(scaled, radius, part, _boxes(scaled, radius, most))
+    faces, regions = _joined(pieces)
+    volume, volume_of_part = (
+        float(np.ldexp(_sum(np.concatenate(volumes)), 3 * exponent))
+        for volumes in zip(*(piece.volumes for piece in pieces), strict=True)
+    )
+    return _hull(points, faces, volume, alpha, regions), volume_of_part
+
+
+class _Piece(NamedTuple):
+    """The tetrahedra of a shape whose centers are in one box."""
+
+    faces: Faces
+    """Those between them and the rest, as indices of points."""
+    regions: Index
+    """Region at each face, counted from 0."""
+    number: int
+    """Number of regions."""
+    volumes: tuple[Array, Array]
+    """Of the tetrahedra, and of those that a part of the points has by itself [m³]."""
+
+
+class _Crowded(Exception):
+    """One triangulation of all points must decide whether they lie on a curve."""
+
+
+def _pieces(points: Points, alpha: float, part: Mask | None, boxes: list[Array]) -> list[_Piece]:
+    """The shape box by box; in one piece where too many tetrahedra crowd in a box."""
+
+    def pieces(boxes: list[Array], lies_on_curve: Callable[[], bool]) -> list[_Piece]:
+        tasks = (partial(_piece, points, alpha, part, box, lies_on_curve) for box in boxes)
+        return list(parallel.in_order(tasks))
+
+    if len(boxes) > 1:
+        with suppress(_Crowded):
+            return pieces(boxes, _give_up)
+    return pieces([WHOLE], partial(lies_on_curve, points))
+
+
+def _give_up() -> bool:
+    raise _Crowded
+
+
+def _piece(
+    points: Points,
+    alpha: float,
+    part: Mask | None,
+    box: Array,
+    lies_on_curve: Callable[[], bool],
+) -> _Piece:
+    """Triangulate the points around a box, and keep the tetrahedra with centers in it."""
+    members = np.flatnonzero(_near(points, alpha, box))
+    order = insertion_order(points, members, part)
+    inserted, work = points[order], scratch()
+    volumes_of_part = [np.empty(0)]
+
+    def measured(cells: np.ndarray) -> tuple[Array, Array]:
+        radii, volumes = np.empty((2, len(cells)))
+        kernels.measure_cells(inserted, cells, order, box, work, radii, volumes)
+        return radii, volumes
+
+    def look(cells: np.ndarray) -> None:
+        radii, volumes = measured(cells)
+        volumes_of_part[0] = volumes[radii <= alpha]
+
+    early = 0 if part is None else int(part[members].sum())
+    cells, neighbors, _ = triangulate(inserted, lies_on_curve, early, look)
+    radii, volumes = measured(cells)
+    kept = radii <= alpha
+    faces, owners = _boundary(cells, neighbors, kept)
+    parent = np.full(len(kept), -1, np.int32)
+    kernels.join_regions(neighbors, kept, parent)
+    roots = np.flatnonzero(parent == np.arange(len(parent)))
+    while not np.array_equal(above := parent[owners], owners):
+        owners = above
+    regions = np.searchsorted(roots, owners)
+    return _Piece(order[faces], regions, len(roots), (volumes[kept], volumes_of_part[0]))
+
+
+def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
+    """The faces around all pieces together, and the number of regions."""
+    if len(pieces) == 1:
+        return pieces[0].faces, pieces[0].number
+    counts = np.array([piece.number for piece in pieces])
+    firsts = np.cumsum(counts) - counts
+    faces = np.concatenate([piece.faces for piece in pieces])
+    regions = np.concatenate(
+        [first + piece.regions for first, piece in zip(firsts, pieces, strict=True)]
+    )
+    inner = np.zeros(len(faces), bool)
+    table = np.full(1 << (2 * len(faces)).bit_length(), -1)
+    parent = np.arange(counts.sum())
+    joins = kernels.join_pieces(np.sort(faces, axis=1), regions, parent, table, inner)
+    return faces[~inner], int(counts.sum() - joins)
+
+
+def _boxes(points: Points, alpha: float, most: int) -> list[Array]:
+    """Boxes that together are all of space, with about as many points within alpha of each.
+
+    They decide how long the shape takes, and nothing else: so a sample of the points will do.
+    """
+    if min(most, len(points)) <= 1 or not np.isfinite(alpha):
+        return [WHOLE]
+    chosen = np.random.default_rng(0).integers(len(points), size=SAMPLED)
+    return _divided(points[chosen], alpha, WHOLE, most)
+
+
+def _divided(sample: Points, alpha: float, box: Array, most: int) -> list[Array]:
+    """A box cut in two, and these again, until there are enough or it costs too much."""
+    if most == 1:
+        return [box]
+    share = (most // 2) / most
+    load, at, axis = min((*_cut(sample[:, axis], alpha, share), axis) for axis in range(3))
+    if load > WORTHWHILE:
+        return [box]
+    lower, upper = box.copy(), box.copy()
+    lower[1, axis] = upper[0, axis] = at
+    halves = zip((lower, upper), (most // 2, most - most // 2), strict=True)
+    return [
+        smaller
+        for half, count in halves
+        for smaller in _divided(sample[_near(sample, alpha, half)], alpha, half, count)
+    ]
+
+
+def _cut(x: Array, alpha: float, share: float) -> tuple[float, float]:
+    """The greater load of two parts, over what it would be without overlap, and where to cut."""
+    x = np.sort(x)
+    left = np.searchsorted(x, x + alpha, side="right") / share
+    right = (len(x) - np.searchsorted(x, x - alpha)) / (1.0 - share)
+    best = np.maximum(left, right).argmin()
+    return float(max(left[best], right[best]) / len(x)), float(x[best])
+
+
+def _near(points: Points, alpha: float, box: Array) -> Mask:
+    """Mask of the points in a box widened by alpha, and by more than rounding moves a center."""
+    margin = alpha * (1.0 + 2.0**-20) + 2.0**-50
+    near = np.ones(len(points), bool)
+    for axis in range(3):
+        if box[0, axis] > -np.inf:
+            near &= points[:, axis] >= box[0, axis] - margin
+        if box[1, axis] < np.inf:
+            near &= points[:, axis] <= box[1, axis] + margin
+    return near
+
+
+def _boundary(
+    cells: np.ndarray, neighbors: np.ndarray, kept: Mask
+) -> tuple[np.ndarray, np.ndarray]:
+    """The faces between kept tetrahedra and the rest, normals outwards, and whose they are."""
+    room = 4 * len(cells)  # of which only what is written takes memory
+    faces, owners = np.empty((room, 3), np.int32), np.empty(room, np.int32)
+    count = kernels.boundary_faces(cells, neighbors, kept, faces, owners)
+    return faces[:count].copy(), owners[:count].copy()
+
+
+def _hull(points: Points, faces: Faces, volume: float, alpha: float, regions: int) -> Hull:
+    """A shape, its faces in an order that does not depend on where they come from."""
+    vertices, faces = compact_surface(points, faces)
+    first = faces.argmin(axis=1)[:, None] if len(faces) else faces[:, :1]
+    faces = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
+    faces = faces[np.lexsort(faces.T[::-1])]
+    return Hull(
+        vertices=vertices,
+        faces=faces,
+        volume=volume,
+        area=surface_area(vertices, faces),
+        alpha=float(alpha),
+        regions=regions,
+        n=len(points),
+    )
+
+
+def _sum(volumes: Array) -> float:
+    """Their sum from the smallest to the largest: the same for every order of tetrahedra."""
+    return float(np.sort(volumes).sum())
+
+
+def _measure(mesh: Delaunay) -> tuple[Array, Array]:
     """Radii [m] and volumes [m³] of all tetrahedra, on all threads."""
     points, exponent = unit_scale(mesh.points)
     radii, volumes = np.empty((2, len(mesh.tetrahedra)))
+    names = np.arange(len(points))
 
     def task(part: slice) -> Callable[[], object]:
         return partial(
             kernels.measure_cells,
             points,
             mesh.tetrahedra[part],
+            names,
+            WHOLE,
             scratch(),
             radii[part],
             volumes[part],

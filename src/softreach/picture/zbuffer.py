@@ -175,12 +175,17 @@ def _span_ends(triangles: Array, height: Array) -> tuple[Array, Array]:
     share = np.divide(above, rise, out=np.full_like(above, -1.0), where=rise != 0)
     crossed = (share >= 0) & (share <= 1)
     # at least two sides are crossed, since the line lies between the highest and lowest corner
-    share = np.where(crossed, share, 0.0)[..., None]
-    points = np.delete(start + share * (stop - start), 1, axis=2)
-    every = np.arange(len(triangles))
-    enter = np.where(crossed, points[..., 0], np.inf).argmin(axis=1)
-    leave = np.where(crossed, points[..., 0], -np.inf).argmax(axis=1)
-    return points[every, enter], points[every, leave]
+    share = np.where(crossed, share, 0.0)
+    column = start[..., 0] + share * (stop[..., 0] - start[..., 0])
+    enter = np.where(crossed, column, np.inf).argmin(axis=1)
+    leave = np.where(crossed, column, -np.inf).argmax(axis=1)
+    every, kept = np.arange(len(triangles)), [0, *range(2, triangles.shape[2])]
+
+    def crossing(side: Index) -> Array:
+        low, high = start[every, side], stop[every, side]
+        return (low + share[every, side][:, None] * (high - low))[:, kept]
+
+    return crossing(enter), crossing(leave)
 
 
 def _next_center(edge: Array, count: int) -> Index:
@@ -259,6 +264,8 @@ def _range_of(some: NDArray[np.bool_], by: int) -> slice:
 
 def _averaged(keys: Keys, by: int) -> NDArray[np.uint8]:
     """RGBA means of blocks of pixels; colors are weighted by opacity so that edges keep theirs."""
+    if by == 1:  # every key ends in its color
+        return keys.astype(">u4").view(np.uint8).reshape(*keys.shape, 4)
     # four sums in one number: opacity, green, blue and red from 0 to 255, each in 16 bits of 64
     pairs = np.uint64(0x00FF00FF)
     lanes = (keys & pairs) | (keys >> np.uint64(8) & pairs) << np.uint64(32)

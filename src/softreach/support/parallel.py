@@ -16,7 +16,7 @@ from functools import cache, partial
 from itertools import chain, islice
 from typing import Any, TypeVar
 
-__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count", "undivided"]
+__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count", "threads_here", "undivided"]
 
 Result = TypeVar("Result")
 
@@ -31,6 +31,11 @@ def thread_count() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def threads_here() -> int:
+    """Number of threads that work begun on this one may be spread over: 1 where `undivided`."""
+    return 1 if getattr(_here, "undivided", False) else thread_count()
 
 
 def blocks(total: int, size: int) -> list[slice]:

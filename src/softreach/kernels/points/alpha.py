@@ -19,6 +19,7 @@ from softreach.kernels.strict_vector import cross, difference, dot
 
 __all__ = [
     "boundary_faces",
+    "join_pieces",
     "join_regions",
     "least_radii",
     "measure_cells",
@@ -30,31 +31,61 @@ LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two product
 
 
 @strict
-def measure_cells(points, cells, w, radii, volumes):
+def measure_cells(points, cells, names, box, w, radii, volumes):
     """Write the radius of the circumscribed sphere and the volume of every cell.
 
-    With edges a, b, c from the fourth vertex, 6V = a · (b × c) and
-    R = |a² b × c + b² c × a + c² a × b| / 12V.
+    With edges a, b, c from the last vertex, 6V = a · (b × c), and the center of the sphere is at
+    (a² b × c + b² c × a + c² a × b) / 12V from there. Vertices are taken in the order of their
+    names, so that rounding is the same whoever made the cell.
 
     Args:
         points: Coordinates in [-1, 1], shape (n, 3).
-        cells: Vertices, shape (m, 4).
+        cells: Vertices, shape (m, 4); no cell where one is negative.
+        names: Numbers of the points, shape (n,).
+        box: Lower and upper corner; a cell counts if its center is inside or on a lower face.
         w: Work array of the predicates.
-        radii: Result, shape (m,); inf where a cell has no volume.
+        radii: Result, shape (m,); inf where a cell has no volume or does not count.
         volumes: Result, shape (m,).
     """
     for t in range(len(cells)):
+        radii[t], volumes[t] = np.inf, 0.0
         i, j, k, m = corners(cells, t)
-        length, det, sure = sphere(points, i, j, k, m)
+        if (i | j | k | m) < 0:
+            continue
+        i, j, k, m = by_name(names, i, j, k, m)
+        x, y, z, det, sure = sphere(points, i, j, k, m)
         if not sure:
-            length, det = sphere_exact(points, i, j, k, m, w)
+            x, y, z, det = sphere_exact(points, i, j, k, m, w)
         volumes[t] = abs(det) / 6.0
-        radii[t] = length / (2.0 * abs(det)) if det != 0.0 else np.inf
+        if det != 0.0 and not (
+            beyond(points[m, 0] + x / (2.0 * det), box, 0)
+            or beyond(points[m, 1] + y / (2.0 * det), box, 1)
+            or beyond(points[m, 2] + z / (2.0 * det), box, 2)
+        ):
+            radii[t] = np.sqrt(x * x + y * y + z * z) / (2.0 * abs(det))
+
+
+@strict
+def by_name(names, i, j, k, m):
+    """Four vertices in the order of their names."""
+    a, b = (names[i] << 32) | i, (names[j] << 32) | j
+    c, d = (names[k] << 32) | k, (names[m] << 32) | m
+    a, b, c, d = min(a, b), max(a, b), min(c, d), max(c, d)
+    a, c, b, d = min(a, c), max(a, c), min(b, d), max(b, d)
+    b, c = min(b, c), max(b, c)
+    low = 0xFFFFFFFF
+    return np.intp(a & low), np.intp(b & low), np.intp(c & low), np.intp(d & low)
+
+
+@strict
+def beyond(x, box, axis):
+    """True if a coordinate is outside the box."""
+    return x < box[0, axis] or x >= box[1, axis]
 
 
 @strict
 def sphere(points, i, j, k, m):
-    """The numerator |...| of R and 6V, and whether rounding left them good to eight digits."""
+    """The numerator of the center, 6V, and whether rounding left them good to eight digits."""
     a, b, c = difference(points, i, m), difference(points, j, m), difference(points, k, m)
     a2, b2, c2 = dot(a, a), dot(b, b), dot(c, c)
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
@@ -71,7 +102,7 @@ def sphere(points, i, j, k, m):
         abs(det) > DIGITS * ORIENT_BOUND * u * v * w
         and length > DIGITS * LENGTH_BOUND * length_size
     )
-    return length, det, sure
+    return x, y, z, det, sure
 
 
 @strict
@@ -83,34 +114,35 @@ def sphere_exact(points, i, j, k, m, w):
     a2 = dot3(w, end(c[2]), a[0], a[0], a[1], a[1], a[2], a[2])
     b2 = dot3(w, end(a2), b[0], b[0], b[1], b[1], b[2], b[2])
     c2 = dot3(w, end(b2), c[0], c[0], c[1], c[1], c[2], c[2])
-    square, det = 0.0, 0.0
-    for z in range(3):
-        x, y = (z + 1) % 3, (z + 2) % 3
-        bc = minor(w, end(c2), b[x], b[y], c[x], c[y])
-        ca = minor(w, end(bc), c[x], c[y], a[x], a[y])
-        ab = minor(w, end(ca), a[x], a[y], b[x], b[y])
-        square += value(w, dot3(w, end(ab), a2, bc, b2, ca, c2, ab)) ** 2
-        det = value(w, dot3(w, end(ab), a[z], bc, b[z], ca, c[z], ab))
-    return np.sqrt(square), det
+    x, y, z, det = 0.0, 0.0, 0.0, 0.0
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        bc = minor(w, end(c2), b[u], b[v], c[u], c[v])
+        ca = minor(w, end(bc), c[u], c[v], a[u], a[v])
+        ab = minor(w, end(ca), a[u], a[v], b[u], b[v])
+        x, y, z = y, z, value(w, dot3(w, end(ab), a2, bc, b2, ca, c2, ab))
+        det = value(w, dot3(w, end(ab), a[axis], bc, b[axis], ca, c[axis], ab))
+    return x, y, z, det
 
 
 @strict
-def boundary_faces(cells, neighbors, kept, faces):
+def boundary_faces(cells, neighbors, kept, faces, owners):
     """Write the faces between kept cells and the rest, normals outwards; return how many.
 
     Args:
         cells: Vertices, shape (m, 4).
         neighbors: Neighbors, -1 for none, shape (m, 4).
         kept: Mask of the cells that belong to the shape, shape (m,).
-        faces: Result, shape (f, 3); empty to count only.
+        faces: Result, with room for as many as there can be, 4 m; shape (f, 3).
+        owners: Result, the kept cell at each face, shape (f,).
     """
     count = 0
     for t in range(len(cells)):
         for i in range(4):
             if is_boundary(neighbors, kept, t, i):
-                if len(faces):
-                    for k in range(3):
-                        faces[count, k] = cells[t, FACES[i, k]]
+                owners[count] = t
+                for k in range(3):
+                    faces[count, k] = cells[t, FACES[i, k]]
                 count += 1
     return count
 
@@ -133,9 +165,7 @@ def merges(neighbors, parent, t):
         there = neighbors[t, i]
         if there < 0 or parent[there] < 0:
             continue
-        while parent[there] != there:
-            parent[there] = parent[parent[there]]
-            there = parent[there]
+        there = root(parent, there)
         if there != here:
             parent[here] = there
             here = there
@@ -152,6 +182,47 @@ def join_regions(neighbors, kept, parent):
             parent[t] = t
             regions += 1 - merges(neighbors, parent, t)
     return regions
+
+
+@strict
+def join_pieces(faces, regions, parent, table, inner):
+    """Mark faces that are listed twice, and join the regions on both sides; how many that cost.
+
+    Args:
+        faces: Sorted vertices of the outer faces of all pieces, shape (f, 3).
+        regions: Region at each face, shape (f,).
+        parent: Each region itself, shape (r,); changed (see `merges`).
+        table: Work array of -1, its size a power of two above f.
+        inner: Result, a mask of False, shape (f,).
+    """
+    joined = 0
+    for f in range(len(faces)):
+        a, b, c = np.int64(faces[f, 0]), np.int64(faces[f, 1]), np.int64(faces[f, 2])
+        at = (a * 73856093 ^ b * 19349663 ^ c * 83492791) & (len(table) - 1)
+        while table[at] != -1:
+            g = table[at]
+            if faces[g, 0] == a and faces[g, 1] == b and faces[g, 2] == c:
+                break
+            at = (at + 1) & (len(table) - 1)
+        if table[at] == -1:
+            table[at] = f
+            continue
+        g = table[at]
+        inner[f], inner[g] = True, True
+        here, there = root(parent, regions[f]), root(parent, regions[g])
+        if here != there:
+            parent[here] = there
+            joined += 1
+    return joined
+
+
+@strict
+def root(parent, t):
+    """The one that names the set of t in a union-find forest, with paths halved."""
+    while parent[t] != t:
+        parent[t] = parent[parent[t]]
+        t = parent[t]
+    return t
 
 
 @strict

@@ -52,7 +52,7 @@ REMADE = 3  # times that a cell is made and dug out again, at most
 INSIDE, UNSURE = np.intp(-1), np.intp(-2)
 
 
-def triangulate(points, lies_on_curve):
+def triangulate(points, lies_on_curve, early=0, look=None):
     """Insert points in the given order.
 
     Points in space and on surfaces have four to eight cells each, of some thirty that are made;
@@ -62,6 +62,8 @@ def triangulate(points, lies_on_curve):
     Args:
         points: Coordinates in [-1, 1], multiples of 2^-200 (see `predicates`), shape (n, 3).
         lies_on_curve: Called without arguments when cells crowd; True gives up.
+        early: Number of points whose own triangulation is to be seen on the way.
+        look: Called with its cells, among which are such with negative vertices, that are none.
 
     Returns:
         Cells (m, 4), neighbors (m, 4) with -1 outside the hull, and for every point itself or the
@@ -72,26 +74,29 @@ def triangulate(points, lies_on_curve):
     w, start, same = scratch(), np.zeros(4, np.int64), np.arange(len(points))
     mesh = empty_triangulation(8 * len(points) + 64)
     table = np.empty((2, 2048), np.int64)
-    at, walls, used, free, last = _insert(
-        points, mesh, start, same, table, w, 0, 0, DEAD, 0, crowded
-    )
-    while at < len(points):
-        if walls > 0:
-            mesh = enlarged(mesh, used, walls)
-            table = np.empty((2, max(2048, 32 * walls)), np.int64)
-        elif lies_on_curve():
-            return mesh.cells[:0], mesh.neighbors[:0], same
-        else:
-            crowded = np.iinfo(np.int64).max // (2 * REMADE)
-        at, walls, used, free, last = _insert(
-            points, mesh, start, same, table, w, at, used, free, last, crowded
-        )
+    at, used, free, last = 0, 0, DEAD, 0
+    for stop in (early, len(points)) if 0 < early < len(points) else (len(points),):
+        while True:
+            at, walls, used, free, last = _insert(
+                points, mesh, start, same, table, w, at, used, free, last, crowded, stop
+            )
+            if at >= stop:
+                break
+            if walls > 0:
+                mesh = enlarged(mesh, used, walls)
+                table = np.empty((2, max(2048, 32 * walls)), np.int64)
+            elif lies_on_curve():
+                return mesh.cells[:0], mesh.neighbors[:0], same
+            else:
+                crowded = np.iinfo(np.int64).max // (2 * REMADE)
+        if look is not None and at == early and start.max() < early:
+            look(mesh.cells[:used])
     return mesh.cells[:used], mesh.neighbors[:used], same
 
 
 @strict
-def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
-    """Insert points from number `at` on while there is room; no cells yet if that is 0.
+def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded, stop):
+    """Insert points from number `at` up to `stop` while there is room; no cells yet if `at` is 0.
 
     Memory is left to the caller: a kernel that asks for it takes longer to compile.
 
@@ -106,7 +111,7 @@ def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
         if used == 0:
             return len(points), 0, used, free, last
     made = 0
-    for p in range(at, len(points)):
+    for p in range(at, stop):
         if used > crowded + USUAL * p or made > REMADE * (crowded + USUAL * (p - at)):
             return p, 0, used, free, last
         if p == start[0] or p == start[1] or p == start[2] or p == start[3]:
@@ -121,7 +126,7 @@ def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
             return p, walls, used, free, last
         used, free, last = fill(mesh, p, dug, walls, used, free, table)
         made += walls
-    return len(points), 0, compact(mesh, used), free, last
+    return stop, 0, compact(mesh, used) if stop == len(points) else used, free, last
 
 
 @strict

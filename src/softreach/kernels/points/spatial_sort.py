@@ -22,17 +22,27 @@ ROUNDS = 6
 QUANTILES = 1024
 
 
-def insertion_order(points):
-    """Indices of the points, shape (n,), in the order in which to insert them."""
-    places = np.empty((len(points), 3), np.uint16)
+def insertion_order(points, members=None, early=None):
+    """Indices of points in the order in which to insert them; a part keeps the order of the whole.
+
+    Args:
+        points: All of them, shape (n, 3).
+        members: Increasing indices of those to be inserted; all if left out.
+        early: Mask of those that come before the others, shape (n,); none if left out.
+    """
+    members = np.arange(len(points)) if members is None else members
+    early = np.ones(len(points), np.bool_) if early is None else early
+    if len(members) == 0:
+        return members
+    places = np.empty((len(members), 3), np.uint16)
     for axis in range(3):
-        places[:, axis] = _crowding_scale(points[:, axis])
-    keys = np.empty(len(points), np.uint64)
-    _sort_keys(places, keys)
-    return np.argsort(keys, kind="stable")
+        places[:, axis] = _crowding_scale(points[:, axis], members)
+    keys = np.empty(len(members), np.uint64)
+    _sort_keys(places, members, early, keys)
+    return members[np.argsort(keys, kind="stable")]
 
 
-def _crowding_scale(x):
+def _crowding_scale(x, members):
     """Coordinates mapped to [0, 2^BITS) so that crowded places get more room.
 
     Half by length and half by rank among a sample: one far outlier must not squeeze all the other
@@ -43,15 +53,17 @@ def _crowding_scale(x):
     level = np.linspace(0.0, 1.0, len(sample))
     if spread > 0:
         level = 0.5 * level + 0.5 * (sample - sample[0]) / spread
-    return np.interp(x, sample, level * (2**BITS - 1)).astype(np.uint16)
+    return np.interp(x[members], sample, level * (2**BITS - 1)).astype(np.uint16)
 
 
 @strict
-def _sort_keys(places, keys):
+def _sort_keys(places, members, early, keys):
     """Write one integer per point: its round, then its place on the Hilbert curve."""
     for i in range(len(places)):
         x, y, z = np.uint32(places[i, 0]), np.uint32(places[i, 1]), np.uint32(places[i, 2])
-        late = np.uint64(ROUNDS - _round_from_end(i))
+        late = np.uint64(ROUNDS - _round_from_end(members[i]))
+        if not early[members[i]]:
+            late = np.uint64(ROUNDS + 1)
         keys[i] = (late << np.uint64(3 * BITS)) | _hilbert(x, y, z)
 
 
