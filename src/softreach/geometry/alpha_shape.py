@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from softreach.geometry.delaunay import Delaunay, unit_scale
+from softreach.geometry.delaunay import Delaunay
 from softreach.geometry.hull import Hull
-from softreach.geometry.surface import compact_surface, surface_area
+from softreach.geometry.surface import compact_surface, surface_area, unit_scale
 from softreach.kernels.points import alpha as kernels
 from softreach.kernels.points.expansions import scratch
 from softreach.support import parallel
