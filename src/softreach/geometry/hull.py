@@ -26,7 +26,7 @@ from softreach.support.versions import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Hull", "convex_hull"]
+__all__ = ["Hull", "convex_faces", "convex_hull"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -128,7 +128,7 @@ def convex_hull(points: np.ndarray) -> Hull:
         InvalidInput: Points of another shape, or not finite.
     """
     points = as_points("points", points)
-    vertices, faces = _convex_surface(points)
+    vertices, faces = compact_surface(points, convex_faces(points))
     volume = enclosed_volume(vertices, faces)
     return Hull(
         vertices=vertices,
@@ -141,22 +141,22 @@ def convex_hull(points: np.ndarray) -> Hull:
     )
 
 
-def _convex_surface(points: Points) -> tuple[Points, Faces]:
-    """Corners and outward faces; none if the cloud is flat."""
+def convex_faces(points: Points) -> Faces:
+    """Outward faces of the convex hull, as numbers of the points; none if the cloud is flat."""
     scaled, _ = unit_scale(points)
     if len(points) < 4:
-        return np.empty((0, 3)), np.empty((0, 3), np.int32)
+        return np.empty((0, 3), np.int32)
     qhull = _qhull()
     try:
         hull = qhull.ConvexHull(scaled - scaled.mean(axis=0))
     except qhull.QhullError:
-        return np.empty((0, 3)), np.empty((0, 3), np.int32)
+        return np.empty((0, 3), np.int32)
     corners = hull.points[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     inward = np.einsum("fi,fi->f", normals, hull.equations[:, :3]) < 0
     faces = hull.simplices.copy()
     faces[inward] = faces[inward][:, ::-1]
-    return compact_surface(points, faces)
+    return faces
 
 
 @cache
