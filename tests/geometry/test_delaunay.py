@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import Delaunay, delaunay, unit_scale
+from softreach.geometry.delaunay import Delaunay, delaunay
 from softreach.geometry.hull import convex_hull
+from softreach.geometry.surface import unit_scale
 from softreach.kernels.points.expansions import scratch
 from softreach.kernels.points.predicates import insphere, orient
 from softreach.kernels.points.triangulation import FACES

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softreach.inverse.cells import image_tree
+from softreach.inverse.cells import ImageLeaves, image_tree
 from softreach.kernels.branches import candidates
 from softreach.kernels.branches.candidates import MOST_STARTS, find_starts
 from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic
@@ -45,6 +45,23 @@ def test_the_root_of_an_affine_map_is_found_exactly(seed, with_root):
     target, start = starts_of(f, f.values(gamma), 4, with_root)
     assert set(target) == set(range(60))
     assert start == pytest.approx(gamma[target], abs=1e-10)
+
+
+@given(seed=SEEDS)
+@settings(max_examples=5)
+def test_starts_do_not_depend_on_how_space_is_divided(seed):
+    rng = np.random.default_rng(seed)
+    f = random_quadratic(rng, bend=0.1)
+    mesh, targets = mesh_of(f, 6), f.values(rng.uniform(-1.1, 1.1, (40, 3)))
+    trees = image_tree(mesh), ImageLeaves(mesh).around(targets)
+    assert [len(tree.child) > 1 for tree in trees] == [True, False]
+    found = []
+    for tree in trees:
+        room = MOST_STARTS * (1 + len(targets))
+        out = np.empty(room, int), np.empty(room, int), np.empty((room, 3)), np.empty((room, 3, 3))
+        _, count = find_starts(mesh, tree, targets, LOW, HIGH, True, *out)
+        found.append([values[:count].tobytes() for values in out])
+    assert found[0] == found[1]
 
 
 @given(seed=SEEDS)

@@ -28,11 +28,7 @@ REACH = {
     "raster.crossings",
     "raster.add_counts",
 }
-MESH = {
-    "activation_mesh.interpolation_errors",
-    "activation_mesh.face_planes",
-    "space_tree.sort_into_children",
-}
+MESH = {"activation_mesh.interpolation_errors", "activation_mesh.face_planes"}
 NEWTON = {
     "candidates._find_starts",
     "newton.newton_step",

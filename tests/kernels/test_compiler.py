@@ -160,6 +160,22 @@ def test_private_attributes_that_numba_lacks_are_named(monkeypatch):
     assert parts.missing() == ["CPUCodegen._module_pass_manager", "CPUCodegen._gone"]
 
 
+LOADING = """
+import numpy as np
+import softreach as sr
+from numba.core.runtime import rtsys
+sr.tip_positions(sr.designs.minimal_trunk(), np.zeros((1, 3)))
+print(rtsys._init)
+"""
+
+
+def test_a_process_that_compiles_nothing_prepares_no_compiler():
+    """The second of two processes at the latest finds all kernels."""
+    script = [sys.executable, "-c", LOADING]
+    runs = [subprocess.run(script, capture_output=True, text=True, check=True) for _ in range(2)]
+    assert runs[1].stdout == "False\n"
+
+
 def doubled(x):
     return x + x
 

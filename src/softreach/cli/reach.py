@@ -88,6 +88,9 @@ def reach(
 
 def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     """Refuse files that cannot be written, or that a set of so few dimensions does not have."""
+    if not outs:
+        check_output(None, {}, overwrite)
+        return
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.support.files.kinds import PAGES, PICTURES, check_installed
 
@@ -102,9 +105,9 @@ def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
         needed.append(("skimage", "surface"))
     check_installed(*needed)
     free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
-    for path in outs or [None]:
+    for path in outs:
         check_output(path, formats, overwrite)
-        if path is not None and not is_page(path) and free < (3 if _is_picture(path) else 2):
+        if not is_page(path) and free < (3 if _is_picture(path) else 2):
             raise _no_such_output(path)
 
 

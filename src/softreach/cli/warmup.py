@@ -43,7 +43,7 @@ def _free() -> list[Callable[[], object]]:
     from softreach import workspace
     from softreach.arm import designs
     from softreach.arm.base import Base
-    from softreach.inverse import solve_inverse
+    from softreach.inverse import prepared_map, solve_inverse
     from softreach.inverse.path import track_path
     from softreach.rod.kinematics import configuration, tip_jacobian
 
@@ -59,6 +59,7 @@ def _free() -> list[Callable[[], object]]:
         partial(configuration, arm, [-1.0, 0.0, -0.4]),
         _set,
         partial(solve_inverse, arm, [target, beyond]),
+        lambda: prepared_map(arm).tree,
         partial(track_path, arm, path),
         partial(workspace.direction_spread, arm, n=1024),
         partial(workspace.reachable_set, redundant, accuracy=0.1),

@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.geometry.delaunay import Delaunay, lies_on_curve, unit_scale
+from softreach.geometry.delaunay import Delaunay, lies_on_curve
 from softreach.geometry.hull import Hull
-from softreach.geometry.surface import compact_surface, surface_area
+from softreach.geometry.surface import compact_surface, surface_area, unit_scale
 from softreach.kernels.points import alpha as kernels
 from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.expansions import scratch

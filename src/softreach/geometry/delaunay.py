@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from softreach.geometry.surface import unit_scale
 from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.spatial_sort import insertion_order
 from softreach.support.arguments import as_one_of
@@ -15,7 +16,6 @@ from softreach.support.arrays import Points, as_points
 
 _SAMPLED = 512
 _NEIGHBORS = 16
-FINEST = 200  # bits below the largest coordinate that `kernels.predicates` may see
 _FEW = 1000  # of which even those on a curve are soon triangulated
 METHODS = ("auto", "numba", "qhull")
 
@@ -95,13 +95,6 @@ def local_dimension(points: Points) -> float:
     distance = np.asarray(KDTree(distinct).query(distinct[chosen], k=_NEIGHBORS + 1)[0])[:, 1:]
     growth = np.log(distance[:, -1:] / distance[:, :-1]).sum()
     return float(count * (_NEIGHBORS - 1) / growth) if growth > 0 else 0.0  # one sets the scale
-
-
-def unit_scale(points: Points) -> tuple[Points, int]:
-    """Points times 2^-e in [-1, 1], and e: exact, but for what lies below 2^-200 of the largest."""
-    exponent = int(np.frexp(np.abs(points).max(initial=0.0))[1])
-    scaled = np.ldexp(points, -exponent)
-    return np.ldexp(np.round(np.ldexp(scaled, FINEST)), -FINEST), exponent
 
 
 def _by_insertion(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

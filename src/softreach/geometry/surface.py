@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.geometry.delaunay import unit_scale
 from softreach.kernels.points.point_distances import distances_to_faces
 from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
@@ -17,6 +16,7 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
+FINEST = 200  # bits below the largest coordinate that `kernels.points.predicates` may see
 _NEIGHBORS = 16  # with 4, distances to long triangles came out up to a cell too large
 
 
@@ -201,3 +201,10 @@ def _walk(
         place = end if start == place else start
         curve.append(place)
     return curve
+
+
+def unit_scale(points: Points) -> tuple[Points, int]:
+    """Points times 2^-e in [-1, 1], and e: exact, but for what lies below 2^-200 of the largest."""
+    exponent = int(np.frexp(np.abs(points).max(initial=0.0))[1])
+    scaled = np.ldexp(points, -exponent)
+    return np.ldexp(np.round(np.ldexp(scaled, FINEST)), -FINEST), exponent

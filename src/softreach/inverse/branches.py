@@ -6,7 +6,8 @@
    lies within planes; the true image lies within a remainder of it, estimated from the tips and
    Jacobians along the edges: `kernels.activation_mesh`. So every root lies in a tetrahedron whose
    planes, moved out by the remainder, contain the target.
-3. An octree over space lists the inflated images that may cover a place (`image_tree`).
+3. An octree over space lists the inflated images that may cover a place (`image_tree`); for few
+   targets the boxes round the images are looked through instead (`ImageLeaves`).
 4. In each tetrahedron listed at the target, the quadratic through tips and Jacobians says whether
    and where it is reached: a start (`kernels.candidates`). Tips alone improve it.
 5. Damped Newton with the exact Jacobian leads from each start to a root (`kernels.newton`).
@@ -75,7 +76,7 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     count = len(request.targets)
     if not count:
         return no_roots(prepared.rod)
-    prepared.prepare_branches()
+    prepared.prepare_branches(count)
     sets = _sets(spatial_order(request.targets), _set_size(prepared, count))
     if prepared.branch_map.supports_unstable or len(sets) == 1:
         parts = [_branches_of(prepared, request, chosen) for chosen in sets]

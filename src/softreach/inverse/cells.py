@@ -63,16 +63,45 @@ def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[Activatio
 
 def image_tree(mesh: ActivationMesh) -> SpaceTree:
     """Divide space until few tetrahedra remain in each place."""
-    planes = np.empty((6 * len(mesh.corner), 4, 4))
-    face_planes(mesh, 1e-9 * float(np.nanmax(mesh.tip) - np.nanmin(mesh.tip)), planes)
-    boxes = np.repeat(_image_boxes(mesh), 6, axis=0)
-    low = boxes[:, 0].min(axis=0)
-    size = float((boxes[:, 1].max(axis=0) - low).max())
-    growing = _Growing(planes, boxes, low, size)
+    planes, boxes = np.empty((6 * len(mesh.corner), 4, 4)), _image_boxes(mesh)
+    face_planes(mesh, _rounding(mesh), planes)
+    growing = _Growing(planes, boxes, *_root(boxes))
     for _ in range(_MOST_LEVELS):
         if not growing.divide():
             break
     return growing.finished()
+
+
+class ImageLeaves:
+    """Trees that are not divided: for few targets, of no more than what may cover them.
+
+    Args:
+        mesh: Cells of the activation box.
+    """
+
+    def __init__(self, mesh: ActivationMesh) -> None:
+        """Boxes round all images."""
+        self._mesh, self._boxes, self._rounding = mesh, _image_boxes(mesh), _rounding(mesh)
+        self._low, self._high = np.ascontiguousarray(np.moveaxis(self._boxes, 0, 2))
+        self._root = _root(self._boxes)
+
+    def around(self, targets: Array) -> SpaceTree:
+        """The tetrahedra of the cells in whose boxes some targets lie; planes of no others.
+
+        Args:
+            targets: Targets [m], shape (t, 3).
+        """
+        mesh, near = self._mesh, np.zeros(len(self._boxes), bool)
+        for place in targets[:, :, None]:
+            near |= ((self._low <= place) & (place <= self._high)).all(axis=0)
+        cells = np.flatnonzero(near)
+        of_cells = ActivationMesh(*mesh[:3], *(values[cells] for values in mesh[3:]))
+        some, planes = np.empty((len(cells), 6, 4, 4)), np.empty((len(near), 6, 4, 4))
+        face_planes(of_cells, self._rounding, some.reshape(-1, 4, 4))
+        planes[cells] = some
+        item = (6 * cells[:, None] + np.arange(6)).astype(np.int32).ravel()
+        node, planes = np.zeros(1, np.int64), planes.reshape(-1, 4, 4)
+        return SpaceTree(planes, self._boxes, *self._root, node, node, node + len(item), item)
 
 
 class TornCells(NamedTuple):
@@ -181,9 +210,21 @@ def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:
 
 
 def _image_boxes(mesh: ActivationMesh) -> Array:
+    """Boxes round the images of the cells [m], shape (cell, 2, 3)."""
     images = mesh.tip[mesh.corner]
     error = mesh.interpolation_error[:, None]
     return np.stack([images.min(axis=1) - error, images.max(axis=1) + error], 1)
+
+
+def _root(boxes: Array) -> tuple[Array, float]:
+    """Lowest corner and edge of a cube round all boxes [m]."""
+    low = boxes[:, 0].min(axis=0)
+    return low, float((boxes[:, 1].max(axis=0) - low).max())
+
+
+def _rounding(mesh: ActivationMesh) -> float:
+    """Distance beyond its faces at which a tetrahedron may still cover a place [m]."""
+    return 1e-9 * float(np.nanmax(mesh.tip) - np.nanmin(mesh.tip))
 
 
 class _Growing:
@@ -250,6 +291,7 @@ class _Growing:
         first, count = (np.concatenate(part) for part in zip(*self.done, strict=True))
         return SpaceTree(
             self.planes,
+            self.boxes,
             self.low,
             self.size,
             np.concatenate(self.child),

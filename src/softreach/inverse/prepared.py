@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.cells import TornCells, activation_cells, image_tree
+from softreach.inverse.cells import (
+    ImageLeaves,
+    TornCells,
+    activation_cells,
+    image_tree,
+)
 from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
@@ -16,6 +22,7 @@ from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.rod.view import free_bundles, measured_bundles, stable_tips
+from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -25,6 +32,8 @@ __all__ = ["PreparedMap", "prepared_map"]
 
 
 _CELLS = 32
+_FEW = 500  # targets; to divide space for more takes less time than not to
+_AT_ONCE = 32  # of them
 
 
 @dataclass(frozen=True)
@@ -73,9 +82,11 @@ class PreparedMap:
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
         return activation_cells(self.branch_map, self.cells, self.depth)
 
-    def prepare_branches(self) -> None:
-        """Compute what every search from the cells needs, once for all threads."""
-        for name in ("rod", "branch_map", "_cut", "tree")[: 4 if len(self.mesh.corner) else 3]:
+    def prepare_branches(self, count: int) -> None:
+        """Compute what searches for so many targets need, once for all threads."""
+        self._searched[0] += count
+        divided = len(self.mesh.corner) and self._searched[0] > _FEW
+        for name in ("rod", "branch_map", "_cut", "tree")[: 4 if divided else 3]:
             getattr(self, name)
 
     @property
@@ -92,6 +103,23 @@ class PreparedMap:
     def tree(self) -> SpaceTree:
         """The tetrahedra of the cells whose images may cover a place."""
         return image_tree(self.mesh)
+
+    def trees(self, targets: Array) -> Iterator[tuple[slice, SpaceTree]]:
+        """A tree for each block of targets: before many were asked for, of what may cover them."""
+        if "tree" in vars(self):
+            yield slice(len(targets)), self.tree
+            return
+        for block in parallel.blocks(len(targets), _AT_ONCE):
+            yield block, self._leaves.around(targets[block])
+
+    @lazy
+    def _leaves(self) -> ImageLeaves:
+        return ImageLeaves(self.mesh)
+
+    @lazy
+    def _searched(self) -> list[int]:
+        """Number of targets for which branches were searched."""
+        return [0]
 
     @lazy
     def seeds(self) -> Seeds:

@@ -53,14 +53,15 @@ def starts_from_cells(
         return parts[0]
     box, targets = prepared.rod.box, request.targets[chosen]
     low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
-    first = 0
-    while first < len(chosen):
-        done, count = candidates.find_starts(
-            prepared.mesh, prepared.tree, targets[first:], low, high, with_root, *out
-        )
-        part = rows(out, np.arange(count))
-        parts.append(part._replace(target=chosen[part.target + first]))
-        first += done
+    for block, tree in prepared.trees(targets):
+        first, last, _ = block.indices(len(targets))
+        while first < last:
+            done, count = candidates.find_starts(
+                prepared.mesh, tree, targets[first:last], low, high, with_root, *out
+            )
+            part = rows(out, np.arange(count))
+            parts.append(part._replace(target=chosen[part.target + first]))
+            first += done
     return joined(parts)
 
 

@@ -71,17 +71,17 @@ def _dispatcher(function: Callable[..., Any], *, part: bool = False, **options: 
     return made_by(function, targetoptions=options | {"nopython": True})
 
 
-def _dispatchers() -> tuple[Any, Any]:
-    """Makers of kernels and of parts; plain ones where Numba lacks what these rest on."""
+def _means() -> tuple[Any, Any, Any]:
+    """Makers of kernels and of parts, and what loads them; plain ones where Numba lacks names."""
     try:
         from softreach.kernels import parts
 
         if not (lacking := parts.missing()):
-            return parts.KernelDispatcher, parts.PartedDispatcher
+            return parts.KernelDispatcher, parts.PartedDispatcher, parts.loaded
     except ImportError as error:  # a class that Numba has renamed
         lacking = [str(error)]
     _LOG.info("kernels are compiled plainly, as Numba lacks %s", ", ".join(lacking))
-    return _plain, _plain
+    return _plain, _plain, FunctionCache.load_overload
 
 
 def _plain(function: Callable[..., Any], targetoptions: dict[str, Any]) -> Any:
@@ -89,7 +89,7 @@ def _plain(function: Callable[..., Any], targetoptions: dict[str, Any]) -> Any:
     return jit(**targetoptions)(function)
 
 
-_KERNEL, _PART = _dispatchers()
+_KERNEL, _PART, _loaded = _means()
 
 
 def _cached(function: Any) -> Any:
@@ -115,7 +115,7 @@ class _Cache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled code, or None if there is none that can be read."""
         try:
-            overload = super().load_overload(sig, target_context)
+            overload = _loaded(self, sig, target_context)
             if overload is not None and overload.signature.args != getattr(sig, "args", sig):
                 raise TypeError(f"compiled for {overload.signature.args}")
             return overload

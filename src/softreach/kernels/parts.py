@@ -17,23 +17,27 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Literal, cast
 
+from llvmlite import binding
+from numba.core.caching import FunctionCache
 from numba.core.codegen import CPUCodegen, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 from numba.core.typed_passes import NativeLowering
 
-__all__ = ["KernelDispatcher", "PartedDispatcher", "missing"]
+__all__ = ["KernelDispatcher", "PartedDispatcher", "loaded", "missing"]
 
 
-_PRIVATE: tuple[tuple[type, tuple[str, ...]], ...] = (
+_PRIVATE: tuple[tuple[Any, tuple[str, ...]], ...] = (
     (JITCodeLibrary, ("_finalize_dynamic_globals", "_get_module_for_linking", "_finalized")),
     (JITCodeLibrary, ("_codegen", "_final_module", "_linking_libraries", "_reload_init")),
     (CPUCodegen, ("_module_pass_manager",)),
     (CPUDispatcher, ("add_overload", "get_call_template", "get_overload")),
     (DefaultPassBuilder, ("define_nopython_pipeline",)),
     (NativeLowering, ("run_pass",)),
+    (FunctionCache, ("_load_overload", "_guard_against_spurious_io_errors")),
+    (_nrt_python, ("c_helpers",)),
 )
 
 
@@ -47,7 +51,7 @@ def missing() -> list[str]:
         for owner, names in _PRIVATE
         for name in names
         if not hasattr(owner, name)
-        and not any(name in _names_in_constructor(base) for base in owner.__mro__)
+        and not any(name in _names_in_constructor(base) for base in getattr(owner, "__mro__", ()))
     ]
 
 
@@ -153,14 +157,34 @@ def _installed_with_softreach() -> None:
     """SciPy is there."""
 
 
+@cache
+def _name_symbols() -> None:
+    """Tell the linker what machine code of kernels calls in Numba's runtime, and no compiler."""
+    for name, address in _nrt_python.c_helpers.items():
+        binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
+def loaded(kept: FunctionCache, sig: Any, target_context: Any) -> Any:
+    """What a cache holds for one set of types; None if it must be compiled.
+
+    Numba would first declare to itself every function that it can compile, for a tenth of a second.
+    It asks for this under its own lock, so that one thread at a time loads these declarations.
+    """
+    _name_symbols()
+    with kept._guard_against_spurious_io_errors():
+        overload = kept._load_overload(sig, target_context)
+        if overload is not None:
+            return overload
+    _prepare_target()
+    return None
+
+
 class KernelDispatcher(CPUDispatcher):
     """A function that is called from Python."""
 
     def compile(self, sig: Any) -> Any:
         """Compile for one set of types, or load what is cached."""
         with _PAUSE:
-            with global_compiler_lock:
-                _prepare_target()
             return super().compile(sig)
 
 

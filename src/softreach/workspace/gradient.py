@@ -10,13 +10,14 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
-from softreach.geometry.hull import convex_hull
+from softreach.geometry.hull import convex_faces
+from softreach.geometry.surface import compact_surface, enclosed_volume
 from softreach.rod.rods import refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.schema import provenance
 from softreach.support.arguments import as_names, as_number
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.quantity import quantity
@@ -319,14 +320,15 @@ class HullCorners:
     @classmethod
     def of(cls, tips: Array, cube: Array) -> HullCorners:
         """Corners of the hull of some tips at places of the cube."""
-        hull = convex_hull(tips)
-        area = np.zeros_like(hull.vertices)
-        corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]
+        every = convex_faces(tips)
+        vertices, faces = compact_surface(tips, every)
+        area = np.zeros_like(vertices)
+        corners = (vertices - vertices.mean(axis=0))[faces]
         for k in range(3):
             # The volume is a sum of triple products over 6: linear in each corner.
             share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
-            np.add.at(area, hull.faces[:, k], share)
-        return cls(cube[_rows_of(hull.vertices, tips)], area, hull.volume)
+            np.add.at(area, faces[:, k], share)
+        return cls(cube[np.unique(every)], area, enclosed_volume(vertices, faces))
 
 
 def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
@@ -365,10 +367,3 @@ def _corners_of(image: Image) -> HullCorners:
     which = outer_vertices(image)
     tips = image.lattice.origin + image.lattice.cell / image.unit * image.vertices[which]
     return HullCorners.of(tips, image.cube_vertices(which))
-
-
-def _rows_of(some: Array, every: Array) -> Index:
-    """Places of some points in a list of all; one place for those that come twice."""
-    from scipy.spatial import KDTree  # lazily
-
-    return np.asarray(KDTree(every).query(some)[1], np.int64)

@@ -7,19 +7,18 @@ meet. Both are bounded on cells, from samples with a margin for what may lie bet
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
+from softreach.support.lazy import lazy
 from softreach.support.progress import Progress
-from softreach.workspace.discontinuities import corner_values
-from softreach.workspace.flux import box_slopes, grid_faces, signed_volume
+from softreach.workspace.flux import box_slopes, cross_products, grid_faces, signed_volume
 from softreach.workspace.grid import cube_grid, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.measure import extrapolated_hull
+from softreach.workspace.measure import Estimate, extrapolated_hull
 from softreach.workspace.solid import ReachableSolid
 
 _LIMIT = 0.8  # of 1, for slopes between the samples
@@ -68,12 +67,8 @@ def solid_by_flux(
         lattice_for: The lattice to rasterize on, for the tips that it must hold.
         progress: Called with the number of grid vertices done since its last call.
     """
-    flux = signed_volume(rod)
-    places = grid_faces(cells)
-    tips = rod.tips(rod.box.from_free_cube(places))
-    lattice = lattice_for(tips)
-    even = (np.rint(places * cells) % 2 == 0).all(axis=1)
-    progress(len(places))
+    flux, faces = signed_volume(rod), MappedFaces(rod, cells)
+    progress(6 * cells**2 + 2)
     volume = abs(flux.value)
     return ReachableSolid(
         tip_map=rod,
@@ -85,9 +80,27 @@ def solid_by_flux(
         fold_volume=0.0,
         fold_volume_error=0.0,
         route="flux",
-        measure_hull=partial(extrapolated_hull, tips, tips[even]),
-        rasterize=partial(_rasterized, rod, cells, lattice),
+        measure_hull=faces.convex_volume,
+        rasterize=lambda: _rasterized(rod, cells, lattice_for(faces.tips)),
     )
+
+
+class MappedFaces:
+    """Vertices of a grid of n³ cells on the faces of the box, mapped when they are first needed."""
+
+    def __init__(self, rod: TipMap, cells: int) -> None:
+        """Nothing is mapped yet."""
+        self._rod, self._cells = rod, cells
+
+    @lazy
+    def tips(self) -> Array:
+        """Their tips [m], shape (6 n² + 2, 3)."""
+        return self._rod.tips(self._rod.box.from_free_cube(grid_faces(self._cells)))
+
+    def convex_volume(self) -> Estimate:
+        """Volume of the convex hull [m³]."""
+        even = (np.rint(grid_faces(self._cells) * self._cells) % 2 == 0).all(axis=1)
+        return extrapolated_hull(self.tips, self.tips[even])
 
 
 def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
@@ -140,6 +153,7 @@ class RegularWindows:
     def __init__(self, slopes: Array) -> None:
         self._cells = len(slopes) - 1
         self._slopes = slopes.reshape(-1, 3, 3)
+        self._columns = _columns(self._slopes)
         self._sizes = 2 ** np.arange(int(np.log2(self._cells)))
         self._known = np.full((len(self._sizes), len(self._slopes)), _UNKNOWN, np.int8)
         corners = 2 * np.indices((2, 2, 2)).reshape(3, -1).T - 1
@@ -186,26 +200,36 @@ class RegularWindows:
 
     def _judge(self, width: Index, vertex: Index) -> Mask:
         n = self._cells
-        center = np.stack(np.unravel_index(vertex, (n + 1,) * 3), axis=-1)
+        center = np.stack(np.unravel_index(vertex, (n + 1,) * 3))
         left, stretch, right = np.linalg.svd(self._slopes[vertex])
-        back = np.swapaxes(left, 1, 2) / stretch[:, :, None]
-        largest = np.zeros((len(vertex), 3, 3))
+        back = _columns(np.swapaxes(left, 1, 2) / stretch[:, :, None])
+        turn, middle = _columns(np.swapaxes(right, 1, 2)), self._columns[:, :, vertex]
+        largest = np.zeros((3, 3, len(vertex)))
         for offset in self._offsets:
-            other = np.clip(center + offset * width[:, None], 0, n)
-            at = (other[:, 0] * (n + 1) + other[:, 1]) * (n + 1) + other[:, 2]
-            change = self._slopes[at] - self._slopes[vertex]
-            np.maximum(largest, np.abs(back @ change @ np.swapaxes(right, 1, 2)), out=largest)
+            other = np.clip(center + offset[:, None] * width, 0, n)
+            at = (other[0] * (n + 1) + other[1]) * (n + 1) + other[2]
+            change = _product(back, self._columns[:, :, at] - middle)
+            np.maximum(largest, np.abs(_product(change, turn)), out=largest)
         return _spectral_bound(largest) < _LIMIT
 
 
+def _columns(matrices: Array) -> Array:
+    """Matrices (n, 3, 3) as (3, 3, n): short sums along the last axis cost the most."""
+    return np.moveaxis(matrices, 0, 2).copy()
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Products of matrices, all (3, 3, n)."""
+    return np.stack([_times(a, column) for column in np.swapaxes(b, 0, 1)], axis=1)
+
+
 def _spectral_bound(matrices: Array) -> Array:
-    """An upper bound of the spectral radius of matrices without negative entries (Collatz)."""
-    columns = np.moveaxis(matrices, 0, 2).copy()  # long axis last: short sums cost the most
-    vector = np.ones((3, len(matrices)))
+    """An upper bound of the spectral radius of matrices (3, 3, n) >= 0 (Collatz)."""
+    vector = np.ones((3, matrices.shape[2]))
     for _ in range(_POWERS):
-        vector = _times(columns, vector)
+        vector = _times(matrices, vector)
         vector = vector / vector.max(axis=0, initial=1e-300) + 1e-6
-    return (_times(columns, vector) / vector).max(axis=0)
+    return (_times(matrices, vector) / vector).max(axis=0)
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
@@ -288,8 +312,8 @@ def _lengths(vectors: Array) -> Array:
 
 def _normals(patches: _Patches) -> Array:
     rows, axis = np.arange(len(patches.half)), np.argmin(patches.half, axis=1)
-    first = patches.slopes[rows, :, (axis + 1) % 3]
-    return np.cross(first, patches.slopes[rows, :, (axis + 2) % 3])
+    first, second = (patches.slopes[rows, :, (axis + k) % 3] for k in (1, 2))
+    return cross_products(first, second)
 
 
 def _hull(patches: _Patches, a: Index, b: Index) -> tuple[Array, Array]:
@@ -325,12 +349,19 @@ def _keeps_sign(stretch: Array) -> bool:
     A function differs from its trilinear interpolant by no more than the sum of its second
     differences over 8.
     """
-    curved = np.zeros_like(stretch)
+    curved, inside = np.zeros_like(stretch), np.arange(len(stretch)).clip(1, len(stretch) - 2) - 1
     for axis in range(3):
-        second = np.abs(np.diff(stretch, 2, axis))
-        curved += np.pad(second, [(int(other == axis),) * 2 for other in range(3)], "edge")
-    least = np.abs(corner_values(stretch)).min(axis=-1)
-    return bool((least > _MARGIN / 8.0 * corner_values(curved).max(axis=-1)).all())
+        curved += np.abs(np.diff(stretch, 2, axis)).take(inside, axis)
+    least, most = _of_corners(np.minimum, np.abs(stretch)), _of_corners(np.maximum, curved)
+    return bool((least > _MARGIN / 8.0 * most).all())
+
+
+def _of_corners(choose: np.ufunc, values: Array) -> Array:
+    """One of the values at the eight corners of each cell, (n + 1)³ to n³."""
+    for axis in range(3):
+        values = np.moveaxis(values, axis, 0)
+        values = np.moveaxis(choose(values[1:], values[:-1]), 0, axis)
+    return values
 
 
 def _rasterized(rod: TipMap, cells: int, lattice: Lattice) -> Image:

@@ -26,7 +26,7 @@ from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.discontinuities import coarser, finer, left_out_cells, remainder
 from softreach.workspace.grid import corners_of, every_second, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.injective import is_injective, solid_by_flux
+from softreach.workspace.injective import MappedFaces, is_injective, solid_by_flux
 from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import thin_set
@@ -232,9 +232,10 @@ def _of_three(
 ) -> ReachableSolid:
     cells = grid if grid is not None else grid_for(accuracy)
     if is_injective(rod):
-        return solid_by_flux(
-            rod, cells, partial(lattice_for, cell=cell, accuracy=accuracy), progress
-        )
+        lattice = partial(lattice_for, cell=cell, accuracy=accuracy)
+        if cell is not None:  # which may be too small
+            lattice(MappedFaces(rod, cells).tips)
+        return solid_by_flux(rod, cells, lattice, progress)
     solid = rasterized_set(rod, cells, cell, accuracy, progress)
     while grid is None and not is_settled(solid, accuracy) and is_worthwhile(solid, accuracy):
         solid = rasterized_set(rod, 2 * solid.cells, cell, accuracy, progress)

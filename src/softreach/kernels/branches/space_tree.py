@@ -17,6 +17,8 @@ class SpaceTree(NamedTuple):
 
     planes: np.ndarray
     """Faces of the tetrahedra, n·p >= d within [m], shape (tetrahedron, 4, 4)."""
+    boxes: np.ndarray
+    """Boxes round the images of cells of six tetrahedra each [m], shape (cell, 2, 3)."""
     low: np.ndarray
     """Lowest corner of the root [m], shape (3,)."""
     size: float
@@ -48,9 +50,10 @@ def leaf_at(low, size, child, first, length, p):
 
 @inline
 def listed(tree, p, begin, end, held):
-    """Put those of some items whose face planes hold p into `held`, in order; return how many.
+    """Put those of some items whose faces and boxes hold p into `held`, in order; return how many.
 
-    Two faces at a time, without a branch: which of them misses p cannot be predicted.
+    Two faces at a time, without a branch: which of them misses p cannot be predicted. What is left
+    does not depend on how large the leaf is.
     """
     count = end - begin
     for entry in range(count):
@@ -62,7 +65,20 @@ def listed(tree, p, begin, end, held):
             held[kept] = k
             kept += _is_beyond(tree.planes, k, i, p) & _is_beyond(tree.planes, k, i + 1, p)
         count = kept
-    return count
+    kept = 0
+    for entry in range(count):
+        held[kept] = held[entry]
+        kept += int(_is_boxed(tree.boxes, held[entry] // 6, p))
+    return kept
+
+
+@inline
+def _is_boxed(boxes, c, p):
+    """True if p lies in the box of cell c."""
+    inside = True
+    for k in range(3):
+        inside &= boxes[c, 0, k] <= p[k] and p[k] <= boxes[c, 1, k]
+    return inside
 
 
 @inline
@@ -78,7 +94,7 @@ def sort_into_children(planes, boxes, corner, edge, first, count, item, meets, c
 
     Args:
         planes: Faces of the tetrahedra.
-        boxes: Boxes round them, shape (tetrahedron, 2, 3).
+        boxes: Boxes round their cells, shape (cell, 2, 3).
         corner: Lowest corners of the nodes, shape (node, 3).
         edge: Edge of a child.
         first: Beginning of each node's items in `item`.
@@ -111,9 +127,9 @@ def _children_met(planes, boxes, k, p, edge):
 
     The products of its normals with the children's centers are shared.
     """
-    half = 0.5 * edge
-    x, y = _sides_met(boxes, k, 0, p, edge), _sides_met(boxes, k, 1, p, edge)
-    z = _sides_met(boxes, k, 2, p, edge)
+    half, c = 0.5 * edge, k // 6
+    x, y = _sides_met(boxes, c, 0, p, edge), _sides_met(boxes, c, 1, p, edge)
+    z = _sides_met(boxes, c, 2, p, edge)
     met = 0
     for o in range(8):
         met |= (x >> (o >> 2) & y >> (o >> 1 & 1) & z >> (o & 1) & 1) << o
@@ -133,9 +149,9 @@ def _children_met(planes, boxes, k, p, edge):
 
 
 @inline
-def _sides_met(boxes, k, axis, p, edge):
+def _sides_met(boxes, c, axis, p, edge):
     """Two bits: a box meets the lower and the upper half of a cube along an axis."""
-    low, high = boxes[k, 0, axis], boxes[k, 1, axis]
+    low, high = boxes[c, 0, axis], boxes[c, 1, axis]
     lower = int(low <= p[axis] + edge) & int(high >= p[axis])
     upper = int(low <= p[axis] + 2.0 * edge) & int(high >= p[axis] + edge)
     return lower | upper << 1

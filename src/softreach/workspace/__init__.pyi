@@ -1,0 +1,13 @@
+from . import payload as payload
+from .abstract_set import ReachableSet as ReachableSet
+from .directions import direction_spread as direction_spread
+from .gradient import VolumeGradient as VolumeGradient
+from .gradient import volume_gradient as volume_gradient
+from .image import Image as Image
+from .image import Lattice as Lattice
+from .reach import reachable_set as reachable_set
+from .solid import ReachableSolid as ReachableSolid
+from .solid import Surface as Surface
+from .thin import ReachableCurve as ReachableCurve
+from .thin import ReachablePoint as ReachablePoint
+from .thin import ReachableSurface as ReachableSurface
