@@ -7,7 +7,7 @@ READY := .venv/.ready
 # Bytecode is kept whatever the environment says, or every process would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-all tests all-tests ready kernels browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all tests all-tests ready kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -38,7 +38,8 @@ demo: setup
 # Tests side by side, up to four on as many cores.
 TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
 
-# The checks run beside the compiler of the kernels, which has one core.
+# The checks run beside the compiler of the kernels, which has one core, and so does what every
+# process of the tests would else do anew: turn their assertions into ones that tell values.
 test: ready
 	$(MAKE) --no-print-directory tests
 
@@ -52,11 +53,14 @@ all-tests:
 	$(TESTS) -m "large or not large"
 
 ready: setup
-	$(MAKE) --no-print-directory -j2 --output-sync=target kernels check browser
+	$(MAKE) --no-print-directory -j2 --output-sync=target kernels check browser collected
 
 # Compiled once here, and not by every process of the tests.
 kernels: setup
 	$(BIN)/softreach warmup
+
+collected: setup
+	@$(BIN)/python -m pytest -q -q --collect-only >/dev/null || true  # the tests say why
 
 # The studio is tested in a real browser. Only root installs one; whoever has none is told at the end
 # of the tests what to type.
@@ -75,6 +79,7 @@ fast: setup
 # Renews the list of slow tests, which `make quick` leaves out; on an idle machine.
 record: setup browser
 	$(TESTS) --record
+	$(TESTS) --record --quick tests
 
 check: lint types
 	$(BIN)/python -m zensical build --strict --clean

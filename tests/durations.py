@@ -1,7 +1,8 @@
 """How long each test takes, for `make quick`: it leaves out what took over a twentieth of a second.
 
 `pytest --record` writes `durations.json` after a run of all tests: the seconds of each such test
-function with its slowest fixture; the slowest of its cases counts.
+function with its slowest fixture; the slowest of its cases counts. `pytest --record --quick` adds
+what is slow only where those before it are left out, as it is the first to use something.
 """
 
 from __future__ import annotations
@@ -73,5 +74,6 @@ class Durations:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         config = session.config
         if config.getoption("record") and not hasattr(config, "workerinput"):
-            slow = {name: round(s, 2) for name, s in sorted(self.tests.items()) if s > SLOW}
-            FILE.write_text(json.dumps(slow, indent=0) + "\n", "utf-8")
+            known = json.loads(FILE.read_text("utf-8")) if config.getoption("quick") else {}
+            slow = known | {name: round(s, 2) for name, s in self.tests.items() if s > SLOW}
+            FILE.write_text(json.dumps(slow, indent=0, sort_keys=True) + "\n", "utf-8")
