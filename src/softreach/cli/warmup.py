@@ -53,6 +53,7 @@ def _free() -> list[Callable[[], object]]:
     path = (target, (0.2, 0.1, 0.61))
     return [
         _hulls,
+        _triangle,
         _calibration,
         partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
         partial(tip_jacobian, hanging, [[-1.0, 0.0, -0.4]]),
@@ -119,6 +120,15 @@ def _hulls() -> None:
     concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
     for design in (designs.minimal_trunk(), designs.redundant_trunk()):
         activation_distance(compute_cloud(design, 2000), 0.1)
+
+
+def _triangle() -> None:
+    """One triangle of a picture."""
+    import numpy as np
+
+    from softreach.picture.zbuffer import Extent, ZBuffer
+
+    ZBuffer(Extent(0.0, 1.0, 0.0, 1.0), 4).draw_triangles(np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
 
 
 def _loaded() -> list[Callable[[], object]]:

@@ -1,4 +1,4 @@
-"""A z-buffer in NumPy: millions of points, and triangles, to one image where the nearest shows.
+"""A z-buffer: millions of points, and triangles, to one image where the nearest shows.
 
 Every pixel holds one 64-bit key, the depth above the color, and drawing takes the larger key. So
 the image does not depend on the order of what is drawn, and a point of several pixels is a shifted
@@ -7,8 +7,6 @@ maximum of the finished image, whatever the number of points.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from itertools import product
 from typing import NamedTuple
 
@@ -16,32 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.projection import View, project
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array
 
-_PIXELS = 1 << 17  # at a time: temporary arrays stay in the MB
 Keys = NDArray[np.uint64]
 _BLOCK = 1 << 15  # points at a time: temporary arrays stay in the cache, and in memory once touched
-
-
-def filled_pixels(triangles: Array, shape: tuple[int, int]) -> Iterator[tuple[Index, Index, Array]]:
-    """The pixels whose centers lie in triangles, with what the corners carry, blended linearly.
-
-    Args:
-        triangles: Column, row and any number of values at each corner, shape (n, 3, 2 + values);
-            pixel (i, j) covers rows i to i + 1 and columns j to j + 1.
-        shape: Rows and columns of the image; what lies outside is left out.
-
-    Yields:
-        Rows, columns and values, shape (p,), (p,), (p, values), a bounded number at a time.
-    """
-    count = 1 + _PIXELS // 16
-    for start in range(0, len(triangles), count):
-        chunk = triangles[start : start + count]
-        first = _next_center(chunk[..., 1].min(axis=1), shape[0])
-        last = _next_center(chunk[..., 1].max(axis=1), shape[0])
-        owner, row = _ranges(first, last - first)
-        for part in _bounded(np.full(len(row), 16)):
-            yield from _fill_spans(chunk[owner[part]], row[part], shape[1])
 
 
 class Extent(NamedTuple):
@@ -109,13 +85,12 @@ class ZBuffer:
             corners: Shape (n, 3 corners, 3).
             colors: RGB from 0 to 255, shape (n, 3 corners, 3).
         """
+        from softreach.kernels.points.triangle_pixels import fill_triangles  # lazily: Numba
+
         values = np.concatenate([np.asarray(corners, float), np.asarray(colors, float)], axis=2)
         values = values[np.isfinite(values).all(axis=(1, 2))]
         values[..., :2] = self._to_pixels(values)
-        for row, column, depth_and_color in filled_pixels(values, self._keys.shape):
-            depth, color = depth_and_color[:, 0], np.rint(depth_and_color[:, 1:])
-            index = row * self._keys.shape[1] + column
-            np.maximum.at(self._keys.reshape(-1), index, _keys(depth, color.astype(np.uint8)))
+        fill_triangles(values, np.empty((2, 6)), self._keys)
 
     def rgba(self) -> NDArray[np.uint8]:
         """The image from top to bottom, shape (rows, columns, 4); transparent where nothing is."""
@@ -147,66 +122,6 @@ class ZBuffer:
 
     def _keep_larger(self, layer: Keys) -> None:
         np.maximum(self._keys, layer, out=self._keys)
-
-
-def _fill_spans(triangles: Array, row: Index, columns: int) -> Iterator[tuple[Index, Index, Array]]:
-    """Fill one row of each triangle."""
-    left, right = _span_ends(triangles, row.astype(float) + 0.5)
-    first = _next_center(left[:, 0], columns)
-    length = _next_center(np.nextafter(right[:, 0], np.inf), columns) - first
-    # one row for each value, since NumPy is slow along an axis of four
-    starts, slopes = left[:, 1:].T.copy(), (right[:, 1:] - left[:, 1:]).T.copy()
-    slopes /= np.maximum(right[:, 0] - left[:, 0], 1e-12)
-    for part in _bounded(length):
-        owner, column = _ranges(first[part], length[part])
-        along = column + 0.5 - left[part, 0][owner]
-        values = np.empty((len(starts), len(owner)))
-        for value, start, slope in zip(values, starts[:, part], slopes[:, part], strict=True):
-            np.multiply(along, slope[owner], out=value)
-            value += start[owner]
-        yield row[part][owner], column, values.T
-
-
-def _span_ends(triangles: Array, height: Array) -> tuple[Array, Array]:
-    """Both ends of a horizontal line within each triangle: column and values."""
-    start, stop = triangles, np.roll(triangles, -1, axis=1)
-    rise = stop[..., 1] - start[..., 1]
-    above = height[:, None] - start[..., 1]
-    share = np.divide(above, rise, out=np.full_like(above, -1.0), where=rise != 0)
-    crossed = (share >= 0) & (share <= 1)
-    # at least two sides are crossed, since the line lies between the highest and lowest corner
-    share = np.where(crossed, share, 0.0)
-    column = start[..., 0] + share * (stop[..., 0] - start[..., 0])
-    enter = np.where(crossed, column, np.inf).argmin(axis=1)
-    leave = np.where(crossed, column, -np.inf).argmax(axis=1)
-    every, kept = np.arange(len(triangles)), [0, *range(2, triangles.shape[2])]
-
-    def crossing(side: Index) -> Array:
-        low, high = start[every, side], stop[every, side]
-        return (low + share[every, side][:, None] * (high - low))[:, kept]
-
-    return crossing(enter), crossing(leave)
-
-
-def _next_center(edge: Array, count: int) -> Index:
-    """The first pixel whose center is at or after an edge, within 0 to count."""
-    return np.ceil(np.clip(edge - 0.5, 0, count)).astype(np.int64)
-
-
-def _ranges(first: Index, length: Index) -> tuple[Index, Index]:
-    """first[k], first[k] + 1, ... for length[k] numbers, one after another, each with its k."""
-    length = np.maximum(length, 0)
-    owner = np.repeat(np.arange(len(first)), length)
-    before = np.cumsum(length) - length
-    return owner, np.arange(len(owner)) - before[owner] + first[owner]
-
-
-def _bounded(sizes: Index) -> Iterator[slice]:
-    """Slices of consecutive items whose sizes add up to about `_PIXELS`."""
-    bins = np.cumsum(np.maximum(sizes, 0)) // _PIXELS
-    edges = np.flatnonzero(np.diff(bins, prepend=-1, append=-1))
-    for start, stop in itertools.pairwise(edges):
-        yield slice(start, stop)
 
 
 def _keys(depth: Array, colors: NDArray[np.uint8]) -> Keys:

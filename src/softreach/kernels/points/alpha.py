@@ -58,9 +58,9 @@ def measure_cells(points, cells, names, box, w, radii, volumes):
             x, y, z, det = sphere_exact(points, i, j, k, m, w)
         volumes[t] = abs(det) / 6.0
         if det != 0.0 and not (
-            beyond(points[m, 0] + x / (2.0 * det), box, 0)
-            or beyond(points[m, 1] + y / (2.0 * det), box, 1)
-            or beyond(points[m, 2] + z / (2.0 * det), box, 2)
+            beyond(points[m, 0] + x / (2.0 * det), box[0, 0], box[1, 0])
+            or beyond(points[m, 1] + y / (2.0 * det), box[0, 1], box[1, 1])
+            or beyond(points[m, 2] + z / (2.0 * det), box[0, 2], box[1, 2])
         ):
             radii[t] = np.sqrt(x * x + y * y + z * z) / (2.0 * abs(det))
 
@@ -78,9 +78,9 @@ def by_name(names, i, j, k, m):
 
 
 @strict
-def beyond(x, box, axis):
-    """True if a coordinate is outside the box."""
-    return x < box[0, axis] or x >= box[1, axis]
+def beyond(x, lower, upper):
+    """True if a coordinate is below the lower bound, or not below the upper one."""
+    return x < lower or x >= upper
 
 
 @strict
