@@ -11,6 +11,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 import softreach as sr
 from softreach.arm.loads import Loads
+from softreach.force_growth import Growth
 from softreach.forces import Stop, blocked_force
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
@@ -77,6 +78,20 @@ def test_where_no_linear_program_is_solved_the_search_is_unfinished(monkeypatch)
     assert found.force.values.tolist() == [0.0]
     assert np.isnan(found.force_error.values).all()
     assert not found.limit.values.any()
+
+
+def test_few_steps_lead_to_where_stability_is_lost(monkeypatch):
+    """Margins foretell the force: no creeping towards it, and no margin left in the end."""
+    margins, program = [], Growth._program
+
+    def counted(growth, fixed, reach):
+        margins.append(fixed.response.margin)
+        return program(growth, fixed, reach)
+
+    monkeypatch.setattr(Growth, "_program", counted)
+    blocked_force(LOADED, None, SIDE, start=START[:1])
+    assert len(margins) < 60
+    assert 0.0 < margins[-1] < 2e-5
 
 
 @pytest.mark.parametrize("first", [1, pytest.param(0, marks=pytest.mark.large)])

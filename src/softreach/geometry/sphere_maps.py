@@ -216,9 +216,10 @@ def _unit(vectors: Array) -> Array:
 def _first_of_equals(points: Array, good: Mask) -> Index:
     """The first of each group of equal points."""
     kept: list[int] = []
-    for k in np.flatnonzero(good):
-        if all(np.linalg.norm(points[k] - points[j]) > _SAME for j in kept):
-            kept.append(int(k))
+    left = np.flatnonzero(good)
+    while len(left):
+        kept.append(int(left[0]))
+        left = left[np.linalg.norm(points[left] - points[left[0]], axis=1) > _SAME]
     return np.array(kept, np.intp)
 
 
