@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections import Counter
 
 import numpy as np
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from softreach.geometry import hull as geometry_hull
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
@@ -171,3 +174,26 @@ def test_scaling_the_cloud_scales_radii_areas_and_volumes(scale):
     small, large = shape.hull(0.4), scaled.hull(0.4 * scale)
     assert large.volume == pytest.approx(scale**3 * small.volume, rel=1e-12, abs=0)
     assert large.area == pytest.approx(scale**2 * small.area, rel=1e-12, abs=0)
+
+
+ALONE = """
+import sys
+import numpy as np
+from softreach.geometry.hull import convex_hull
+volume = convex_hull(np.random.default_rng(0).random((50, 3))).volume
+print("scipy.spatial" in sys.modules)
+import scipy.spatial
+from scipy.spatial import _qhull
+print(scipy.spatial.ConvexHull is _qhull.ConvexHull, volume.hex())
+"""
+
+
+def test_qhull_is_loaded_without_the_package_that_it_is_in_and_is_the_same():
+    run = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, check=True)
+    points = np.random.default_rng(0).random((50, 3))
+    assert run.stdout.split() == ["False", "True", convex_hull(points).volume.hex()]
+
+
+def test_where_qhull_cannot_be_loaded_alone_it_comes_with_its_package(monkeypatch):
+    monkeypatch.setattr(geometry_hull, "Path", None)  # as any failure
+    assert geometry_hull._qhull.__wrapped__().__name__ == "scipy.spatial"
