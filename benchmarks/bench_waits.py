@@ -69,9 +69,8 @@ WHY = {
     "plan-poses": "predictions for thousands of candidates",
     "reach": "surface, slices and imports of their libraries; the set itself is a fifth",
     "show": "400,000 points drawn by Matplotlib, with its import",
-    "solve": "imports of Numba, and the octree over all cells of the activation box",
     "volume": "400,000 points are triangulated with exact predicates",
-    "track": "import of xarray, and the octree as in `solve`",
+    "track": "import of xarray",
 }
 """Reasons of long waits, by command or function."""
 
@@ -143,7 +142,9 @@ def _command(words: list[str], folder: Path) -> Wait:
     """Run the command line in a process of its own; what no other command reads is removed."""
     before = {*folder.iterdir()}
     cache = folder / "cache"
-    environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "NUMBA_CACHE_DIR": str(cache)}
+    kept = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(cache / "bytecode")}
+    kept["NUMBA_CACHE_DIR"] = str(cache)  # an installed package has its bytecode after a first run
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")} | kept
     start = time.perf_counter()
     with (folder / "said").open("w") as said:
         process = subprocess.Popen(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections import Counter
 
 import numpy as np
@@ -12,6 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from softreach.geometry import alpha_shape
+from softreach.geometry import hull as geometry_hull
 from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
 from softreach.geometry.delaunay import Delaunay, delaunay
 from softreach.geometry.hull import Hull, convex_hull
@@ -247,3 +250,26 @@ def test_radii_and_volumes_do_not_depend_on_the_order_of_vertices(order, seed):
     shape, same = AlphaComplex(triangulation=mesh), AlphaComplex(triangulation=turned)
     np.testing.assert_array_equal(shape.radii, same.radii)
     np.testing.assert_array_equal(shape.volumes, same.volumes)
+
+
+ALONE = """
+import sys
+import numpy as np
+from softreach.geometry.hull import convex_hull
+volume = convex_hull(np.random.default_rng(0).random((50, 3))).volume
+print("scipy.spatial" in sys.modules)
+import scipy.spatial
+from scipy.spatial import _qhull
+print(scipy.spatial.ConvexHull is _qhull.ConvexHull, volume.hex())
+"""
+
+
+def test_qhull_is_loaded_without_the_package_that_it_is_in_and_is_the_same():
+    run = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, check=True)
+    points = np.random.default_rng(0).random((50, 3))
+    assert run.stdout.split() == ["False", "True", convex_hull(points).volume.hex()]
+
+
+def test_where_qhull_cannot_be_loaded_alone_it_comes_with_its_package(monkeypatch):
+    monkeypatch.setattr(geometry_hull, "Path", None)  # as any failure
+    assert geometry_hull._qhull.__wrapped__().__name__ == "scipy.spatial"

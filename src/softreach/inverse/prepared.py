@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -22,7 +21,6 @@ from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.rod.view import free_bundles, measured_bundles, stable_tips
-from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -33,7 +31,6 @@ __all__ = ["PreparedMap", "prepared_map"]
 
 _CELLS = 32
 _FEW = 500  # targets; to divide space for more takes less time than not to
-_AT_ONCE = 32  # of them
 
 
 @dataclass(frozen=True)
@@ -104,16 +101,9 @@ class PreparedMap:
         """The tetrahedra of the cells whose images may cover a place."""
         return image_tree(self.mesh)
 
-    def trees(self, targets: Array) -> Iterator[tuple[slice, SpaceTree]]:
-        """A tree for each block of targets: before many were asked for, of what may cover them."""
-        if "tree" in vars(self):
-            yield slice(len(targets)), self.tree
-            return
-        for block in parallel.blocks(len(targets), _AT_ONCE):
-            yield block, self._leaves.around(targets[block])
-
     @lazy
-    def _leaves(self) -> ImageLeaves:
+    def leaves(self) -> ImageLeaves:
+        """What stands for that tree before many targets were asked for."""
         return ImageLeaves(self.mesh)
 
     @lazy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +10,15 @@ import numpy as np
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import candidates
+from softreach.kernels.branches.space_tree import SpaceTree
+from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined, joined_by, rows
 
 __all__ = ["Starts", "spatial_order", "starts_from_cells", "with_torn_cells"]
 
 
 _ROOM = candidates.MOST_STARTS + 4096  # starts that are gathered before they are copied
+_AT_ONCE = 32  # targets that share a tree which is not divided
 _PLACES = 32  # along each axis, when targets are put in order
 
 
@@ -53,7 +57,7 @@ def starts_from_cells(
         return parts[0]
     box, targets = prepared.rod.box, request.targets[chosen]
     low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
-    for block, tree in prepared.trees(targets):
+    for block, tree in _trees(prepared, targets):
         first, last, _ = block.indices(len(targets))
         while first < last:
             done, count = candidates.find_starts(
@@ -63,6 +67,15 @@ def starts_from_cells(
             parts.append(part._replace(target=chosen[part.target + first]))
             first += done
     return joined(parts)
+
+
+def _trees(prepared: PreparedMap, targets: Array) -> Iterator[tuple[slice, SpaceTree]]:
+    """A tree for each block of targets: before many were asked for, of what may cover them."""
+    if "tree" in vars(prepared):
+        yield slice(len(targets)), prepared.tree
+        return
+    for block in parallel.blocks(len(targets), _AT_ONCE):
+        yield block, prepared.leaves.around(targets[block])
 
 
 def with_torn_cells(prepared: PreparedMap, request: Request, starts: Starts) -> Starts:

@@ -55,6 +55,22 @@ def _product(factor, a, b, out):
 
 
 @inline
+def _copy(a, out):
+    """Write a to out; Numba takes seconds to compile an assignment of one array to another."""
+    for i in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            out[i, c] = a[i, c]
+
+
+@inline
+def _add(factor, a, out):
+    """Add factor a to out."""
+    for i in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            out[i, c] += factor * a[i, c]
+
+
+@inline
 def _rates_of_places(growth, stretch, thrust, d3, force, work):
     """Write ρ' = (η/K0 d3 (d3 × n)ᵀ - ζ d3 ×) θ into `work`, shape (3, 3)."""
     _skew(d3, work)
@@ -153,8 +169,20 @@ def _move(i, state, rates, rise, climb, angle, moved):
                 + GAUSS[i, 1] * rates[6 + a, c]
                 + GAUSS[i, 2] * rates[12 + a, c]
             )
-    moved[:] = climb
+    _copy(climb, moved)
     _product(1.0, rise, angle, moved)
+
+
+@inline
+def _step(rates, state):
+    """Add θ' and μ' of the three nodes to θ and μ."""
+    for a in range(6):
+        for c in range(state.shape[1]):
+            state[a, c] += (
+                WEIGHTS[0] * rates[a, c]
+                + WEIGHTS[1] * rates[6 + a, c]
+                + WEIGHTS[2] * rates[12 + a, c]
+            )
 
 
 @inline
@@ -175,7 +203,8 @@ def _keep(step, marks, place, state, kept):
     """Keep ρ and θ at the places that are asked for behind a step."""
     for mark in range(len(marks)):
         if marks[mark] == step:
-            kept[mark, :3], kept[mark, 3:] = place, state[:3]
+            _copy(place, kept[mark, :3])
+            _copy(state, kept[mark, 3:])
 
 
 @inline
@@ -273,17 +302,18 @@ def respond(
             _collocate(local, state, system, rates)
         for i in range(3):
             _move(i, state, rates, rise[i], climb[i], angle, moved)
-            place += WEIGHTS[i] * moved
+            _add(WEIGHTS[i], moved, place)
             turned = rates[6 * i : 6 * i + 3]
             _add_work(WEIGHTS[i], measures[k, i], directors[k, i], turned, moved, work)
-        state += WEIGHTS[0] * rates[:6] + WEIGHTS[1] * rates[6:12] + WEIGHTS[2] * rates[12:]
+        _step(rates, state)
         _keep(k + 1, marks, place, state, kept)
     unknown = np.zeros((3, columns))
     if loaded:
         _moment_at_base(state, lever, weight, tipping, angle, unknown)
     for mark in range(len(marks)):
-        moves[mark], turns[mark] = kept[mark, :3, 3:], kept[mark, 3:, 3:]
+        _copy(kept[mark, :3, 3:], moves[mark])
+        _copy(kept[mark, 3:, 3:], turns[mark])
         _product(1.0, kept[mark, :3, :3], unknown, moves[mark])
         _product(1.0, kept[mark, 3:, :3], unknown, turns[mark])
-    works[:] = work[:, 3:]
+    _copy(work[:, 3:], works)
     _product(1.0, work[:, :3], unknown, works)
