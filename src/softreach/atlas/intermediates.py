@@ -96,6 +96,8 @@ class Intermediates(Mapping[Need, Any]):
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
         """Mask of the samples that have a stable equilibrium, shape (n,)."""
+        if not self.rod.supports_unstable:  # nobody may ask for the tips
+            return np.ones(len(self.cube), bool)
         return self._samples[1] == TipStatus.STABLE
 
     @cached_property
