@@ -189,7 +189,8 @@ class _Program:
                 (p.design for p in self._points.values() if (p.reals == reals).all()), None
             )
             if design is None:
-                if self.designs >= self._most and len(self.accepted):
+                # one is left for the design that it ends with
+                if self.designs >= self._most - 1 and len(self.accepted):
                     raise _Spent
                 self.designs += 1
                 values = self.values_of(unknowns)

@@ -14,7 +14,7 @@ import numpy as np
 
 from softreach.atlas.metric import MetricFailed
 from softreach.optimization.free_parameters import FreeParameters, Values
-from softreach.optimization.objectives import DesignCase, Goal, Value
+from softreach.optimization.objectives import SETS, DesignCase, Goal, Value
 from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -108,6 +108,13 @@ class Problem:
         }
         text = json.dumps(record, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def is_finer_on_finer_sets(self) -> bool:
+        """True if reachable sets decide, so that what is best depends on their accuracy."""
+        names = {goal.name for goal in self.goals} | {*self.requirements.measures}
+        regions = any(target.region is not None for target in self.requirements.targets)
+        return regions or not names.isdisjoint(SETS)
 
     def case(self, values: Values, accuracy: float) -> DesignCase:
         """The design with these values, to be asked to a relative error of volumes.
