@@ -51,7 +51,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
         state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowCamera},
         state.showing(cut="half"): {FollowCamera},
         state.showing(orthographic=True): {FollowCamera},
-        state.showing(dark=True): {SetTheme, DrawSearch},
+        state.showing(dark=True): {SetTheme, DrawSearch, DrawSurfaces},
         state.replace(needs=NEEDS): {CheckNeeds, FollowCamera},
         state.replace(reference=trunk): {DrawReference},
         state.replace(design=other): {ComputeReach, DrawArm, DrawMap, DrawSample},

@@ -84,7 +84,7 @@ class DrawSurfaces(Job):
 
     depends_on = (
         "appearance.surface", "appearance.alpha_shape", "appearance.slice",
-        "appearance.cloud", "appearance.color", "appearance.lit",
+        "appearance.cloud", "appearance.color", "appearance.lit", "appearance.dark",
     )  # fmt: skip
     only_with = "appearance.surfaces"
 

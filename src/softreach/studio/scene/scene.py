@@ -106,7 +106,7 @@ _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _CLEAR_SURFACE = 0.6  # opacity of the boundary, through which the arm is seen
-_INK: Color = (60, 62, 80)
+_INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _MARK: Color = (235, 90, 0)
 _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
@@ -242,7 +242,7 @@ class Scene:
         self.remove("/surface")
         if len(skin.faces):
             opened = look.slice.axis != "none" or not isinstance(reach.exact, ReachableSolid)
-            data = glb(skin, _CLEAR_SURFACE, lines, _INK, both_sides=opened)
+            data = glb(skin, _CLEAR_SURFACE, lines, _INK[look.dark], both_sides=opened)
             self._api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
         return coloring.key
 
