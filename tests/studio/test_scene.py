@@ -104,3 +104,17 @@ def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or
     assert nodes == {"/surface", "/cloud"}
     assert keys == (None, of_cloud)
     assert drawn(reach, replace(look, surface=False))[1] == set()
+
+
+def test_the_reach_without_loads_is_a_faint_surface_and_points_only_where_it_has_none(trunk):
+    *_, reach = stages(trunk, 12, SMALL, lambda: None)
+    meshes, look = Meshes(), Appearance()
+    scene = Scene(meshes)
+    scene.draw_free(reach, look)
+    free = meshes.added["/free"]
+    np.testing.assert_allclose(free.vertices, reach.sheets.vertices / trunk.length, atol=1e-6)
+    assert free.opacity < 0.3
+    scene.draw_free(replace(reach, exact=None), look)
+    assert len(meshes.added["/free"].points)
+    scene.draw_free(reach, replace(look, free=False))
+    assert not meshes.added

@@ -111,6 +111,7 @@ _MARK: Color = (235, 90, 0)
 _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
+_FAINT = 0.2  # opacity of the reach without loads
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
@@ -149,9 +150,15 @@ class Scene:
         self._points("/unstable", points, color, _UNSTABLE_SIZE * size, shape="diamond")
 
     def draw_free(self, reach: Reach | None, look: Appearance) -> None:
-        """The cloud of the arm without its loads, faint; None takes it away."""
+        """The reach of the arm without its loads, a faint surface; None takes it away.
+
+        Points, where there is no surface, lie before those of the loaded arm.
+        """
+        self.remove("/free")
         if reach is None or not look.free:
-            self.remove("/free")
+            return
+        if reach.has_surface:
+            self._surface("/free", reach.sheets, reach, look.slice, FAINT, _FAINT)
             return
         points = cloud_points(reach, _FREE_LEVEL)
         kept = in_slice(points, look.slice)
