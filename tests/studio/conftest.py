@@ -15,9 +15,8 @@ SMALL = Quality(coarse_level=11, fine_level=12, coarse_accuracy=0.05, fine_accur
 
 @pytest.fixture(scope="session")
 def studio() -> Iterator[Studio]:
-    start = Start(
-        state=StudioState(design=designs.minimal_trunk()).showing(level=12), quality=SMALL
-    )
+    look = {"level": 12, "cloud": True, "surface": False}
+    start = Start(state=StudioState(design=designs.minimal_trunk()).showing(**look), quality=SMALL)
     with Studio(start) as running:
         yield running
 

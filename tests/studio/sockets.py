@@ -11,6 +11,18 @@ from softreach.studio import Studio
 from softreach.studio.session import Session
 
 PATIENCE = 600.0  # [s] on a loaded machine
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (2.0, -4.0, 1.0),
+    "fov": 0.8,
+    "near": 0.1,
+    "far": 100.0,
+    "image_height": 500,
+    "image_width": 800,
+    "look_at": (0.0, 0.0, 0.3),
+    "up_direction": (0.0, 0.0, 1.0),
+}
 
 
 def until(condition: Callable[[], object]) -> None:
@@ -21,25 +33,17 @@ def until(condition: Callable[[], object]) -> None:
 
 
 @contextmanager
-def connected(studio: Studio) -> Iterator[None]:
-    """What a tab is to the server: a socket that reads all it is sent and has told its camera."""
+def connected(studio: Studio) -> Iterator[Callable[[object], None]]:
+    """What a tab is to the server: a socket that reads all it is sent and has told its camera.
+
+    Yields:
+        Sends a message, or bytes as they are.
+    """
     import msgspec
     import viser
     from websockets.exceptions import ConnectionClosed
     from websockets.sync.client import connect
 
-    camera = {
-        "type": "ViewerCameraMessage",
-        "wxyz": (1.0, 0.0, 0.0, 0.0),
-        "position": (2.0, -4.0, 1.0),
-        "fov": 0.8,
-        "near": 0.1,
-        "far": 100.0,
-        "image_height": 500,
-        "image_width": 800,
-        "look_at": (0.0, 0.0, 0.3),
-        "up_direction": (0.0, 0.0, 1.0),
-    }
     address = studio.url.replace("http", "ws", 1)
     version = [f"viser-v{viser.__version__}"]
     with connect(address, subprotocols=version, max_size=None) as socket:
@@ -51,8 +55,8 @@ def connected(studio: Studio) -> Iterator[None]:
 
         reader = threading.Thread(target=read, daemon=True)
         reader.start()
-        socket.send(msgspec.msgpack.encode(camera))
-        yield
+        socket.send(msgspec.msgpack.encode(CAMERA))
+        yield lambda m: socket.send(m if isinstance(m, bytes) else msgspec.msgpack.encode(m))
     reader.join(PATIENCE)
 
 

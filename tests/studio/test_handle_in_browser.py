@@ -71,6 +71,22 @@ FOLDED = (-0.48, -0.16, -1.23)
 START = (-0.7, -0.4, -0.9)
 
 
+def test_a_tip_inside_the_exact_surface_is_dragged(inverse_tab):
+    tab = inverse_tab
+    tab.session.update(lambda s: s.showing(surface=True, cloud=False))
+    begin = pose(tab, START)
+    tab.wait(lambda: tab.drawn("/surface"), "the surface is drawn")
+    end = sr.tip_positions(tab.session.state.design, [(-0.6, -0.55, -0.8)])[0]
+    drag_tip(tab, begin, end)
+    tab.page.mouse.up()
+    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
+    tab.settle()
+    np.testing.assert_allclose(tip_of(tab), tab.session.state.target, atol=1e-5)
+    np.testing.assert_allclose(screen(tab, tip_of(tab)), screen(tab, end), atol=3)
+    assert tab.drawn("/surface")
+    assert not tab.drawn("/cloud")
+
+
 def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(full_tab):
     tab = full_tab
     begin = pose(tab, START)

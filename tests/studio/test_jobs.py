@@ -43,14 +43,15 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     other = changed(trunk, {"taper": 0.01})
     changes = {
         state.replace(activation=(-1.0, 0.0, 0.0)): {DrawArm, DrawSample},
-        state.showing(color="multiplicity"): {DrawCloud},
-        state.showing(slice=Slice(axis="x")): {DrawCloud},
+        state.showing(color="multiplicity"): {DrawCloud, DrawSurfaces},
+        state.showing(slice=Slice(axis="x")): {DrawCloud, DrawSurfaces},
         state.showing(map=MapView(metric="volume")): {DrawMap},
-        state.showing(surface=True): {DrawSurfaces},
+        state.showing(surface=False): {DrawCloud, DrawSurfaces},
+        state.showing(cloud=True): {DrawCloud, DrawSurfaces},
         state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowCamera},
         state.showing(cut="half"): {FollowCamera},
         state.showing(orthographic=True): {FollowCamera},
-        state.showing(dark=True): {SetTheme, DrawSearch},
+        state.showing(dark=True): {SetTheme, DrawSearch, DrawSurfaces},
         state.replace(needs=NEEDS): {CheckNeeds, FollowCamera},
         state.replace(reference=trunk): {DrawReference},
         state.replace(design=other): {ComputeReach, DrawArm, DrawMap, DrawSample},
@@ -64,7 +65,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
     plots = PlotSettings(shown=("along_arm", "section"))
     bare = StudioState(design=trunk)
     full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk, needs=NEEDS)
-    full = full.showing(surface=True, plots=plots)
+    full = full.showing(plots=plots)
     other = changed(trunk, {"taper": 0.01})
     moves = {
         full.replace(design=other): {
@@ -82,8 +83,8 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
             DrawSurfaces,
             SECTION,
         },
-        full.showing(color="rgb"): {DrawCloud, DrawReference},
-        full.showing(surface=False): {DrawSurfaces},
+        full.showing(color="rgb"): {DrawCloud, DrawReference, DrawSurfaces},
+        full.showing(surface=False): {DrawCloud, DrawSurfaces},
         full.showing(plots=PlotSettings()): {ALONG_ARM, SECTION},
         full.replace(target=None): {SolveInverse, FollowCamera},
         full.replace(reference=None): {DrawReference},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 
@@ -18,8 +20,8 @@ from softreach.studio.scene.clouds import (
     key_html,
     sample_colors,
     sample_values,
-    sliced_faces,
 )
+from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
 from softreach.studio.state import Slice
 from softreach.studio.work import Dropped
 
@@ -126,12 +128,53 @@ def test_the_box_holds_every_point_and_its_numbers_are_round(rng):
     assert {"0", "0.5", "1", "x / L", "y / L", "z / L"} <= texts
 
 
-def test_a_slice_keeps_the_faces_within_it():
+def test_a_slice_cuts_a_surface_at_its_planes_and_its_colors_with_it():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 3.0]])
-    faces = np.array([[0, 1, 2], [0, 1, 3]])
-    kept = sliced_faces(vertices, faces, Slice(axis="z", center=0.0, thickness=0.5))
-    np.testing.assert_array_equal(kept, faces[:1])
-    np.testing.assert_array_equal(sliced_faces(vertices, faces, Slice()), faces)
+    skin = Skin(vertices, np.array([[0, 1, 2], [0, 1, 3]]), 100.0 * vertices)
+    cut = Slice(axis="z", center=0.25, thickness=0.5)
+    part = sliced(skin, cut)
+    corners = part.vertices[part.faces]
+    assert corners[..., 2].min() == 0.0
+    assert corners[..., 2].max() == pytest.approx(0.5)
+    area = np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1).sum() / 2
+    assert area == pytest.approx(0.5 + 1.5 * (1 - (5 / 6) ** 2))
+    np.testing.assert_allclose(part.colors, 100 * part.vertices)
+    assert sliced(skin, Slice()) is skin
+
+
+def test_a_surface_is_colored_by_its_own_activations_with_the_key_of_that_color(both):
+    reach = both[1]
+    effort = surface_colors(reach, "effort")
+    assert isinstance(effort.key, ScalarKey)
+    pulls = np.abs(reach.sheets.activation / reach.arm.bounds[:, 0]).mean(axis=1)
+    brightest = np.all(effort.rgb == effort.rgb[pulls.argmax()], axis=1)
+    assert pulls[brightest].min() > pulls.max() - 0.01
+    for color in color_names(reach.arm):
+        assert surface_colors(reach, color).rgb.shape == reach.sheets.vertices.shape
+    multiplicity = surface_colors(reach, "multiplicity").key
+    assert isinstance(multiplicity, ScalarKey)
+    assert multiplicity.low == 1.0
+
+
+def test_a_surface_of_four_bundles_has_the_colors_of_the_samples_nearby():
+    *_, reach = stages(designs.redundant_trunk(), 11, SMALL, lambda: None)
+    for color in ("effort", "manipulability", "strongest"):
+        assert len(surface_colors(reach, color).rgb) == len(reach.sheets.vertices)
+
+
+def test_a_surface_is_read_back_from_its_file():
+    import trimesh
+
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])
+    skin = Skin(vertices, np.array([[0, 1, 2]]), np.full((3, 3), 255.0))
+    data = glb(skin, 0.5, vertices[[[0, 1]]], (0, 0, 0), both_sides=False)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
+    surface, lines = scene.geometry.values()
+    np.testing.assert_allclose(surface.vertices, vertices)
+    np.testing.assert_array_equal(
+        surface.visual.vertex_attributes["color"][0], (255, 255, 255, 128)
+    )
+    np.testing.assert_allclose(lines.vertices, vertices[:2])
 
 
 def test_the_volume_of_the_alpha_shape_is_known_once_it_is_there(trunk):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +10,11 @@ import pytest
 
 from softreach.arm import Marker
 from softreach.rod.kinematics import marker_positions
+from softreach.studio.reach import stages
 from softreach.studio.scene.scene import Scene
+from softreach.studio.state import Appearance
 from tests.made_arms import MADE_ARMS
+from tests.studio.conftest import SMALL
 
 
 class Meshes:
@@ -25,6 +29,12 @@ class Meshes:
 
     def add_point_cloud(self, path, points, colors, **style):
         self.added[path] = SimpleNamespace(points=points, colors=colors, **style)
+
+    def add_glb(self, path, data, **style):
+        self.added[path] = SimpleNamespace(data=data, **style)
+
+    def remove_by_name(self, path):
+        del self.added[path]
 
     def get_handle_by_name(self, path):
         return self.added.get(path)
@@ -72,3 +82,39 @@ def test_markers_are_dots_in_a_body_that_is_clear_and_lengths_are_over_the_one_t
     np.testing.assert_allclose(
         0.5 * vertices, arm.length * meshes.added["/ghosts/0/0"].vertices, atol=1e-6
     )
+
+
+def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or_on_demand(trunk):
+    *_, reach = stages(trunk, 12, SMALL, lambda: None)
+    meshes, look = Meshes(), Appearance()
+    scene = Scene(meshes)
+
+    def drawn(reach, look):
+        keys = scene.draw_surfaces(reach, look), scene.draw_cloud(reach, look)
+        return keys, {path for path in meshes.added if path in ("/surface", "/cloud")}
+
+    keys, nodes = drawn(reach, look)
+    assert nodes == {"/surface"}
+    assert keys[0] is not None
+    assert keys[1] is None
+    (_, of_cloud), nodes = drawn(replace(reach, exact=None), look)
+    assert nodes == {"/cloud"}
+    assert of_cloud is not None
+    keys, nodes = drawn(reach, replace(look, cloud=True))
+    assert nodes == {"/surface", "/cloud"}
+    assert keys == (None, of_cloud)
+    assert drawn(reach, replace(look, surface=False))[1] == set()
+
+
+def test_the_reach_without_loads_is_a_faint_surface_and_points_only_where_it_has_none(trunk):
+    *_, reach = stages(trunk, 12, SMALL, lambda: None)
+    meshes, look = Meshes(), Appearance()
+    scene = Scene(meshes)
+    scene.draw_free(reach, look)
+    free = meshes.added["/free"]
+    np.testing.assert_allclose(free.vertices, reach.sheets.vertices / trunk.length, atol=1e-6)
+    assert free.opacity < 0.3
+    scene.draw_free(replace(reach, exact=None), look)
+    assert len(meshes.added["/free"].points)
+    scene.draw_free(reach, replace(look, free=False))
+    assert not meshes.added

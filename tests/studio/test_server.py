@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 from http.client import HTTPConnection
 from pathlib import Path
+from urllib.parse import urlencode
 
 import pytest
 
@@ -13,8 +14,10 @@ from softreach.studio.serve.access import (
     page_address,
     page_headers,
     reachable_hosts,
+    refusal,
     same_origin,
 )
+from softreach.studio.serve.messages import is_choice
 from softreach.studio.serve.server import page_url, start_server, stop_server
 from softreach.support.errors import InvalidInput
 
@@ -175,3 +178,37 @@ def test_others_are_told_addresses_that_they_can_use():
     assert not {"0.0.0.0", "127.0.0.1"} & set(reachable_hosts("0.0.0.0"))
     assert page_address("::", 80) == "http://127.0.0.1:80"
     assert page_address("fe80::1", 80) == "http://[fe80::1]:80"
+
+
+@pytest.mark.parametrize(
+    ("value", "present", "options", "held"),
+    [
+        (0.3, 0.2, None, True),
+        (3, 0.2, None, True),
+        ("3", 0.2, None, False),
+        (float("nan"), 0.2, None, False),
+        (True, 0.2, None, False),
+        (2.5, 1, None, False),
+        (4.0, 1, None, True),
+        ("b", "a", ("a", "b"), True),
+        ("c", "a", ("a", "b"), False),
+        ("any text", "a", None, True),
+        (None, "a", None, False),
+        ([0.0, 1.0], (0.5, 0.5), None, True),
+        ([0.0], (0.5, 0.5), None, False),
+        (1, True, None, False),
+        (b"x", object(), None, False),
+    ],
+)
+def test_a_widget_takes_values_of_its_own_kind(value, present, options, held):
+    assert is_choice(value, present, options) is held
+
+
+def test_an_address_that_names_another_server_is_refused():
+    headers = {"Host": "127.0.0.1:8080"}
+    assert not refusal("127.0.0.1", "", "/", headers)
+    own = urlencode({"websocket": "ws://127.0.0.1:8080/?state=x"})
+    assert not refusal("127.0.0.1", "", f"/?{own}", headers)
+    for foreign in ("ws://elsewhere.example", "wss://127.0.0.1:9999", "", "x", "ws://[", "//"):
+        told = refusal("127.0.0.1", "", "/?" + urlencode({"websocket": foreign}), headers)
+        assert bool(told) is bool(foreign)

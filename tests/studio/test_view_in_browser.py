@@ -58,6 +58,21 @@ def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     assert hidden < 0.75 * seen
 
 
+def test_the_arm_is_seen_through_the_exact_surface(tab):
+    def arm(**look) -> int:
+        """Number of pixels that the arm changes."""
+        with_arm, without = (pixels_of(tab, arm=shown, **look) for shown in (True, False))
+        return int((np.abs(with_arm - without).max(axis=-1) > 0.05).sum())
+
+    behind = arm(cloud=False, surface=True, handle=False)
+    assert behind > 0.9 * arm(cloud=False, surface=False, handle=False)
+
+
+def pixels_of(tab, **look) -> np.ndarray:
+    show(tab, **look)
+    return pixels(tab)
+
+
 @pytest.mark.large
 def test_no_point_is_drawn_before_the_arm_from_any_side(tab):
     tab.session.update(lambda s: s.replace(activation=(-1.0, -0.2, -0.5)))

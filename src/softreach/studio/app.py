@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -27,13 +28,15 @@ from softreach.studio.jobs.reach import (
 from softreach.studio.jobs.search import CheckNeeds, ConfirmNeeds, DrawSearch, SearchDesigns
 from softreach.studio.scene.camera import framing
 from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
+from softreach.studio.serve.messages import LARGEST_UPLOAD
 from softreach.studio.serve.server import page_url, start_server, stop_server
-from softreach.studio.serve.viser_fixes import close_sockets, request_path
+from softreach.studio.serve.viser_fixes import close_sockets, guard_inputs, request_path
 from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start, state_in_request
 from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import CompilationWatch, Latest
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -155,6 +158,7 @@ class Studio:
 
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start, JOBS, work=self.work, snapshots=self.snapshots)
+        guard_inputs(client, partial(_refuse_file, session))
         session.compiling = self._compilation.running
         with self._lock:
             left = self._work_left()
@@ -226,6 +230,11 @@ def _look_at_all(session: Session) -> None:
     low, high = round_box(np.vstack([*session.scene.axes.corners, session.board.corners]))
     toward = np.subtract(_CAMERA_ON_MAP.position, _CAMERA_ON_MAP.look_at)
     session.camera.look_from(framing(low, high, toward, session.camera.aspect))
+
+
+def _refuse_file(session: Session, name: str, size: int) -> None:
+    most = f"at most {LARGEST_UPLOAD / 1e6:g} MB"
+    session.say(str(InvalidInput(name, f"{size / 1e6:.3g} MB", most)))
 
 
 def _furnish(session: Session, url: str) -> None:

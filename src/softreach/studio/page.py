@@ -68,8 +68,8 @@ def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
     scene.draw_axes(reach, look)
     if look.arm:
         scene.draw_arm(state.design, state.activation)
-    scene.draw_surfaces(reach, look)
-    return key_html(scene.draw_cloud(reach, look))
+    of_surface = scene.draw_surfaces(reach, look)
+    return key_html(scene.draw_cloud(reach, look) or of_surface)
 
 
 def _html_caption(state: StudioState, reach: Reach, key: str) -> str:
@@ -121,7 +121,7 @@ def picture_file(
     paper, ink = _INK[state.appearance.dark]
     figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=_DPI, facecolor=paper)
     figure.figimage(scene, 0, below)
-    if key is not None and state.appearance.cloud:
+    if key is not None:
         _draw_key(figure, key, (1 - (height + 0.35 * _KEY) / total, _KEY / total), ink)
     for k, line in enumerate(reversed(lines)):
         at = (_EDGE + k * _LINE) / total

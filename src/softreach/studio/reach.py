@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.cloud.volume import concave_hull
+from softreach.picture.shading import vertex_normals
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.studio.state import TOL, solvable_rod
 from softreach.studio.work import (
@@ -33,6 +34,7 @@ from softreach.workspace import (
     ReachableSurface,
     reachable_set,
 )
+from softreach.workspace.sheets import Sheets
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +43,10 @@ if TYPE_CHECKING:
 
 _ALPHA_NUMBERS = 128
 """A point of an α-shape takes about as much memory as a sample of so many activations."""
+
+_INSIDE = 2e-3
+"""How far behind a boundary is counted what leads there [L]."""
+_NEIGHBORS = 8
 
 Rows = slice | NDArray[np.int64]
 
@@ -147,6 +153,41 @@ class Reach:
         """Share of the activation box that the exact set leaves out [-]."""
         return float(getattr(self.exact, "lost_share", 0.0))  # only sets of loaded arms lose any
 
+    @property
+    def has_surface(self) -> bool:
+        """True if there is a boundary to be drawn."""
+        return isinstance(self.exact, ReachableSolid | ReachableSurface)
+
+    @cached_property
+    def sheets(self) -> Sheets:
+        """Boundary of a solid as it is drawn, or a surface; slow the first time."""
+        if isinstance(self.exact, ReachableSolid):
+            return self.exact.sheets()
+        assert isinstance(self.exact, ReachableSurface)
+        return Sheets.of(self.exact.surface())
+
+    @cached_property
+    def boundary(self) -> Reach:
+        """The same with the vertices of `sheets`, a little inside, in place of the samples.
+
+        Where activations are not known they are the mean of those of the nearest samples.
+        """
+        sheets, given = self.sheets, self.cloud.activation
+        inward = -_INSIDE * self.arm.length * vertex_normals(sheets.vertices, sheets.faces)
+        activation = sheets.activation
+        if activation is None:
+            activation = given.values[nearest_samples(self, sheets.vertices)].mean(axis=1)
+        cloud = (
+            self.cloud[["tip", "activation"]]
+            .drop_vars("status", errors="ignore")
+            .isel(sample=np.zeros(len(activation), np.int64))
+        )
+        cloud = cloud.assign(
+            tip=(cloud.tip.dims, sheets.vertices + inward, cloud.tip.attrs),
+            activation=(given.dims, activation, given.attrs),
+        )
+        return replace(self, cloud=cloud, order=None)
+
     def share(self, status: TipStatus) -> float:
         """Share of the samples that have a status [-]."""
         return float((self.status == status).mean())
@@ -176,6 +217,16 @@ def shown_samples(reach: Reach, level: int) -> Rows:
 def shown_rows(reach: Reach, level: int) -> NDArray[np.int64]:
     """The same samples by their numbers."""
     return np.arange(reach.samples)[shown_samples(reach, level)]
+
+
+def nearest_samples(reach: Reach, points: NDArray[np.float64], level: int = 15) -> Rows:
+    """Numbers of the samples nearest to each point [m], of the 2^level first, shape (n, k)."""
+    from scipy.spatial import KDTree
+
+    rows = shown_rows(reach, level)
+    count = min(_NEIGHBORS, len(rows))
+    near = KDTree(reach.cloud.tip.values[rows]).query(points, count)[1]
+    return near.reshape(len(points), count)
 
 
 def unstable_samples(reach: Reach, level: int) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from softreach.studio.plots.plot import Figures
 from softreach.studio.reach import Reach, cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.clouds import in_slice
-from softreach.studio.scene.scene import Scene
+from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import History, StudioState
@@ -253,10 +253,12 @@ class Session:
             direction: Of the ray, any length.
         """
         reach, look = self.reach, self.state.appearance
-        if reach is None or not look.cloud or reach.arm != self.state.design:
+        shown = look.cloud or look.surface
+        if reach is None or not shown or reach.arm != self.state.design:
             return None
         points = cloud_points(reach, look.level)
-        seen = np.flatnonzero(in_slice(points, look.slice) & ~self.scene.clouds.hidden(points))
+        hidden = self.scene.clouds.hidden(points) & shows_cloud(reach, look)
+        seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
         hit = picked_point(points[seen], origin, direction, _CLICK * self.camera.narrowness)
         return None if hit is None else int(shown_rows(reach, look.level)[seen[hit]])
 

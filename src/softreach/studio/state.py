@@ -143,10 +143,10 @@ class Appearance:
     """Parallels stay parallel."""
     dark: bool = False
     """The page is dark."""
-    cloud: bool = True
+    cloud: bool = False
     arm: bool = True
     axes: bool = True
-    surface: bool = False
+    surface: bool = True
     """The exact boundary of the reachable set."""
     alpha_shape: bool = False
     trail: bool = False

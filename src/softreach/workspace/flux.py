@@ -84,7 +84,7 @@ def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
     tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
     if not np.isfinite(tips).all():
         return None
-    surface = Surface(vertices=tips, faces=_face_triangles(cube, cells))
+    surface = Surface(vertices=tips, faces=face_triangles(cube, cells))
     if surface.volume < 0:  # the map turns the box over
         surface = Surface(vertices=tips, faces=surface.faces[:, ::-1].copy())
     return surface
@@ -174,7 +174,7 @@ def _flux(rod: TipMap, nodes: int) -> Flux:
     return Flux(value, moved, faces, area)
 
 
-def _face_triangles(cube: Array, cells: int) -> NDArray[np.int32]:
+def face_triangles(cube: Array, cells: int) -> NDArray[np.int32]:
     """Two triangles for every square of the grid on the faces, oriented outwards."""
     number = np.full((cells + 1,) * 3, -1, np.int32)
     number[tuple(np.rint(cube * cells).astype(int).T)] = np.arange(len(cube))

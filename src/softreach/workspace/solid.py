@@ -21,12 +21,12 @@ from softreach.workspace.boundary import (
     ReachedCells,
     boundary_surface,
     critical_surface,
-    outer_sheets,
     signed_field,
 )
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
 from softreach.workspace.measure import Estimate
+from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -134,12 +134,13 @@ class ReachableSolid(ReachableSet):
         image = self._face_image if self.route == "flux" and not self.lost_share else None
         return self._boundary if image is None else image
 
-    def sheets(self) -> Surface:
+    def sheets(self) -> Sheets:
         """The boundary as the sheets it consists of: images of faces of the box, and folds.
 
-        Unlike `surface()` it ends sharply at rims and has parts of any thinness, but where sheets
-        cross it reaches a little inside: it is for pictures. Of more than three free bundles it is
-        `surface()`.
+        Unlike `surface()` it is smooth, ends sharply at rims and where sheets cross, has parts of
+        any thinness, and knows its `lines` and activations. It is for pictures: there may be gaps
+        where sheets meet. Of more than three free bundles, and under loads where the set folds, it
+        is `surface()`.
 
         Raises:
             MissingExtra: scikit-image is not installed.
@@ -228,10 +229,13 @@ class ReachableSolid(ReachableSet):
         return boundary_surface(self.image, self._field, self.volume)
 
     @lazy
-    def _sheets(self) -> Surface:
-        if self.route == "raster" and isinstance(self.image, Image):
-            return outer_sheets(self.tip_map, self.image)
-        return self.surface()
+    def _sheets(self) -> Sheets:
+        sheets = None
+        if self.route == "flux" and not self.lost_share:
+            sheets = box_sheets(self.tip_map)
+        elif isinstance(self.image, Image) and not self.tip_map.supports_unstable:
+            sheets = outer_sheets(self.tip_map, self.image)
+        return Sheets.of(self.surface()) if sheets is None else sheets
 
     @lazy
     def _face_image(self) -> Surface | None:

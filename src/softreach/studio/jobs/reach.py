@@ -14,6 +14,7 @@ from softreach.studio.needs import requirements_of
 from softreach.studio.reach import Reach, shown_rows, stages
 from softreach.studio.scene.camera import Viewpoint, is_behind
 from softreach.studio.scene.clouds import shown_color
+from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.session import Job, Session
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck
@@ -64,7 +65,7 @@ class DrawCloud(Job):
 
     depends_on = (
         "appearance.level", "appearance.color", "appearance.point_size", "appearance.slice",
-        "appearance.cloud", "appearance.axes", "appearance.lit",
+        "appearance.cloud", "appearance.surface", "appearance.axes", "appearance.lit",
     )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
@@ -81,23 +82,25 @@ class DrawCloud(Job):
 class DrawSurfaces(Job):
     """The exact boundary and the α-shape."""
 
-    depends_on = "appearance.surface", "appearance.alpha_shape", "appearance.slice"
+    depends_on = (
+        "appearance.surface", "appearance.alpha_shape", "appearance.slice",
+        "appearance.cloud", "appearance.color", "appearance.lit", "appearance.dark",
+    )  # fmt: skip
     only_with = "appearance.surfaces"
 
     def run(self, check: StaleCheck) -> None:
         """Draw them, which computes them the first time."""
         check()
-        if self.session.reach is not None:
-            self._draw(self.session.reach)
-            self.session.show()
-
-    def _draw(self, reach: Reach) -> None:
-        session, look = self.session, self.session.state.appearance
-        if not look.surfaces:
-            session.scene.draw_surfaces(reach, look)
+        reach, look = self.session.reach, self.session.state.appearance
+        if reach is None:
             return
-        with session.working("computing surfaces"):
-            session.scene.draw_surfaces(reach, look)
+        with self.session.working("computing surfaces" if look.surfaces else ""):
+            if look.surface and reach.has_surface and not look.cloud:
+                _count(self.session, reach.boundary, check)
+            key = self.session.scene.draw_surfaces(reach, look)
+        if key is not None:
+            self.session.key = key
+        self.session.show()
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:
@@ -125,9 +128,13 @@ def _draw_cloud(session: Session) -> None:
 def _count_shown(session: Session, check: StaleCheck) -> None:
     """Count the activations of the points that are shown, where their colors tell it."""
     reach, look = session.reach, session.state.appearance
-    if reach is None or not reach.fine or not look.cloud:
-        return
-    if shown_color(reach.arm, look.color) != "multiplicity":
+    if reach is not None and shows_cloud(reach, look):
+        _count(session, reach, check)
+
+
+def _count(session: Session, reach: Reach, check: StaleCheck) -> None:
+    look = session.state.appearance
+    if not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
         return
     missing, done = uncounted(reach, shown_rows(reach, look.level)), 0
 
@@ -146,7 +153,9 @@ def _draw_points(session: Session) -> None:
     if reach is None:
         return
     with session.drawing, session.client.atomic():
-        session.key = session.scene.draw_cloud(reach, look)
+        key = session.scene.draw_cloud(reach, look)
+        if shows_cloud(reach, look) or not look.surface:  # else the surface has its own
+            session.key = key
         draw_axes(session)
 
 

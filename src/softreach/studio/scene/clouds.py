@@ -245,7 +245,7 @@ _LABELS = {
 }
 
 
-# Slices of points and surfaces.
+# Slices of points.
 
 
 def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
@@ -253,11 +253,6 @@ def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
     if cut.axis == "none":
         return np.ones(len(points), bool)
     return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
-
-
-def sliced_faces(vertices: Array, faces: NDArray[Any], cut: Slice) -> NDArray[Any]:
-    """The faces whose centers [L] a slice shows."""
-    return faces[in_slice(vertices[faces].mean(axis=1), cut)]
 
 
 # Light on a cloud: points at its surface are as bright as the surface would be.
@@ -278,10 +273,16 @@ def lit(colors: NDArray[np.uint8], points: Array) -> NDArray[np.uint8]:
     """
     if len(points) < 2:
         return colors
-    outward = _outward(points)
+    return shaded(colors, _outward(points))
+
+
+def shaded(colors: NDArray[Any], outward: Array) -> NDArray[np.uint8]:
+    """Colors, shape (n, 3), as the lamp lights what looks this way, shape (n, 3).
+
+    What has no direction is inside, where no surface could turn away from the lamp.
+    """
     facing = np.clip(outward @ _LIGHT, -1.0, 1.0)
     shade = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * 0.5 * (1.0 - facing)
-    # Inside there is no surface that could turn away from the lamp.
     surface = np.minimum(np.linalg.norm(outward, axis=1), 1.0)
     shade = surface * shade + (1.0 - surface) * (_DARKEST + _BRIGHTEST) / 2
     return np.rint(colors * shade[:, None]).astype(np.uint8)

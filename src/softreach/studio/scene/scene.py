@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import inside
 from softreach.picture.axes_box import axes_box, round_box, seen_from
+from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points
 from softreach.rod.kinematics import configuration
@@ -22,11 +23,12 @@ from softreach.studio.scene.clouds import (
     in_slice,
     lit,
     sample_colors,
-    sliced_faces,
+    shaded,
 )
+from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
 from softreach.studio.state import Appearance, Slice, solvable_rod
 from softreach.support.palette import BODY, bundle_color
-from softreach.workspace import ReachableSolid, ReachableSurface, Surface
+from softreach.workspace import ReachableSolid
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -103,10 +105,13 @@ _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
+_CLEAR_SURFACE = 0.6  # opacity of the boundary, through which the arm is seen
+_INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _MARK: Color = (235, 90, 0)
 _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
+_FAINT = 0.2  # opacity of the reach without loads
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
@@ -127,7 +132,7 @@ class Scene:
 
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
-        if not look.cloud:
+        if not shows_cloud(reach, look):
             self.remove("/cloud", "/unstable", "/slice")
             return None
         points = cloud_points(reach, look.level)
@@ -145,9 +150,15 @@ class Scene:
         self._points("/unstable", points, color, _UNSTABLE_SIZE * size, shape="diamond")
 
     def draw_free(self, reach: Reach | None, look: Appearance) -> None:
-        """The cloud of the arm without its loads, faint; None takes it away."""
+        """The reach of the arm without its loads, a faint surface; None takes it away.
+
+        Points, where there is no surface, lie before those of the loaded arm.
+        """
+        self.remove("/free")
         if reach is None or not look.free:
-            self.remove("/free")
+            return
+        if reach.has_surface:
+            self._surface("/free", reach.sheets, reach, look.slice, FAINT, _FAINT)
             return
         points = cloud_points(reach, _FREE_LEVEL)
         kept = in_slice(points, look.slice)
@@ -207,13 +218,40 @@ class Scene:
         for k, activation in enumerate(activations):
             self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
 
-    def draw_surfaces(self, reach: Reach, look: Appearance) -> None:
-        """The exact boundary and the α-shape, as far as they are shown; slow the first time."""
-        self.remove("/surface", "/alpha-shape")
-        if look.surface and isinstance(reach.exact, ReachableSolid | ReachableSurface):
-            self._surface("/surface", boundary_of(reach.exact), reach, look.slice, _SURFACE)
+    def draw_surfaces(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
+        """The exact boundary and the α-shape, as far as they are shown; slow the first time.
+
+        Returns:
+            The key to the colors of the boundary; None where it has none of its own.
+        """
         if look.alpha_shape and len(reach.alpha_shape.faces):
             self._surface("/alpha-shape", reach.alpha_shape, reach, look.slice, _HULL)
+        else:
+            self.remove("/alpha-shape")
+        if not (look.surface and reach.has_surface):
+            self.remove("/surface")
+            return None
+        if shows_cloud(reach, look):  # whose colors it would hide
+            self.remove("/surface")
+            self._surface("/surface", reach.sheets, reach, look.slice, _SURFACE)
+            return None
+        return self._draw_boundary(reach, look)
+
+    def _draw_boundary(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
+        """The exact boundary in the colors of what is asked, with its edges and folds."""
+        coloring, sheets = surface_colors(reach, look.color), reach.sheets
+        vertices, colors = sheets.vertices / reach.arm.length, coloring.rgb
+        if look.lit:
+            colors = shaded(colors, vertex_normals(vertices, sheets.faces))
+        skin = sliced(Skin(vertices, sheets.faces, colors.astype(float)), look.slice)
+        lines = vertices[sheets.lines]
+        lines = lines[in_slice(lines.reshape(-1, 3), look.slice).reshape(-1, 2).all(axis=1)]
+        self.remove("/surface")
+        if len(skin.faces):
+            opened = look.slice.axis != "none" or not isinstance(reach.exact, ReachableSolid)
+            data = glb(skin, _CLEAR_SURFACE, lines, _INK[look.dark], both_sides=opened)
+            self._api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
+        return coloring.key
 
     def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
@@ -295,9 +333,7 @@ class Scene:
         if np.any(shift):
             self._draw_beside(reach, look, shift)
         elif isinstance(reach.exact, ReachableSolid):
-            self._surface(
-                "/reference", boundary_of(reach.exact), reach, look.slice, _REFERENCE, 0.3
-            )
+            self._surface("/reference", reach.sheets, reach, look.slice, _REFERENCE, 0.3)
         else:
             points = cloud_points(reach, min(look.level, 16))
             self._points("/reference", points, np.array(_REFERENCE, np.uint8), look.point_size)
@@ -362,9 +398,9 @@ class Scene:
     ) -> None:
         """Draw what a slice leaves of a surface with `vertices` [m] and `faces`."""
         vertices = surface.vertices / reach.arm.length
-        faces = sliced_faces(vertices, surface.faces, cut)
-        if len(faces):
-            self._mesh(path, vertices, faces, color, opacity)
+        skin = sliced(Skin(vertices, surface.faces, np.zeros_like(vertices)), cut)
+        if len(skin.faces):
+            self._mesh(path, skin.vertices, skin.faces, color, opacity)
 
     def _slab(self, cut: Slice, points: Array) -> None:
         """The middle plane of the slice, as wide as the cloud."""
@@ -381,9 +417,9 @@ class Scene:
         self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
 
 
-def boundary_of(exact: ReachableSolid | ReachableSurface) -> Surface:
-    """Boundary of a reachable set, as it is drawn."""
-    return exact.sheets() if isinstance(exact, ReachableSolid) else exact.surface()
+def shows_cloud(reach: Reach, look: Appearance) -> bool:
+    """True if points are shown: also in place of a surface that there is not, or not yet."""
+    return look.cloud or (look.surface and not reach.has_surface)
 
 
 def _spine(arm: Manipulator, shape: Any) -> tuple[Array, Array]:

@@ -77,6 +77,7 @@ def _outward() -> str:
 _NAME = "softreach_token"
 _NO_TOKEN = "The address lacks the token that softreach printed with it.\n"
 _FOREIGN = "This page is for its own server alone.\n"
+_ELSEWHERE = "This address names another server, to which the page may not connect.\n"
 
 
 def new_token() -> str:
@@ -132,7 +133,19 @@ def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str
     """
     if not is_welcome(path, headers, token):
         return _NO_TOKEN
-    return "" if same_origin(headers, host) else _FOREIGN
+    if not same_origin(headers, host):
+        return _FOREIGN
+    sockets = parse_qs(urlsplit(path).query).get("websocket", [])
+    own = headers.get("Host", "")
+    return "" if all(_place(socket) == own for socket in sockets) else _ELSEWHERE
+
+
+def _place(address: str) -> str:
+    """Name and port in an address; "" if it is none."""
+    try:
+        return urlsplit(address).netloc
+    except ValueError:
+        return ""
 
 
 def answer_headers(token: str, path: str, headers: Mapping[str, str]) -> dict[str, str]:

@@ -11,15 +11,18 @@ import gzip
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
+from softreach.studio.serve.messages import LARGEST_UPLOAD, is_choice, is_message
+
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from viser import ClientHandle, ViserServer
 
 __all__ = [
     "close_sockets",
+    "guard_inputs",
     "guarding",
     "headed",
     "headed_body",
@@ -68,7 +71,10 @@ def guarding(
 
         taken.set()
         assert plain is not None
-        return plain(*arguments, process_request=admit, process_response=add, **options)
+        handler, *others = arguments
+        return plain(
+            _deaf(handler), *others, process_request=admit, process_response=add, **options
+        )
 
     if plain is None:
         yield taken
@@ -79,6 +85,89 @@ def guarding(
             yield taken
         finally:
             sockets.serve = plain
+
+
+def _deaf(handler: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A handler of sockets that hears only what viser can read: what it cannot ends a socket."""
+
+    async def handle(connection: Any) -> None:
+        receive = connection.recv
+
+        async def receive_message(*arguments: Any, **options: Any) -> Any:
+            while not is_message(raw := await receive(*arguments, **options)):
+                pass
+            return raw
+
+        connection.recv = receive_message
+        await handler(connection)
+
+    return handle
+
+
+def guard_inputs(client: ClientHandle, refuse: Callable[[str, int], None]) -> None:
+    """Let widgets take only values that they can hold, and files that are not too large.
+
+    viser sets whatever a socket says, and holds a file whole before it tells of it.
+
+    Args:
+        client: The tab.
+        refuse: Told name and bytes of a file that is too large.
+    """
+    from viser import _messages
+
+    gui: Any = client.gui
+    inputs = _Inputs(gui, refuse)
+    for kind, handler, ours in (
+        (_messages.GuiUpdateMessage, "_handle_gui_updates", inputs.change),
+        (_messages.FileTransferStartUpload, "_handle_file_transfer_start", inputs.begin_file),
+        (_messages.FileTransferPart, "_handle_file_transfer_part", inputs.take_part),
+    ):
+        theirs, line = getattr(gui, handler, None), getattr(gui, "_websock_interface", None)
+        if theirs is not None and line is not None:
+            line.unregister_handler(kind, theirs)
+            line.register_handler(kind, partial(ours, theirs))
+
+
+class _Inputs:
+    """What a page says that a person did."""
+
+    def __init__(self, gui: Any, refuse: Callable[[str, int], None]) -> None:
+        self._gui, self._refuse = gui, refuse
+        self._taken: dict[str, int] = {}
+        """Bytes of the files that are on their way."""
+
+    async def change(self, accept: Any, number: int, message: Any) -> None:
+        """A widget has another value."""
+        handle = self._gui._gui_input_handle_from_uuid.get(message.uuid)
+        if handle is None or set(message.updates) != {"value"}:
+            return
+        options = getattr(handle, "options", None)
+        if is_choice(message.updates["value"], handle.value, options):
+            await accept(number, message)
+
+    def begin_file(self, accept: Any, number: int, message: Any) -> None:
+        """A file is announced."""
+        from viser import _messages
+
+        if message.size_bytes <= LARGEST_UPLOAD:
+            self._taken[message.transfer_uuid] = 0
+            accept(number, message)
+            return
+        end = _messages.FileTransferPartAck(
+            source_component_uuid=message.source_component_uuid,
+            transfer_uuid=message.transfer_uuid,
+            transferred_bytes=message.size_bytes,
+            total_bytes=message.size_bytes,
+        )
+        self._gui._websock_interface.queue_message(end)  # or the page shows it as under way
+        self._refuse(message.filename, message.size_bytes)
+
+    def take_part(self, accept: Any, number: int, message: Any) -> None:
+        """A part of a file is there; no more is held than was allowed."""
+        size = self._taken.get(message.transfer_uuid, LARGEST_UPLOAD) + len(message.content)
+        if size <= LARGEST_UPLOAD:
+            self._taken[message.transfer_uuid] = size
+            accept(number, message)
 
 
 def request_path(server: ViserServer, client_id: int) -> str:

@@ -1,0 +1,309 @@
+"""The boundary of a folded set as smooth sheets, cut where they cross.
+
+The boundary of the image of a box lies in the images of its faces and of the places inside where
+det J = 0. Both are meshed by themselves, with corners where the map puts them: faces are parted
+where det J changes its sign, the fold is the level set of det J. What has reach on both sides is
+then cut away, along lines that bisection finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from softreach.geometry.surface import Surface, compact_surface
+from softreach.picture.shading import vertex_normals
+from softreach.rod.tip_map import TipMap
+from softreach.rod.view import stable_tips
+from softreach.support.arrays import Array, Faces, Mask
+from softreach.support.errors import MissingExtra
+from softreach.workspace.flux import box_slopes, face_triangles, grid_faces
+from softreach.workspace.grid import cube_grid
+from softreach.workspace.image import Image
+
+_FACE_CELLS = 40
+_FOLD_CELLS = 24
+_SECANTS = 3
+_HALVINGS = 7
+_ASIDE = 0.02  # cells of the lattice beside a face where is looked for the reach
+_ROUGH = 0.5  # of second differences: by so much the fold of a linear image is off
+_NEAR = 3.0  # cells of the grid from a fold within which a face may be beneath it
+_STEP = 1e-3  # of the cube, for differences along the kernel of J
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Sheets(Surface):
+    """A boundary for pictures: sheets that end where they meet, and the lines there."""
+
+    lines: NDArray[np.int32]
+    """Edges of the box, folds and crossings, as pairs of vertices, shape (n, 2)."""
+    activation: Array | None
+    """That leads to each vertex, shape (v, bundles); None where it is not known."""
+
+    @classmethod
+    def of(cls, surface: Surface) -> Self:
+        """A surface of which no more is known."""
+        none = np.empty((0, 2), np.int32)
+        return cls(vertices=surface.vertices, faces=surface.faces, lines=none, activation=None)
+
+
+def outer_sheets(rod: TipMap, image: Image) -> Sheets:
+    """The faces and folds that bound an image.
+
+    Args:
+        rod: The tip map, of three free bundles, one smooth branch.
+        image: Of the grid of cubes over its activation box.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    beside = _Beside(rod, image)
+    (on_faces, face_parts), (on_fold, fold_parts) = _parted_faces(rod), _fold(rod)
+    cube = np.concatenate([on_faces, on_fold])
+    faces = np.concatenate([face_parts, fold_parts + np.int32(len(on_faces))])
+    is_fold = np.arange(len(cube)) >= len(on_faces)
+    normals = vertex_normals(_tips(rod, cube), faces)
+
+    def cut(pairs: NDArray[np.int32]) -> Array:
+        share, step = np.full(len(pairs), 0.5), 0.25
+        for _ in range(_HALVINGS):
+            place, normal = (_between(values[pairs], share) for values in (cube, normals))
+            outer = beside.are_outer(place, normal, is_fold[pairs[:, 0]])
+            share, step = np.where(outer, share + step, share - step), step / 2
+        return share
+
+    faces, pairs, shares = clipped(faces, beside.are_outer(cube, normals, is_fold), cut)
+    return _sheets(rod, np.concatenate([cube, _between(cube[pairs], shares)]), faces)
+
+
+def box_sheets(rod: TipMap) -> Sheets | None:
+    """The faces of the box, which bound the image of a map that is one to one.
+
+    Returns:
+        None if some activation on the faces has no stable equilibrium.
+    """
+    cube = grid_faces(_FACE_CELLS)
+    sheets = _sheets(rod, cube, face_triangles(cube, _FACE_CELLS))
+    if not np.isfinite(sheets.vertices).all():
+        return None
+    turned = sheets.volume < 0
+    return replace(sheets, faces=sheets.faces[:, ::-1].copy()) if turned else sheets
+
+
+def _sheets(rod: TipMap, cube: Array, faces: Faces) -> Sheets:
+    cube, faces = compact_surface(cube, faces)
+    activation, lines = rod.box.from_free_cube(cube), _lines(cube, faces)
+    return Sheets(vertices=_tips(rod, cube), faces=faces, lines=lines, activation=activation)
+
+
+def clipped(
+    faces: Faces, kept: Mask, cut: Callable[[NDArray[np.int32]], Array]
+) -> tuple[Faces, NDArray[np.int32], Array]:
+    """Triangles cut along the line between vertices that are kept and others.
+
+    Args:
+        faces: Shape (f, 3).
+        kept: For each vertex.
+        cut: Of pairs of vertices (kept, not kept), shape (n, 2), the share of the way to the second
+            where the line is, shape (n,).
+
+    Returns:
+        Triangles, whose vertices beyond those that are kept are new: one for each cut pair, the
+        pairs and the shares.
+    """
+    count = kept[faces].sum(axis=1)
+    parts = [faces[count == 3]]
+    edges = []
+    one, two = faces[count == 1], faces[count == 2]
+    for some, alone in ((one, kept[one]), (two, ~kept[two])):
+        first = alone.argmax(axis=1)[:, None]
+        apex, left, right = (
+            np.take_along_axis(some, (first + k) % 3, axis=1)[:, 0] for k in range(3)
+        )
+        edges.append((apex, left, right))
+    (a, b, c), (p, q, r) = edges
+    pairs = np.concatenate(
+        [np.stack(pair, axis=1) for pair in ((a, b), (a, c), (q, p), (r, p))]
+    ).reshape(-1, 2)
+    unique, number = np.unique(pairs, axis=0, return_inverse=True)
+    shares = cut(unique.astype(np.int32)) if len(unique) else np.empty(0)
+    new = number.ravel() + len(kept)
+    ab, ac, qp, rp = np.split(new, np.cumsum([len(a), len(a), len(q)]))
+    parts += [
+        np.stack([a, ab, ac], axis=1), np.stack([q, r, rp], axis=1), np.stack([q, rp, qp], axis=1)
+    ]  # fmt: skip
+    return np.concatenate(parts).astype(np.int32), unique.astype(np.int32), shares
+
+
+def _between(values: Array, share: Array) -> Array:
+    """Of pairs of values, shape (n, 2, k), what lies a share of the way to the second."""
+    return values[:, 0] + share[:, None] * (values[:, 1] - values[:, 0])
+
+
+def _tips(rod: TipMap, cube: Array) -> Array:
+    return stable_tips(rod).tips(rod.box.from_free_cube(cube))
+
+
+def _dets(rod: TipMap, cube: Array) -> Array:
+    return np.linalg.det(box_slopes(rod, cube)[1])
+
+
+def _parted_faces(rod: TipMap) -> tuple[Array, Faces]:
+    """The faces of the box with outward triangles, each wholly of one sign of det J."""
+    cube = grid_faces(_FACE_CELLS)
+    faces, dets = face_triangles(cube, _FACE_CELLS), _dets(rod, cube)
+    cut = _zeros(rod, cube, dets)
+    positive, pairs, shares = clipped(faces, dets > 0, cut)
+    negative, more, other = clipped(faces, dets <= 0, cut)
+    # each part has its own copies: across the fold the surface does not go on
+    first = np.concatenate([cube, _between(cube[pairs], shares)])
+    second = np.concatenate([cube, _between(cube[more], other)])
+    flipped = negative[:, ::-1] + np.int32(len(first))
+    return compact_surface(
+        np.concatenate([first, second]), np.concatenate([positive, flipped]).astype(np.int32)
+    )
+
+
+def _zeros(rod: TipMap, cube: Array, dets: Array) -> Callable[[NDArray[np.int32]], Array]:
+    """Shares of the way between vertices where det J = 0, by regula falsi (Illinois)."""
+
+    def cut(pairs: NDArray[np.int32]) -> Array:
+        low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+        at_low, at_high = dets[pairs[:, 0]].copy(), dets[pairs[:, 1]].copy()
+        share = at_low / (at_low - at_high)
+        for _ in range(_SECANTS):
+            value = _dets(rod, _between(cube[pairs], share))
+            beyond = np.sign(value) == np.sign(at_high)
+            high, at_high, at_low = (
+                np.where(beyond, share, high),
+                np.where(beyond, value, at_high / 2),
+                np.where(beyond, at_low / 2, value),
+            )
+            low = np.where(beyond, low, share)
+            share = low + (high - low) * at_low / (at_low - at_high)
+        return share
+
+    return cut
+
+
+def _fold(rod: TipMap) -> tuple[Array, Faces]:
+    """The places where det J = 0, with triangles whose images look away from what is folded."""
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError as error:
+        raise MissingExtra(("scikit-image", "surface")) from error
+    n = _FOLD_CELLS
+    dets = _dets(rod, cube_grid(n))
+    if dets.min() >= 0 or dets.max() <= 0:
+        return np.empty((0, 3)), np.empty((0, 3), np.int32)
+    field = dets.reshape((n + 1,) * 3)
+    places, faces, _, _ = marching_cubes(field, 0.0, allow_degenerate=False)
+    ends = np.stack([np.floor(places), np.ceil(places)], axis=1).astype(int)
+    numbers = np.stack(
+        [np.ravel_multi_index(tuple(end.T), field.shape) for end in ends.swapaxes(0, 1)], axis=1
+    ).astype(np.int32)
+    grid = cube_grid(n)
+    moved = numbers[:, 0] != numbers[:, 1]
+    cube = places.astype(float) / n
+    cube[moved] = _between(grid[numbers[moved]], _zeros(rod, grid, dets)(numbers[moved]))
+    normals = _away(rod, cube)
+    tips = _tips(rod, cube)
+    corners = tips[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    turned = np.einsum("fi,fki->f", area, normals[faces]) < 0
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    return cube, faces.astype(np.int32)
+
+
+def _away(rod: TipMap, cube: Array) -> Array:
+    """Normals of the images of folds, away from what is folded, shape (n, 3)."""
+    left, _, right = np.linalg.svd(box_slopes(rod, cube)[1])
+    kernel, normal = right[:, 2], left[:, :, 2]
+    step = 0.01 * kernel
+    # also of places a little beyond the box
+    second = _tips(rod, cube + step) + _tips(rod, cube - step) - 2.0 * _tips(rod, cube)
+    side = np.einsum("ni,ni->n", second, normal)
+    return np.where(side[:, None] > 0, -normal, normal)
+
+
+class _Beside:
+    """Tells whether what is before a sheet is out of reach."""
+
+    def __init__(self, rod: TipMap, image: Image) -> None:
+        self._rod, self._image = rod, image
+        self._n = round(len(image.vertices) ** (1 / 3)) - 1
+        lattice = image.lattice
+        grid = lattice.origin + image.vertices * (lattice.cell / image.unit)
+        self._grid = grid.reshape(*(self._n + 1,) * 3, 3)
+        bend = sum(
+            np.pad(
+                np.linalg.norm(np.diff(self._grid, 2, axis), axis=-1),
+                [(int(k == axis),) * 2 for k in range(3)],
+                mode="edge",
+            )
+            for axis in range(3)
+        )
+        self._rough = _ROUGH * maximum_filter(bend, 3)
+
+    def are_outer(self, cube: Array, normals: Array, fold: Mask) -> Mask:
+        """Mask of the places of sheets that have nothing before them."""
+        mirrored, near = np.zeros(len(cube), bool), fold.copy()
+        rest = np.flatnonzero(~fold)
+        mirrored[rest], near[rest] = self._beneath_fold(cube[rest])
+        node = np.rint(cube * self._n).astype(int).clip(0, self._n)
+        away = np.where(near, self._rough[tuple(node.T)], 0.0)
+        away = np.maximum(away, _ASIDE * self._image.lattice.cell)
+        before = self._linear(cube) + away[:, None] * normals
+        return ~mirrored & (self._image.counts_at(before) == 0)
+
+    def _beneath_fold(self, cube: Array) -> tuple[Mask, Mask]:
+        """Masks of places of faces that a second activation reaches across a fold; of those near.
+
+        Along the kernel k of J, det J is linear near a fold: its zero is at t = -det/slope, and
+        x + 2 t k has about the same tip as x.
+        """
+        slopes = box_slopes(self._rod, cube)[1]
+        _, sizes, right = np.linalg.svd(slopes)
+        kernel = right[:, 2]
+        dets = np.linalg.det(slopes)
+        some = np.flatnonzero(sizes[:, 2] < 0.3 * sizes[:, 1])
+        at = cube[some]
+        step = np.where(((at + _STEP * kernel[some]) <= 1.0).all(axis=1), _STEP, -_STEP)
+        ahead = _dets(self._rod, at + step[:, None] * kernel[some])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            way = -dets[some] / ((ahead - dets[some]) / step)
+        twin = at + 2.0 * way[:, None] * kernel[some]
+        close = np.abs(way) < _NEAR / self._n
+        inside = ((twin > 0.0) & (twin < 1.0)).all(axis=1)
+        beneath, near = np.zeros((2, len(cube)), bool)
+        beneath[some], near[some] = close & inside, close
+        return beneath, near
+
+    def _linear(self, cube: Array) -> Array:
+        """Images by the map that is linear on the tetrahedra of the grid."""
+        at = cube * self._n
+        corner = np.floor(at).clip(0, self._n - 1).astype(int)
+        rest = at - corner
+        order = np.argsort(-rest, axis=1, kind="stable")
+        place = corner.copy()
+        out = self._grid[tuple(place.T)].copy()
+        rows = np.arange(len(at))
+        for k in range(3):
+            before = self._grid[tuple(place.T)]
+            place[rows, order[:, k]] += 1
+            out += rest[rows, order[:, k]][:, None] * (self._grid[tuple(place.T)] - before)
+        return out
+
+
+def _lines(cube: Array, faces: Faces) -> NDArray[np.int32]:
+    """Edges of triangles that lie on edges of the box, or that have a triangle on one side only."""
+    pairs = np.sort(np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    ends = cube[edges]
+    level = (ends[:, 0] == ends[:, 1]) & ((ends[:, 0] == 0.0) | (ends[:, 0] == 1.0))
+    return edges[(count == 1) | (level.sum(axis=1) >= 2)].astype(np.int32)
