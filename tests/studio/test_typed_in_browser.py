@@ -52,6 +52,16 @@ def test_numbers_are_kept_to_the_last_digit(tab):
             assert value(tab, name) == pytest.approx(wanted, abs=1e-15)
 
 
+def test_arrow_keys_on_a_control_leave_the_camera_alone(tab):
+    before = tab.session.camera.actual()
+    thumb = tab.slider("revolution Ω [deg]")
+    for control in (tab.page.get_by_role("tab", name="Design"), thumb):
+        control.press("ArrowUp", delay=100)
+    assert thumb.get_attribute("aria-valuenow") == "109"
+    tab.settle()
+    assert tab.session.camera.actual() == before
+
+
 @pytest.mark.large
 def test_nothing_happens_before_enter_and_the_field_says_so(tab):
     tab.open("Design")

@@ -1,0 +1,63 @@
+// What viser's page lacks: when fields apply, which keys are the scene's, and letters on dark ground.
+
+// viser drops what a field tells if Enter follows at once; and fields that are left apply too.
+(function () {
+  function apply(form) {
+    form.typed = false;
+    setTimeout(function () {
+      if (form.isConnected) form.requestSubmit();
+    }, 120);
+  }
+  addEventListener("input", function (event) {
+    if (event.target.form) event.target.form.typed = true;
+  }, true);
+  addEventListener("keydown", function (event) {
+    var form = event.target.form;
+    if (form && event.key === "Enter") {
+      event.preventDefault();
+      event.stopPropagation();
+      apply(form);
+    }
+  }, true);
+  addEventListener("focusout", function (event) {
+    var form = event.target.form;
+    if (form && form.typed) apply(form);
+  }, true);
+})();
+
+// viser turns its camera with every key that is not typed into a field. Keys of a slider, a tab or a
+// button are its own; those with Ctrl are commands.
+document.documentElement.addEventListener("keydown", function (event) {
+  var own = event.target.closest && event.target.closest("[role=slider], [role=tab], button");
+  if (own && !event.ctrlKey && !event.metaKey) event.stopPropagation();
+});
+
+// viser writes black on white whatever the page looks like; its two shaders for that get a switch.
+(function () {
+  var gl = window.WebGL2RenderingContext && WebGL2RenderingContext.prototype;
+  if (!gl) return;
+  var source = gl.shaderSource, attach = gl.attachShader, use = gl.useProgram;
+  var shaders = new WeakSet(), programs = new WeakMap();
+  gl.shaderSource = function (shader, text) {
+    var ours = text
+      .replace("vec4(1.0, 1.0, 1.0, 0.85 * vAlpha)",
+               "vec4(vec3(1.0 - 0.92 * isDark), 0.85 * vAlpha)")
+      .replace("vec4(0.0, 0.0, 0.0, a)", "vec4(vec3(0.85 * isDark), a)");
+    if (ours !== text) {
+      shaders.add(shader);
+      ours = ours.replace("void main", "uniform float isDark; void main");
+    }
+    source.call(this, shader, ours);
+  };
+  gl.attachShader = function (program, shader) {
+    if (shaders.has(shader)) programs.set(program, null);
+    attach.call(this, program, shader);
+  };
+  gl.useProgram = function (program) {
+    use.call(this, program);
+    if (!program || !programs.has(program)) return;
+    var place = programs.get(program) || this.getUniformLocation(program, "isDark");
+    programs.set(program, place);
+    this.uniform1f(place, document.documentElement.dataset.mantineColorScheme === "dark" ? 1 : 0);
+  };
+})();
