@@ -21,6 +21,7 @@ import pytest
 from numba import njit
 from numba.core import caching
 from numba.core.codegen import CPUCodegen
+from numba.core.compiler_lock import global_compiler_lock as lock
 from numba.core.dispatcher import Dispatcher
 
 import softreach
@@ -161,6 +162,14 @@ def test_private_attributes_that_numba_lacks_are_named(monkeypatch):
 
 def doubled(x):
     return x + x
+
+
+def test_one_thread_at_a_time_loads_what_numba_declares(monkeypatch):
+    """Two that begin at once would find half of it each, and compile nothing any more."""
+    alone = []
+    monkeypatch.setattr(parts, "_prepare_target", lambda: alone.append(lock.is_locked()))
+    assert kernel(lambda x: x + 1)(1) == 2
+    assert alone == [True]
 
 
 @pytest.fixture

@@ -19,6 +19,7 @@ from typing import Any, Literal, cast
 
 from numba.core.codegen import CPUCodegen, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.typed_passes import NativeLowering
@@ -158,7 +159,8 @@ class KernelDispatcher(CPUDispatcher):
     def compile(self, sig: Any) -> Any:
         """Compile for one set of types, or load what is cached."""
         with _PAUSE:
-            _prepare_target()
+            with global_compiler_lock:  # two threads would take half of the declarations each
+                _prepare_target()
             return super().compile(sig)
 
 
