@@ -18,7 +18,7 @@ from softreach.studio.start import start_on_store
 from softreach.studio.state import Slice
 from softreach.studio.tabs.inverse import InversePanel
 from tests.studio.conftest import SMALL
-from tests.studio.tab import PATIENCE, Tab, unit
+from tests.studio.tab import PATIENCE, SIZE, Tab, unit
 
 
 def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(tab):
@@ -106,6 +106,19 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     assert len(tab.session.answer) == 0
     tab.page.get_by_text("out of reach").wait_for()
     tab.page.get_by_text("L away").wait_for()
+
+
+def test_the_caption_of_a_saved_page_stands_below_its_scene(tab, tmp_path):
+    tab.open("Export")
+    saved = tab.context.new_page()
+    saved.goto(tab.save("Save web page (HTML)", tmp_path).as_uri())
+    scene = saved.locator("canvas[data-engine]")
+    scene.wait_for()
+    canvas = scene.bounding_box()
+    numbers = saved.get_by_text("volume").bounding_box()
+    saved.close()
+    assert canvas["height"] > SIZE[1] / 2
+    assert canvas["y"] + canvas["height"] <= numbers["y"]
 
 
 @pytest.mark.large
