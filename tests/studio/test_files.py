@@ -17,6 +17,7 @@ from softreach.export import export_cloud
 from softreach.plot.style import pyplot
 from softreach.studio import page
 from softreach.studio.atlas_map import atlas_map, fixed_places, map_choices, metric_names
+from softreach.studio.captions import size_text
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
 from softreach.studio.reach import Quality, cloud_points, stages
@@ -79,7 +80,7 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
 
 def test_a_saved_page_holds_everything_itself(fine):
     saved = static_page(StudioState(design=fine.arm), fine)
-    assert f"{fine.volume:.4f}" in saved
+    assert size_text(fine.size) in saved
     assert "taper_deg = 2.0" in saved
     assert '<script src="http' not in saved
     assert '<link href="http' not in saved

@@ -8,6 +8,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed, find_parameter
 from softreach.studio import Start, Studio, StudioState
+from softreach.studio.captions import size_text
 from softreach.studio.start import KeptWork
 from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
@@ -96,7 +97,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, folder):
         tab.settle()
         tab.session = reloaded(tab, studio)
         assert taper(tab) == 0.02
-        tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").wait_for()
+        tab.page.get_by_text(size_text(tab.session.reach.size)).wait_for()
         tab.press("Undo")
         become(tab, lambda: tab.session.state.design == TRUNK, "the history is there too")
         tab.close()
@@ -115,7 +116,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was_beside_another_tab(browser
         one.session = reloaded(one, studio)
         assert taper(one) == 0.02
         assert one.session.reach.arm == one.session.state.design
-        one.page.get_by_text(f"volume {one.session.reach.volume:.4f}").wait_for()
+        one.page.get_by_text(size_text(one.session.reach.size)).wait_for()
         one.press("Undo")
         become(one, lambda: one.session.state.design == TRUNK, "the history is there too")
         assert taper(other) == 0.01
