@@ -164,7 +164,9 @@ class Studio:
         _furnish(session, page_url(self.server))
         session.camera.on_move(lambda: session.follow(FollowCamera))
         session.begin()
-        if session.camera.is_upright:
+        if left is None and self.start.state.camera is not None:
+            session.look_as(self.start.state.camera)
+        elif session.camera.is_upright and (left is None or left[0].camera is None):
             _look_at_all(session)
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)

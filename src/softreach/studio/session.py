@@ -21,7 +21,7 @@ from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
-from softreach.studio.state import History, StudioState
+from softreach.studio.state import Camera, History, StudioState
 from softreach.studio.work import Latest, StaleCheck
 from softreach.support.errors import SoftreachError
 
@@ -243,7 +243,7 @@ class Session:
         """Take up a state that was saved, and its view."""
         self.update(lambda _: state)
         if state.camera is not None:
-            self.camera.look_from(state.camera)
+            self.look_as(state.camera)
 
     def picked_sample(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
         """Number of the sample under the cursor, of those that can be seen; None beside all.
@@ -263,6 +263,13 @@ class Session:
     def look_from(self, view: str) -> None:
         """See everything from one of `camera.VIEWS`."""
         self.camera.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.camera.aspect))
+
+    def look_as(self, camera: Camera) -> None:
+        """Look from a camera that was saved; from its side, if that was in a window of a phone."""
+        if not self.camera.fits(camera):
+            toward = np.subtract(camera.position, camera.look_at)
+            camera = framing(*self.scene.axes.corners, toward, self.camera.aspect)
+        self.camera.look_from(camera)
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
@@ -287,7 +294,7 @@ class Session:
         if state.design != self.start.state.design:
             self.reach = None
         if state.camera is not None:
-            self.camera.look_from(state.camera)
+            self.look_as(state.camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""
