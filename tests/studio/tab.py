@@ -26,6 +26,18 @@ TEN_A_SECOND = """
 """So many pictures are enough: without a graphics card each takes a core as long as it is drawn."""
 
 
+FLASH = """
+    window.flashed = false;
+    (function look() {
+        if (document.querySelector("[data-softreach]")) return;
+        const panel = document.querySelector(".mantine-Paper-root");
+        if (panel && panel.checkVisibility({visibilityProperty: true})) window.flashed = true;
+        setTimeout(look, 20);
+    })();
+"""
+"""Notes whether a panel was seen before ours."""
+
+
 class Tab:
     """One page and its session."""
 
@@ -35,7 +47,7 @@ class Tab:
         )
         self.requests: list[str] = []
         self.errors: list[str] = []
-        self.context.add_init_script(TEN_A_SECOND)
+        self.context.add_init_script(TEN_A_SECOND + FLASH)
         self.context.on("request", lambda request: self.requests.append(request.url))
         self.page = self.context.new_page()
         self.page.set_default_timeout(1000 * PATIENCE)

@@ -72,11 +72,20 @@ def test_reset_leads_back_to_the_beginning_and_can_be_undone(tab):
     become(tab, lambda: tab.session.state == before, "the reset is undone")
 
 
-@pytest.mark.large
-def test_where_there_is_nothing_to_redo_the_page_says_so(tab):
+def test_where_there_is_nothing_to_redo_the_page_says_so_and_no_tab_jumps(tab):
+    bar = tab.page.get_by_role("tablist").first.bounding_box()
+    redo = tab.page.get_by_role("button", name="Redo", exact=True)
     tab.session.update(lambda s: s.replace(activation=(-0.1, 0.0, 0.0)))
-    tab.press("Redo")
+    tab.wait(redo.is_disabled, "Redo is gray")
+    tab.page.locator("canvas").first.focus()
+    tab.page.keyboard.press("Control+Shift+z")
     tab.page.get_by_text("There is nothing to redo.").wait_for()
+    assert tab.page.get_by_role("tablist").first.bounding_box() == bar
+    tab.press("Undo")
+    tab.wait(redo.is_enabled, "Redo is there")
+    tab.page.get_by_text("There is nothing to redo.").wait_for(state="detached")
+    tab.settle()
+    assert tab.page.get_by_role("tablist").first.bounding_box() == bar
 
 
 def reloaded(tab, studio):

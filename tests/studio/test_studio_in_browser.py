@@ -23,6 +23,7 @@ from tests.studio.tab import PATIENCE, SIZE, Tab, unit
 
 
 def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(tab):
+    assert not tab.page.evaluate("flashed")
     reach = tab.session.reach
     assert reach.fine
     tab.page.get_by_text(size_text(reach.size)).wait_for()
@@ -113,7 +114,7 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
 
 def test_the_caption_of_a_saved_page_stands_below_its_scene(tab, tmp_path):
     tab.open("Export")
-    saved = tab.context.new_page()
+    saved = tab.context.browser.new_page()
     saved.goto(tab.save("Save web page (HTML)", tmp_path).as_uri())
     scene = saved.locator("canvas[data-engine]")
     scene.wait_for()

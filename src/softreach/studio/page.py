@@ -90,7 +90,7 @@ def _html_caption(state: StudioState, reach: Reach, key: str) -> str:
     marks = markup.paragraph(*legend_text(reach, free=False))
     paper, ink = _INK[state.appearance.dark]
     colors = f"background:{paper};color:{ink}"
-    return f'<div style="{_BOX};{colors}">{numbers}{key}{marks}{design}</div>'
+    return f'<div data-softreach style="{_BOX};{colors}">{numbers}{key}{marks}{design}</div>'
 
 
 def _html_image(picture: NDArray[np.uint8] | None) -> str:

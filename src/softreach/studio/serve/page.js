@@ -19,6 +19,17 @@
       apply(form);
     }
   }, true);
+  addEventListener("focusin", function (event) {
+    if (event.target.form) event.target.form.before = event.target.value;
+  }, true);
+  addEventListener("keydown", function (event) {
+    var field = event.target;
+    if (event.key !== "Escape" || !field.form || field.form.before === undefined) return;
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(
+      field, field.form.before);
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+    field.form.typed = false;
+  }, true);
   addEventListener("focusout", function (event) {
     var form = event.target.form;
     if (form && form.typed) apply(form);
@@ -31,6 +42,27 @@ document.documentElement.addEventListener("keydown", function (event) {
   var own = event.target.closest && event.target.closest("[role=slider], [role=tab], button");
   if (own && !event.ctrlKey && !event.metaKey) event.stopPropagation();
 });
+
+// What changes with the page: which steps can be undone, and how wide the panel is.
+(function () {
+  var waiting = false;
+  function tidy() {
+    waiting = false;
+    var status = document.querySelector("[data-history]");
+    if (!status) return;
+    var steps = status.dataset.history;
+    document.querySelectorAll("button").forEach(function (button) {
+      var step = button.textContent.toLowerCase();
+      if (step === "undo" || step === "redo") button.disabled = !steps.includes(step);
+    });
+    var panel = innerWidth - status.getBoundingClientRect().left;
+    document.documentElement.style.setProperty("--panel", Math.round(panel + 10) + "px");
+  }
+  new MutationObserver(function () {
+    if (!waiting) setTimeout(tidy, 60);
+    waiting = true;
+  }).observe(document.documentElement, { childList: true, subtree: true });
+})();
 
 // viser writes black on white whatever the page looks like; its two shaders for that get a switch.
 (function () {
