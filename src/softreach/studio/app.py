@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
+from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from softreach.picture.axes_box import round_box
+from softreach.plot.style import pyplot
 from softreach.studio.fields import attempt
 from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
 from softreach.studio.jobs.calibration import DrawSample, FitArm
@@ -34,6 +36,7 @@ from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start, state_in_request
 from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import CompilationWatch, Latest
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -96,6 +99,8 @@ class Studio:
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
+        self._libraries = threading.Thread(target=_load_libraries, daemon=True)
+        self._libraries.start()
         self.server = start_server(host, port, token)
         camera = start.state.camera or (
             _camera_beside(start.state.design) if start.atlas is None else _CAMERA_ON_MAP
@@ -150,12 +155,14 @@ class Studio:
 
     def _tell(self, running: bool) -> None:
         for session in list(self.sessions.values()):
-            session.compiling = running
+            session.compiling, session.compiled = running, self._compilation.done
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start, JOBS, work=self.work, snapshots=self.snapshots)
         session.compiling = self._compilation.running
+        session.compiled = self._compilation.done
+        self._libraries.join()
         with self._lock:
             left = self._work_left()
             self.sessions[client.client_id] = session
@@ -206,6 +213,14 @@ class Studio:
     def _show_all(self) -> None:
         for session in list(self.sessions.values()):
             session.show()
+
+
+def _load_libraries() -> None:
+    """Load what several jobs of a tab use: two threads that import it at once see half of it."""
+    import xarray  # noqa: F401
+
+    with suppress(SoftreachError):  # whoever draws a figure says so
+        pyplot()
 
 
 def _ignored(error: Exception) -> None:

@@ -172,6 +172,8 @@ class Session:
         """Work that is being done, for the reader."""
         self.compiling = False
         """True while kernels are being compiled, for whichever tab."""
+        self.compiled = 0
+        """How many were, since the studio was started."""
         self.free: Reach | None = None
         """Reach of a loaded design without its loads."""
         self.reference: Reach | None = None
@@ -208,7 +210,11 @@ class Session:
         self._workers = {kind: Latest(self.fail, self._rested) for kind in self._jobs}
 
     def begin(self) -> None:
-        """Do everything once."""
+        """Do everything once; first what needs no kernel, which may have to be compiled."""
+        if self.reach is None:
+            with self.drawing, self.client.atomic():
+                self.scene.draw_rest(self.state)
+            self.report("computing")
         self._follow_change(None)
         self.show()
 

@@ -9,9 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.rest_shape import STRAIGHT
 from softreach.arm.skin import inside
 from softreach.plot.coloring import UNSTABLE
-from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points
+from softreach.rod.arm_shape import (
+    arm_surface,
+    bundle_skins,
+    marker_points,
+    rest_configuration,
+)
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.axes import NumberedBox, add_label
@@ -114,6 +120,18 @@ class Scene:
         """
         length = length or arm.length
         shape = configuration(solvable_rod(arm), np.asarray(activation), _STATIONS)
+        return self._draw_shape(arm, shape, path, length)
+
+    def draw_rest(self, state: StudioState) -> None:
+        """The straight arm, if it is at rest, and a box around it, before anything is compiled."""
+        arm, look = state.design, state.appearance
+        shape = rest_configuration(arm, _STATIONS)
+        bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
+        if look.arm and not (bent or arm.drives or arm.markers):
+            self._draw_shape(arm, shape, "/arm", arm.length)
+        self.axes.draw(shape["position"].values / arm.length, shown=look.axes)
+
+    def _draw_shape(self, arm: Manipulator, shape: Any, path: str, length: float) -> Array:
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)

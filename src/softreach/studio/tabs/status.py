@@ -112,7 +112,8 @@ def _numbers_text(session: Session) -> list[Part]:
 def _work(session: Session) -> str:
     """Work in progress; that there is none, where something is missing."""
     if session.compiling:
-        return "compiling, once on this machine ..."
+        done = f", {session.compiled} kernels so far" if session.compiled else ""
+        return f"compiling, once on this machine{done} ..."
     if session.doing:
         return f"{session.doing} ..."
     if not is_behind(session):
