@@ -8,6 +8,7 @@ import time
 import weakref
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 import softreach.studio.app
@@ -49,7 +50,10 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
     def follow(session, old):
         scene = session.client.scene
         drawn = [scene.get_handle_by_name(path) is not None for path in ("/arm/0", "/axes/lines")]
-        seen.append((*drawn, session.doing, loaded.is_set()))
+        room = (
+            np.ptp(session.scene.axes.corners, axis=0).min() > 1.0
+        )  # the view is framed around it
+        seen.append((*drawn, room, session.doing, loaded.is_set()))
 
     def load():
         time.sleep(0.05)
@@ -59,7 +63,7 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
     monkeypatch.setattr(softreach.studio.app, "_load_libraries", load)
     with Studio(studio.start) as other, connected(other):
         until(lambda: seen)
-    assert seen[0] == (True, True, "computing", True)
+    assert seen[0] == (True, True, True, "computing", True)
 
 
 def test_of_tabs_that_were_closed_nothing_stays(studio):

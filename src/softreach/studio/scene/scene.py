@@ -61,6 +61,8 @@ _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
 _AROUND_PLACE = 0.02  # [L] that should be seen
+_AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
+"""Corners around most clouds, seen from the base [L]."""
 _NOTHING = np.empty((0, 3)), np.empty(0)
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
@@ -123,13 +125,14 @@ class Scene:
         return self._draw_shape(arm, shape, path, length)
 
     def draw_rest(self, state: StudioState) -> None:
-        """The straight arm, if it is at rest, and a box around it, before anything is compiled."""
+        """The straight arm, if it is at rest, and a box around where it may go."""
         arm, look = state.design, state.appearance
         shape = rest_configuration(arm, _STATIONS)
         bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
         if look.arm and not (bent or arm.drives or arm.markers):
             self._draw_shape(arm, shape, "/arm", arm.length)
-        self.axes.draw(shape["position"].values / arm.length, shown=look.axes)
+        around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
+        self.axes.draw(around, shape["position"].values / arm.length, shown=look.axes)
 
     def _draw_shape(self, arm: Manipulator, shape: Any, path: str, length: float) -> Array:
         if np.isnan(shape["position"].values).any():
