@@ -35,6 +35,18 @@ CHEAP = """
 """Ten pictures a second, with jagged edges and nothing that glides: there is no graphics card."""
 
 
+FLASH = """
+    window.flashed = false;
+    (function look() {
+        if (document.querySelector("[data-softreach]")) return;
+        const panel = document.querySelector(".mantine-Paper-root");
+        if (panel && panel.checkVisibility({visibilityProperty: true})) window.flashed = true;
+        setTimeout(look, 20);
+    })();
+"""
+"""Notes whether a panel was seen before ours."""
+
+
 class Tab:
     """One page and its session."""
 
@@ -44,7 +56,7 @@ class Tab:
         )
         self.requests: list[str] = []
         self.errors: list[str] = []
-        self.context.add_init_script(CHEAP)
+        self.context.add_init_script(CHEAP + FLASH)
         self.context.on("request", lambda request: self.requests.append(request.url))
         self.page = self.context.new_page()
         self.page.set_default_timeout(1000 * PATIENCE)

@@ -10,6 +10,7 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.studio import Quality
 from softreach.studio import reach as stages
+from softreach.studio.captions import size_text
 from softreach.studio.work import Latest, all_cores
 from tests.studio.conftest import SMALL
 from tests.studio.tab import PATIENCE, Tab
@@ -48,7 +49,7 @@ def test_a_running_computation_is_canceled_and_taken_up_again(tab):
     tab.press("Compute what is missing")
     tab.wait(lambda: tab.session.reach.fine, "the rest is computed")
     tab.settle()
-    tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").first.wait_for()
+    tab.page.get_by_text(size_text(tab.session.reach.size)).first.wait_for()
 
 
 @pytest.mark.large
@@ -64,7 +65,7 @@ def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, mo
     monkeypatch.undo()
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
-    tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").first.wait_for()
+    tab.page.get_by_text(size_text(tab.session.reach.size)).first.wait_for()
 
 
 @pytest.mark.large

@@ -16,6 +16,7 @@ def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
     assert told == [True, False]
     assert outer(2) == 6
     assert told == [True, False]  # compiled already
+    assert watch.done == 1
     watch.close()
     outer(1.5)
     assert told == [True, False]

@@ -15,13 +15,17 @@ from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
 from softreach.plot.style import pyplot
+from softreach.studio import page
 from softreach.studio.atlas_map import atlas_map, fixed_places, map_choices, metric_names
+from softreach.studio.captions import size_text
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
-from softreach.studio.reach import Quality, stages
+from softreach.studio.reach import Quality, cloud_points, stages
+from softreach.studio.scene.camera import in_the_way
 from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.scene.scene import Scene
 from softreach.studio.start import start_on_design, start_on_state, start_on_store
-from softreach.studio.state import MapView, Slice, StudioState
+from softreach.studio.state import Camera, MapView, Slice, StudioState
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -75,17 +79,32 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
 
 
 def test_a_saved_page_holds_everything_itself(fine):
-    page = static_page(StudioState(design=fine.arm), fine)
-    assert f"{fine.volume:.4f}" in page
-    assert "taper_deg = 2.0" in page
-    assert '<script src="http' not in page
-    assert '<link href="http' not in page
+    saved = static_page(StudioState(design=fine.arm), fine)
+    assert size_text(fine.size) in saved
+    assert "taper_deg = 2.0" in saved
+    assert '<script src="http' not in saved
+    assert '<link href="http' not in saved
+
+
+def test_a_saved_page_is_cut_free_for_its_camera_as_the_tab_is(fine, monkeypatch):
+    made = []
+    monkeypatch.setattr(page, "Scene", lambda api: made.append(Scene(api)) or made[-1])
+    camera = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
+    state = StudioState(design=fine.arm, camera=camera)
+    points = cloud_points(fine, 12)
+    for cut in "window", "none":
+        static_page(state.showing(cut=cut), fine)
+        viewpoint = made[-1].viewpoint(camera, state)
+        assert len(viewpoint.centers) > 2
+        hidden = in_the_way(points, viewpoint, cut)
+        assert hidden.any() == (cut == "window")
+        np.testing.assert_array_equal(made[-1].clouds.hidden(points), hidden)
 
 
 def test_a_saved_page_carries_the_map(fine):
     red = np.full((4, 4, 3), (255, 0, 0), np.uint8)
-    page = static_page(StudioState(design=fine.arm), fine, red)
-    (data,) = re.findall(r'alt="map".*?data:image/png;base64,([^"]+)', page)
+    saved = static_page(StudioState(design=fine.arm), fine, red)
+    (data,) = re.findall(r'alt="map".*?data:image/png;base64,([^"]+)', saved)
     drawn = pyplot().imread(io.BytesIO(base64.b64decode(data)), format="png")
     np.testing.assert_array_equal(255 * drawn[..., :3], red)
     assert 'alt="map"' not in static_page(StudioState(design=fine.arm), fine)

@@ -8,6 +8,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed, find_parameter
 from softreach.studio import Start, Studio, StudioState
+from softreach.studio.captions import size_text
 from softreach.studio.start import KeptWork
 from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
@@ -71,11 +72,20 @@ def test_reset_leads_back_to_the_beginning_and_can_be_undone(tab):
     become(tab, lambda: tab.session.state == before, "the reset is undone")
 
 
-@pytest.mark.large
-def test_where_there_is_nothing_to_redo_the_page_says_so(tab):
+def test_where_there_is_nothing_to_redo_the_page_says_so_and_no_tab_jumps(tab):
+    bar = tab.page.get_by_role("tablist").first.bounding_box()
+    redo = tab.page.get_by_role("button", name="Redo", exact=True)
     tab.session.update(lambda s: s.replace(activation=(-0.1, 0.0, 0.0)))
-    tab.press("Redo")
+    tab.wait(redo.is_disabled, "Redo is gray")
+    tab.page.locator("canvas").first.focus()
+    tab.page.keyboard.press("Control+Shift+z")
     tab.page.get_by_text("There is nothing to redo.").wait_for()
+    assert tab.page.get_by_role("tablist").first.bounding_box() == bar
+    tab.press("Undo")
+    tab.wait(redo.is_enabled, "Redo is there")
+    tab.page.get_by_text("There is nothing to redo.").wait_for(state="detached")
+    tab.settle()
+    assert tab.page.get_by_role("tablist").first.bounding_box() == bar
 
 
 def reloaded(tab, studio):
@@ -96,7 +106,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, folder):
         tab.settle()
         tab.session = reloaded(tab, studio)
         assert taper(tab) == 0.02
-        tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").wait_for()
+        tab.page.get_by_text(size_text(tab.session.reach.size)).wait_for()
         tab.press("Undo")
         become(tab, lambda: tab.session.state.design == TRUNK, "the history is there too")
         tab.close()
@@ -115,7 +125,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was_beside_another_tab(browser
         one.session = reloaded(one, studio)
         assert taper(one) == 0.02
         assert one.session.reach.arm == one.session.state.design
-        one.page.get_by_text(f"volume {one.session.reach.volume:.4f}").wait_for()
+        one.page.get_by_text(size_text(one.session.reach.size)).wait_for()
         one.press("Undo")
         become(one, lambda: one.session.state.design == TRUNK, "the history is there too")
         assert taper(other) == 0.01

@@ -12,10 +12,11 @@ import softreach as sr
 from softreach import schema
 from softreach.arm import designs
 from softreach.rod.tip_map import TipStatus, has_tip
-from softreach.studio.captions import legend_text
+from softreach.studio.captions import legend_text, size_text
 from softreach.studio.reach import (
     Quality,
     Reach,
+    Size,
     cloud_points,
     shown_samples,
     stages,
@@ -171,3 +172,11 @@ def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
     hasty = Quality(coarse_level=12, fine_seconds=0.0, coarse_accuracy=0.1, fine_accuracy=0.1)
     *_, fine = stages(rod.arm, 14, hasty, lambda: None)
     assert (fine.samples, fine.wanted) == (1 << 10, 1 << 14)
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [(9e-5, "volume 0.25642 ± 0.00009 L³"), (4e-9, "volume 0.256423 ± 0.000001 L³")],
+)
+def test_digits_of_a_size_follow_its_error(error, text):
+    assert size_text(Size("volume", 0.2564231, error, "L³")) == text

@@ -8,6 +8,7 @@ import time
 import weakref
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 import softreach.studio.app
@@ -39,6 +40,30 @@ def shake(session: Session, times: int, pause: float = 0.0) -> None:
             by_widget=True,
         )
         time.sleep(pause)
+
+
+def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed(
+    studio, monkeypatch
+):
+    seen, loaded = [], threading.Event()
+
+    def follow(session, old):
+        scene = session.client.scene
+        drawn = [scene.get_handle_by_name(path) is not None for path in ("/arm/0", "/axes/lines")]
+        room = (
+            np.ptp(session.scene.axes.corners, axis=0).min() > 1.0
+        )  # the view is framed around it
+        seen.append((*drawn, room, session.doing, loaded.is_set()))
+
+    def load():
+        time.sleep(0.05)
+        loaded.set()
+
+    monkeypatch.setattr(Session, "_follow_change", follow)
+    monkeypatch.setattr(softreach.studio.app, "_load_libraries", load)
+    with Studio(studio.start) as other, connected(other):
+        until(lambda: seen)
+    assert seen[0] == (True, True, True, "computing", True)
 
 
 def test_of_tabs_that_were_closed_nothing_stays(studio):

@@ -10,7 +10,7 @@ from softreach.inverse import solve_inverse
 from softreach.rod.rods import tip_map
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.reach import Quality, Reach, shown_rows, stages
-from softreach.studio.scene.clouds import sample_values
+from softreach.studio.scene.clouds import key_html, sample_colors, sample_values
 from softreach.studio.work import Dropped
 
 SMALL = Quality(coarse_level=8, fine_level=13, fine_accuracy=0.01)
@@ -53,6 +53,19 @@ def test_away_from_folds_points_have_the_colors_of_what_the_inverse_finds(folded
     shown = sample_values(folded, 9, "multiplicity")
     assert regular.mean() > 0.5
     np.testing.assert_array_equal(shown[regular], found.counts[regular])
+
+
+def test_the_key_has_the_color_and_the_share_of_each_number_of_activations(folded):
+    counts = sample_values(folded, LEVEL, "multiplicity").values
+    rgb, key = sample_colors(folded, LEVEL, "multiplicity")
+    known = np.unique(counts)
+    assert 1 < len(known) <= len(key.names)
+    for count, name, color in zip(known, key.names, key.colors, strict=True):
+        number, share = name.removesuffix(" %").split(": ")
+        assert int(number) == count
+        assert float(share) == pytest.approx(100 * (counts == count).mean(), rel=0.1)
+        assert (rgb[counts == count] == color).all()
+    assert "activations" in key_html(key)
 
 
 def test_what_was_counted_before_it_was_stopped_is_kept(folded):

@@ -34,8 +34,13 @@ def test_parts_are_taken_added_renamed_changed_and_removed(tab):
     before = design(tab)
     tab.choose("kind", "tendon")
     tab.press("Add")
-    tab.page.get_by_role("alert").filter(has_text="young_modulus").wait_for()
+    tab.page.get_by_role("alert").filter(has_text="choose what it is made of").wait_for()
     assert design(tab) == before
+    tab.choose("made of", "dragon_skin_30")
+    tab.press("Add")
+    become(tab, lambda arm: arm.actuators[-1].name == "tendon 1", "a tendon is added")
+    assert {ring.material.name for ring in design(tab).section.rings} == {"dragon_skin_30"}
+    assert design(tab).actuators[:-1] == before.actuators
 
     tab.choose("named design", "three_chamber_arm")
     tab.press("Take this design")

@@ -10,7 +10,7 @@ import pytest
 from softreach.arm import designs
 from softreach.cloud.clouds import compute_cloud
 from softreach.picture.axes_box import axes_box, seen_from
-from softreach.plot.coloring import ScalarKey
+from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
 from softreach.studio.scene.camera import is_behind, picked_point, plane_crossing
@@ -69,8 +69,8 @@ def test_every_color_that_is_offered_colors_every_point_that_is_shown(both):
         assert coloring.rgb.shape == (1 << 10, 3)
         assert "url(" not in key_html(coloring.key)
     multiplicity = sample_colors(fine, 10, "multiplicity").key
-    assert isinstance(multiplicity, ScalarKey)
-    assert multiplicity.low == 1.0
+    assert isinstance(multiplicity, BundleKey)
+    assert multiplicity.names[0].startswith("1: ")
 
 
 def test_an_unknown_color_is_that_of_the_activations(both):
@@ -152,8 +152,8 @@ def test_a_surface_is_colored_by_its_own_activations_with_the_key_of_that_color(
     for color in color_names(reach.arm):
         assert surface_colors(reach, color).rgb.shape == reach.sheets.vertices.shape
     multiplicity = surface_colors(reach, "multiplicity").key
-    assert isinstance(multiplicity, ScalarKey)
-    assert multiplicity.low == 1.0
+    assert isinstance(multiplicity, BundleKey)
+    assert multiplicity.names[0] == "1"
 
 
 def test_a_surface_of_four_bundles_has_the_colors_of_the_samples_nearby():

@@ -236,7 +236,7 @@ def test_a_search_fills_its_picture_and_its_best_is_loaded_and_undone(session):
     run, panel = session.search, panel_of(session)
     assert any(text.startswith("searching, ") for text in told)
     assert run.result is not None
-    assert len(run.candidates) >= 6
+    assert len(run.candidates) > 1
     assert "computed to full accuracy" in panel._summary._widget.content
     assert "taper φ [deg]" in panel._values._widget.content
     panel._loaded()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 from hypothesis import given
 
-from softreach.arm import designs
+from softreach.arm import designs, edits
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
@@ -15,8 +17,11 @@ from softreach.studio.shown_parameters import (
     named_parameters,
     part_parameters,
     parts,
+    refusal,
+    slider_ends,
     slider_parameters,
 )
+from softreach.support.errors import InvalidDesign
 from tests.cable import Cable
 from tests.laws import arm_of, arms
 
@@ -77,6 +82,41 @@ def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
     assert sliders["width"].label == f"w of {name} [L]"
     typed = part_parameters(arm, parts(arm)[name])
     assert f"{name}.unknown" in {one.name for one in typed}
+
+
+@pytest.mark.parametrize("design", designs.__all__)
+def test_sliders_end_where_the_design_ends_and_not_before(design):
+    arm = getattr(designs, design)()
+    ends = slider_ends(arm)
+    for control in slider_parameters(arm):
+        for end, limit in zip(ends[control.name], control.limits, strict=True):
+            made = changed(arm, {control.name: end * control.scale})
+            assert find_parameter(made, control.name).value(made) == pytest.approx(
+                end * control.scale, abs=1e-9
+            )
+            if end != limit:
+                beyond = end + 0.011 * np.copysign(end, limit - end)
+                with pytest.raises(InvalidDesign):
+                    changed(arm, {control.name: beyond * control.scale})
+
+
+def test_the_taper_slider_of_the_trunk_ends_at_its_cone(trunk):
+    limit = np.degrees(np.arctan(trunk.profile.radius(0.0) / trunk.length))
+    assert slider_ends(trunk)["taper"][1] == pytest.approx(limit, abs=0.01)
+
+
+def test_refusals_use_the_words_of_the_panel(trunk):
+    """No name of a file, and no symbol that the page does not show."""
+    shown = slider_parameters(trunk)
+    for change in (
+        lambda: changed(trunk, {"taper": 0.1}),
+        lambda: edits.with_actuator(trunk, "tendon"),
+    ):
+        with pytest.raises(InvalidDesign) as refused:
+            change()
+        said = refusal(refused.value, shown, trunk)
+        assert not re.search(r"R2|_|rings\[", said)
+    assert said.startswith("E [kPa] of ring 0: must be given")
 
 
 def test_what_differs_between_fibers_is_on_sliders_and_in_fields_of_each():

@@ -13,22 +13,26 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.arm.summary import describe
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Studio, StudioState
+from softreach.studio.captions import size_text
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.start import start_on_store
 from softreach.studio.state import Slice
 from softreach.studio.tabs.inverse import InversePanel
 from tests.studio.conftest import SMALL
-from tests.studio.tab import PATIENCE, Tab, unit
+from tests.studio.tab import PATIENCE, SIZE, Tab, unit
 
 
 def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(tab):
+    assert not tab.page.evaluate("flashed")
     reach = tab.session.reach
     assert reach.fine
-    tab.page.get_by_text(f"volume {reach.volume:.4f}").wait_for()
+    tab.page.get_by_text(size_text(reach.size)).wait_for()
     assert reach.volume == pytest.approx(0.69, abs=0.02)
     assert tab.page.locator("canvas").count() > 0
 
     tab.open("Design")
+    end = float(tab.slider("taper φ [deg]").get_attribute("aria-valuemax"))
+    assert 3.5 < end < np.degrees(np.arctan(0.0625))  # beyond there is no tip
     before = tab.session.reach
     tab.drag("revolution Ω [deg]", 40)
     tab.wait(lambda: tab.session.state.design != before.arm, "the design changes")
@@ -37,7 +41,7 @@ def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(ta
     assert after.fine
     assert after.arm == tab.session.state.design
     assert np.degrees(parameter(tab, "revolution")) > 130
-    tab.page.get_by_text(f"volume {after.volume:.4f}").wait_for()
+    tab.page.get_by_text(size_text(after.size)).wait_for()
     assert after.volume != before.volume
     assert not np.allclose(after.cloud.tip, before.cloud.tip)
 
@@ -108,6 +112,19 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     tab.page.get_by_text("L away").wait_for()
 
 
+def test_the_caption_of_a_saved_page_stands_below_its_scene(tab, tmp_path):
+    tab.open("Export")
+    saved = tab.context.browser.new_page()
+    saved.goto(tab.save("Save web page (HTML)", tmp_path).as_uri())
+    scene = saved.locator("canvas[data-engine]")
+    scene.wait_for()
+    canvas = scene.bounding_box()
+    numbers = saved.get_by_text("volume").bounding_box()
+    saved.close()
+    assert canvas["height"] > SIZE[1] / 2
+    assert canvas["y"] + canvas["height"] <= numbers["y"]
+
+
 @pytest.mark.large
 def test_a_reference_stays_while_the_design_changes(tab):
     tab.open("Design")
@@ -118,7 +135,7 @@ def test_a_reference_stays_while_the_design_changes(tab):
     tab.drag("revolution Ω [deg]", 15)
     tab.wait(lambda: tab.session.state.design != kept, "the design changes")
     tab.settle()
-    tab.page.get_by_text(f"reference (gray): volume {known.volume:.4f}").wait_for()
+    tab.page.get_by_text(f"reference (gray): {size_text(known.size)}").wait_for()
     eye = np.array(tab.session.camera.usual().position)
     tab.page.get_by_label("side by side").check()
     tab.wait(lambda: tab.drawn("/reference/arm"), "the reference stands beside")

@@ -52,6 +52,26 @@ def test_numbers_are_kept_to_the_last_digit(tab):
             assert value(tab, name) == pytest.approx(wanted, abs=1e-15)
 
 
+def test_escape_in_a_field_restores_what_was_there(tab):
+    before = tab.session.state.design
+    place = typed(tab, "taper φ [deg]", "1.5", enter=False)
+    place.press("Escape")
+    assert place.input_value() == "2"
+    place.blur()
+    tab.settle()
+    assert tab.session.state.design == before
+
+
+def test_arrow_keys_on_a_control_leave_the_camera_alone(tab):
+    before = tab.session.camera.actual()
+    thumb = tab.slider("revolution Ω [deg]")
+    for control in (tab.page.get_by_role("tab", name="Design"), thumb):
+        control.press("ArrowUp", delay=100)
+    assert thumb.get_attribute("aria-valuenow") == "109"
+    tab.settle()
+    assert tab.session.camera.actual() == before
+
+
 @pytest.mark.large
 def test_nothing_happens_before_enter_and_the_field_says_so(tab):
     tab.open("Design")
@@ -100,5 +120,8 @@ def test_every_control_has_a_tooltip_with_its_meaning(tab):
     thumb = tab.slider("extent σ [deg]")
     tab.center(thumb)
     thumb.hover()
-    tab.page.get_by_text("the angle of the cross-section").wait_for()
+    meaning = tab.page.get_by_text("the angle of the cross-section")
+    meaning.wait_for()
+    box, panel = meaning.bounding_box(), tab.page.locator("[data-softreach]").bounding_box()
+    assert box["x"] + box["width"] < panel["x"]  # it covers no row
     assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.reach import FollowCamera
-from softreach.studio.scene.camera import FOV, VIEWS
+from softreach.studio.scene.camera import FOV, VIEWS, framing
+from softreach.studio.state import StudioState
 from softreach.support.palette import bundle_color
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
@@ -230,3 +232,14 @@ def test_numbers_are_dark_on_light_and_light_on_dark(tab):
     tab.wait(lambda: around().max() > 0.5, "the text gets light")
     show(tab, dark=False)
     tab.wait(lambda: np.median(around()) > 0.9, "it gets light")
+
+
+def test_a_view_that_was_kept_on_a_phone_is_framed_anew_from_its_side(tab):
+    kept, corners = tab.session.state_now(), tab.session.scene.axes.corners
+    assert kept.camera.aspect == tab.session.camera.aspect
+    of_phone = replace(framing(*corners, VIEWS["side"], 0.46), aspect=0.46)
+    tab.session.restore(kept.replace(camera=of_phone))
+    wanted = framing(*corners, VIEWS["side"], tab.session.camera.aspect)
+    np.testing.assert_allclose(tab.session.camera.usual().position, wanted.position, atol=1e-6)
+    tab.session.restore(StudioState.from_json(kept.to_json()))
+    np.testing.assert_allclose(tab.session.camera.usual().position, kept.camera.position)

@@ -29,6 +29,7 @@ __all__ = [
     "with_actuator_name",
     "with_actuator_ring",
     "with_core",
+    "with_material",
     "with_ring",
     "with_ring_material",
     "with_ring_name",
@@ -154,6 +155,13 @@ def with_ring_material(arm: Manipulator, index: int, material: str) -> Manipulat
     """
     matter = named_material(material)
     rings = _with(arm, index, lambda ring: ring.replace(material=matter))
+    return arm.replace(section=arm.section.replace(rings=rings))
+
+
+def with_material(arm: Manipulator, material: str) -> Manipulator:
+    """The arm with all of its rings made of one named material."""
+    matter = named_material(material)
+    rings = tuple(ring.replace(material=matter) for ring in arm.section.rings)
     return arm.replace(section=arm.section.replace(rings=rings))
 
 

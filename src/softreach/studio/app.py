@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from contextlib import suppress
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from softreach.picture.axes_box import round_box
+from softreach.plot.style import pyplot
 from softreach.studio.fields import attempt
 from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
 from softreach.studio.jobs.calibration import DrawSample, FitArm
@@ -36,7 +38,7 @@ from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start, state_in_request
 from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import CompilationWatch, Latest
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -99,6 +101,8 @@ class Studio:
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
+        self._libraries = threading.Thread(target=_load_libraries, daemon=True)
+        self._libraries.start()
         self.server = start_server(host, port, token)
         camera = start.state.camera or (
             _camera_beside(start.state.design) if start.atlas is None else _CAMERA_ON_MAP
@@ -153,13 +157,15 @@ class Studio:
 
     def _tell(self, running: bool) -> None:
         for session in list(self.sessions.values()):
-            session.compiling = running
+            session.compiling, session.compiled = running, self._compilation.done
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start, JOBS, work=self.work, snapshots=self.snapshots)
         guard_inputs(client, partial(_refuse_file, session))
         session.compiling = self._compilation.running
+        session.compiled = self._compilation.done
+        self._libraries.join()
         with self._lock:
             left = self._work_left()
             self.sessions[client.client_id] = session
@@ -168,7 +174,9 @@ class Studio:
         _furnish(session, page_url(self.server))
         session.camera.on_move(lambda: session.follow(FollowCamera))
         session.begin()
-        if session.camera.is_upright:
+        if left is None and self.start.state.camera is not None:
+            session.look_as(self.start.state.camera)
+        elif session.camera.is_upright and (left is None or left[0].camera is None):
             _look_at_all(session)
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
@@ -208,6 +216,14 @@ class Studio:
     def _show_all(self) -> None:
         for session in list(self.sessions.values()):
             session.show()
+
+
+def _load_libraries() -> None:
+    """Load what several jobs of a tab use: two threads that import it at once see half of it."""
+    import xarray  # noqa: F401
+
+    with suppress(SoftreachError):  # whoever draws a figure says so
+        pyplot()
 
 
 def _ignored(error: Exception) -> None:

@@ -9,6 +9,7 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Strong, Swatch, Term
 from softreach.studio.scene.clouds import FAINT
+from softreach.support.quantity import quantity
 
 if TYPE_CHECKING:
     from softreach.studio.reach import Reach, Size
@@ -24,6 +25,7 @@ _SIZES = {
     "length": "Length [L] of the curve that the tip reaches, its error beside it",
     "point": "All activations are held: the tip is at one place",
 }
+_FINEST = 1e-6
 _GAP = "\N{EN SPACE} "
 _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
@@ -33,13 +35,16 @@ _POSTURES = {
 }
 
 
+def size_text(size: Size) -> str:
+    """Size with its error, to the first digit of that; six digits after the point are enough."""
+    return f"{size.name} {quantity(size.value, size.unit, max(size.error, _FINEST))}"
+
+
 def reach_text(reach: Reach) -> list[Part]:
     """The numbers of a reach in one line."""
     parts: list[Part] = []
     if reach.size is not None:
-        name, value, error, unit = reach.size
-        value_text = f"{name} {value:.4f} ± {error:.1g} {unit}"
-        parts += [Term(value_text, _SIZES[name]), " · "]
+        parts += [Term(size_text(reach.size), _SIZES[reach.size.name]), " · "]
     if not math.isnan(reach.unreachability):
         parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
     if reach.lost_share:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Self
 
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
+_STATUS = "height:6.2em;overflow-y:auto"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
 _HELP = "cursor:help;text-decoration:underline dotted"
 # A field that is typed into stands where viser has its own beside a slider, which rounds.
@@ -78,6 +79,17 @@ def paragraph(*parts: Part) -> str:
 def fields_style() -> str:
     """Style by which a slider and the field for the same number share a row, as HTML."""
     return f"<style>{_FIELDS}</style>"
+
+
+def status(*lines: str, available: Sequence[str]) -> str:
+    """What is known of the design as HTML, as high whatever it says: the tabs below never jump.
+
+    Args:
+        lines: As the other functions here make them.
+        available: Which of undo and redo there are; the head of the page grays the others.
+    """
+    steps = html.escape(" ".join(available))
+    return f'<div data-softreach data-history="{steps}" style="{_STATUS}">{"".join(lines)}</div>'
 
 
 def alert(text: str) -> str:

@@ -19,7 +19,7 @@ from softreach.studio.scene.scene import Scene
 from softreach.studio.serve.server import start_server, stop_server
 from softreach.studio.serve.viser_fixes import headed
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import Camera, StudioState
+from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,16 +28,21 @@ if TYPE_CHECKING:
     from softreach.plot.coloring import BundleKey, ScalarKey
 
 _MOST = 17  # level: a page of some 2 MB
-_BOX = (
-    "position:fixed;left:0;bottom:0;z-index:9;max-width:100%;padding:0.6em 1em;"
-    "background:rgba(255,255,255,0.9);font:14px sans-serif;color:#222"
+# The scene has what the caption under it leaves.
+_LAYOUT = (
+    "<style>body{display:flex;flex-direction:column;height:100dvh;margin:0}"
+    "#root{flex:1 1 0;min-height:0}</style>"
 )
+_BOX = "flex:none;max-height:40%;overflow:auto;padding:0.6em 1em;font:14px sans-serif"
+_INK = {False: ("white", "#222"), True: ("#141414", "#ddd")}
+"""Paper and letters of a light page and of a dark one."""
 
 
 def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | None = None) -> str:
     """The page, with the numbers of the design and its file under the scene.
 
-    Only a server's scene can be saved, so one is started for a moment, on loopback.
+    Only a server's scene can be saved, so one is started for a moment, on loopback. What hides the
+    arm is cut away as it is for the camera of the state; that of the page is followed by nobody.
 
     Args:
         state: What to show.
@@ -46,21 +51,28 @@ def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | N
     """
     server = start_server()
     try:
+        scene = Scene(server.scene)
+        key = _draw(scene, state, reach)
         if state.camera is not None:
-            _place(server, state.camera, orthographic=state.appearance.orthographic)
-        key = _draw(Scene(server.scene), state, reach)
+            _look(server, scene, state)
         page = headed(server.scene.as_html(dark_mode=state.appearance.dark))
     finally:
         stop_server(server)
     end = page.rindex("</body>")
-    return page[:end] + _html_caption(state, reach, key + _html_image(picture)) + page[end:]
+    caption = _html_caption(state, reach, key + _html_image(picture))
+    return page[:end] + _LAYOUT + caption + page[end:]
 
 
-def _place(server: ViserServer, camera: Camera, *, orthographic: bool) -> None:
-    chosen, place = lens(camera, orthographic=orthographic)
+def _look(server: ViserServer, scene: Scene, state: StudioState) -> None:
+    """Begin at the camera of a state, and let it see the arm."""
+    assert state.camera is not None
+    chosen, place = lens(state.camera, orthographic=state.appearance.orthographic)
     first = server.initial_camera
     first.position, first.look_at = place.position, place.look_at
     first.fov, first.near, first.far = chosen.fov, chosen.near, chosen.far
+    viewpoint = scene.viewpoint(place, state)
+    scene.clouds.look(viewpoint, state.appearance.cut)
+    scene.axes.turn(viewpoint.position)
 
 
 def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
@@ -76,7 +88,9 @@ def _html_caption(state: StudioState, reach: Reach, key: str) -> str:
     numbers, file = markup.inline(*reach_text(reach)), markup.inline(state.design.to_toml())
     design = f"<details><summary>design</summary><pre>{file}</pre></details>"
     marks = markup.paragraph(*legend_text(reach, free=False))
-    return f'<div style="{_BOX}">{numbers}{key}{marks}{design}</div>'
+    paper, ink = _INK[state.appearance.dark]
+    colors = f"background:{paper};color:{ink}"
+    return f'<div data-softreach style="{_BOX};{colors}">{numbers}{key}{marks}{design}</div>'
 
 
 def _html_image(picture: NDArray[np.uint8] | None) -> str:
@@ -98,7 +112,6 @@ def _html_image(picture: NDArray[np.uint8] | None) -> str:
 _DPI = 100.0
 _KEY, _LINE, _EDGE = 46, 17, 14  # pixels: height of the key and of a line of text, margin
 _CHARACTER = 6.4  # pixels
-_INK = {False: ("white", "#222"), True: ("#141414", "#ddd")}
 
 
 def picture_file(

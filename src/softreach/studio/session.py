@@ -21,7 +21,7 @@ from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
-from softreach.studio.state import History, StudioState
+from softreach.studio.state import Camera, History, StudioState
 from softreach.studio.work import Latest, StaleCheck
 from softreach.support.errors import SoftreachError
 
@@ -172,6 +172,8 @@ class Session:
         """Work that is being done, for the reader."""
         self.compiling = False
         """True while kernels are being compiled, for whichever tab."""
+        self.compiled = 0
+        """How many were, since the studio was started."""
         self.free: Reach | None = None
         """Reach of a loaded design without its loads."""
         self.reference: Reach | None = None
@@ -208,7 +210,11 @@ class Session:
         self._workers = {kind: Latest(self.fail, self._rested) for kind in self._jobs}
 
     def begin(self) -> None:
-        """Do everything once."""
+        """Do everything once; first what needs no kernel, which may have to be compiled."""
+        if self.reach is None:
+            with self.drawing, self.client.atomic():
+                self.scene.draw_rest(self.state)
+            self.report("computing")
         self._follow_change(None)
         self.show()
 
@@ -243,7 +249,7 @@ class Session:
         """Take up a state that was saved, and its view."""
         self.update(lambda _: state)
         if state.camera is not None:
-            self.camera.look_from(state.camera)
+            self.look_as(state.camera)
 
     def picked_sample(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
         """Number of the sample under the cursor, of those that can be seen; None beside all.
@@ -265,6 +271,13 @@ class Session:
     def look_from(self, view: str) -> None:
         """See everything from one of `camera.VIEWS`."""
         self.camera.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.camera.aspect))
+
+    def look_as(self, camera: Camera) -> None:
+        """Look from a camera that was saved; from its side, if that was in a window of a phone."""
+        if not self.camera.fits(camera):
+            toward = np.subtract(camera.position, camera.look_at)
+            camera = framing(*self.scene.axes.corners, toward, self.camera.aspect)
+        self.camera.look_from(camera)
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
@@ -289,7 +302,7 @@ class Session:
         if state.design != self.start.state.design:
             self.reach = None
         if state.camera is not None:
-            self.camera.look_from(state.camera)
+            self.look_as(state.camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""

@@ -12,7 +12,7 @@ from softreach.arm.design_file import in_file_terms
 from softreach.arm.edits import ring_label
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
-from softreach.arm.parameters import Parameter, parameters
+from softreach.arm.parameters import Parameter, changed, parameters
 from softreach.arm.parameters.draft import part_of
 from softreach.arm.parameters.parameter import OwnParameter
 from softreach.support.errors import Fault, InvalidDesign, Range
@@ -40,6 +40,40 @@ class ShownParameter(NamedTuple):
     def limits(self) -> tuple[float, float]:
         """Ends of the slider: wide enough for a design from a file."""
         return min(self.low, self.shown), max(self.high, self.shown)
+
+
+@lru_cache(maxsize=16)
+def slider_ends(arm: Manipulator) -> dict[str, tuple[float, float]]:
+    """Ends of the sliders of a design: as far as each alone can go, to three digits."""
+    return {
+        parameter.name: (
+            _end(arm, parameter, parameter.limits[0]),
+            _end(arm, parameter, parameter.limits[1]),
+        )
+        for parameter in slider_parameters(arm)
+    }
+
+
+def _end(arm: Manipulator, parameter: ShownParameter, end: float) -> float:
+    if _exists(arm, parameter, end):
+        return end
+    inside, outside = parameter.shown, end
+    for _ in range(_HALVINGS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if _exists(arm, parameter, middle) else (inside, middle)
+    digits = max(0, 2 - math.floor(math.log10(abs(inside)))) if inside else 0
+    toward = math.floor if end > parameter.shown else math.ceil
+    rounded = toward(inside * 10**digits) / 10**digits
+    beyond = rounded < parameter.shown if end > parameter.shown else rounded > parameter.shown
+    return parameter.shown if beyond else rounded
+
+
+def _exists(arm: Manipulator, parameter: ShownParameter, shown: float) -> bool:
+    try:
+        changed(arm, {parameter.name: shown * parameter.scale})
+    except InvalidDesign:
+        return False
+    return True
 
 
 class _Slider(NamedTuple):
@@ -79,6 +113,8 @@ _MORE = {
     "lower": "the most that a bundle contracts",
     "upper": "the most that a bundle extends",
 }
+_HALVINGS = 14
+_IN_WORDS = {"R2(L)": "R₂ at the tip", "R2(0)": "R₂ at the base"}
 _Unit = tuple[str, float]
 """Name of a unit, and how many units of the parameter it is."""
 _DEGREES: _Unit = ("deg", math.radians(1))
@@ -277,18 +313,29 @@ def _titled(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def refusal(error: InvalidDesign, shown: Iterable[ShownParameter]) -> str:
+def refusal(error: InvalidDesign, shown: Iterable[ShownParameter], arm: Manipulator) -> str:
     """Faults of a design, each number by the label and in the unit of its field.
 
     Args:
         error: What is wrong.
         shown: The parameters that have fields.
+        arm: The design that was to be changed.
     """
-    known = {parameter.name: parameter for parameter in shown}
-    return "\n".join(_line(fault, known.get(fault.path)) for fault in error.faults)
+    known = {
+        parameter.name: parameter._replace(label=f"{parameter.label} of {part.label}")
+        for part in parts(arm).values()
+        for parameter in part_parameters(arm, part)
+    }
+    known |= {parameter.name: parameter for parameter in shown}
+    text = "\n".join(_line(fault, known.get(fault.path)) for fault in error.faults)
+    for symbol, words in _IN_WORDS.items():
+        text = text.replace(symbol, words)
+    return text
 
 
 def _line(fault: Fault, shown: ShownParameter | None) -> str:
+    if shown is not None and fault.value is None:
+        return str(fault._replace(path=shown.label))
     if shown is None or not isinstance(fault.value, int | float):
         return str(in_file_terms(InvalidDesign([fault]), ""))
     allowed = fault.allowed

@@ -180,8 +180,12 @@ class Camera:
 
     position: Vector
     look_at: Vector
+    aspect: float | None = None
+    """Width of its picture over the height; None if unknown."""
 
     def __post_init__(self) -> None:
+        if self.aspect is not None:
+            _check_number("camera.aspect", self.aspect, 0.0, _FAR)
         for value in (*self.position, *self.look_at):
             _check_number("camera", value, -_FAR, _FAR)
 
@@ -284,10 +288,14 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "target": values["target"] and vector(values["target"]),
         "reference": reference and design_of_text(reference, "state file"),
         "side_by_side": bool(values["side_by_side"]),
-        "camera": camera and Camera(**{name: vector(v) for name, v in camera.items()}),
+        "camera": camera and _camera(**camera),
         "path": path and TipPath.from_fields(path),
         "needs": str(values.get("needs", "")),
     }
+
+
+def _camera(position: Any, look_at: Any, aspect: float | None = None) -> Camera:
+    return Camera(position=vector(position), look_at=vector(look_at), aspect=aspect)
 
 
 def vector(values: Iterable[float]) -> Vector:

@@ -198,6 +198,18 @@ class SliderField(TypedField):
         super().__init__(gui, "", value, hint)
         self._slider.on_update(self._dragged)
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of the slider; beyond them a value is typed."""
+        return self._ends
+
+    @ends.setter
+    def ends(self, ends: tuple[float, float]) -> None:
+        with self._lock:
+            self._ends = ends
+            self._slider.min, self._slider.max = ends
+            self._follow()
+
     def remove(self) -> None:
         """Take the slider and its field away."""
         self._slider.remove()

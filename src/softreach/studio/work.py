@@ -272,6 +272,8 @@ class CompilationWatch(event.Listener):
     def __init__(self, changed: Callable[[bool], None]) -> None:
         """Watch from now on, until `close`."""
         self._changed, self._running, self._lock = changed, 0, threading.Lock()
+        self.done = 0
+        """How many times all of it has ended: of the kernels of a studio, each once."""
         event.register(_KIND, self)
 
     @property
@@ -297,5 +299,6 @@ class CompilationWatch(event.Listener):
         with self._lock:
             before, self._running = self._running, self._running + change
             now = self._running
+            self.done += not now
         if bool(before) != bool(now):
             self._changed(bool(now))

@@ -24,10 +24,8 @@ Array = NDArray[np.float64]
 
 _LONGEST_TRAIL = 2000
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_TARGET = 0.02  # [L]
 _MOST_PLACES = 40  # that a view is cut free to
 _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
-_NOTHING = np.empty((0, 3)), np.empty(0)
 
 
 class ComputeReach(Job):
@@ -253,17 +251,7 @@ class FollowCamera(Job):
 
     def _viewpoint(self) -> Viewpoint:
         session, state = self.session, self.session.state
-        camera = session.camera.actual()
-        centers, radii = session.scene.spine if state.appearance.arm else _NOTHING
         places = requirements_of(state.needs).places[:_MOST_PLACES]
         if state.target is not None:
             places = np.vstack([places, state.target])
-        centers = np.vstack([centers, places / state.design.length])
-        radii = np.append(radii, np.full(len(places), _TARGET))
-        return Viewpoint(
-            position=np.asarray(camera.position),
-            look_at=np.asarray(camera.look_at),
-            base=np.array(state.design.base.position) / state.design.length,
-            centers=centers,
-            radii=radii,
-        )
+        return session.scene.viewpoint(session.camera.actual(), state, places / state.design.length)

@@ -130,7 +130,12 @@ class TabCamera:
         """Camera with the usual lens that sees the same."""
         place, narrowness = self.actual(), self.narrowness
         offset = narrowness * np.subtract(place.position, place.look_at)
-        return Camera(position=vector(place.look_at + offset), look_at=place.look_at)
+        position = vector(place.look_at + offset)
+        return Camera(position=position, look_at=place.look_at, aspect=self.aspect)
+
+    def fits(self, camera: Camera) -> bool:
+        """True if the window is upright where that of a saved camera was, and else neither is."""
+        return self.is_upright == ((camera.aspect or 1.0) < _UPRIGHT)
 
     def look_from(self, camera: Camera) -> None:
         """Move it to where it sees what the usual lens would see from there."""

@@ -122,6 +122,8 @@ class Clouds:
 FAINT = (196, 198, 206)
 """Gray, of the cloud without loads."""
 
+_MOST_COUNTS = 8
+"""Numbers of activations that the key tells apart."""
 _CLIPPED = ("manipulability", "activation distance")
 _PERCENTILES = (1.0, 99.0)
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
@@ -149,7 +151,32 @@ def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
     others one color.
     """
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
-    return color_samples(cloud, sample_values(reach, level, color))
+    values = sample_values(reach, level, color)
+    coloring = color_samples(cloud, values)
+    if shown_color(reach.arm, color) == "multiplicity" and not isinstance(values, str | int):
+        return coloring._replace(key=counts_key(coloring.rgb, values.values))
+    return coloring
+
+
+def counts_key(colors: NDArray[np.uint8], counts: Array, shares: bool = True) -> BundleKey:
+    """Color of each number of activations, and the share of the places that have it.
+
+    Args:
+        colors: RGB of places, shape (n, 3).
+        counts: Numbers of activations that reach them, shape (n,).
+        shares: Whether to tell shares: those of vertices of a surface mean nothing.
+    """
+    known, first, many = np.unique(counts, return_index=True, return_counts=True)
+    last = min(len(known), _MOST_COUNTS) - 1
+    names = [f"{count:.0f}" for count in known[: last + 1]]
+    if len(known) > _MOST_COUNTS:
+        names[last] += f" to {known[-1]:.0f}"
+    if shares:
+        parts = np.add.reduceat(100 * many / len(counts), np.arange(last + 1))
+        names = [f"{name}: {part:.2g} %" for name, part in zip(names, parts, strict=True)]
+    kept = slice(len(names))
+    title = "activations that reach a place:"
+    return BundleKey(tuple(names), colors[first][kept], ("",) * len(names), title=title)
 
 
 def sample_values(
@@ -195,7 +222,8 @@ def key_html(key: BundleKey | ScalarKey | None) -> str:
     if isinstance(key, BundleKey):
         named = zip(key.labels, key.colors.tolist(), strict=True)
         parts = ((markup.Swatch(rgb), f" {label} \N{EN SPACE} ") for label, rgb in named)
-        return _line(markup.inline(*(part for pair in parts for part in pair)))
+        title = (f"{key.title} \N{EN SPACE} ",) if key.title else ()
+        return _line(markup.inline(*title, *(part for pair in parts for part in pair)))
     if key is None:
         return ""
     stops = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # viridis

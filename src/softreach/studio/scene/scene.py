@@ -9,13 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.rest_shape import STRAIGHT
 from softreach.arm.skin import inside
-from softreach.picture.axes_box import axes_box, round_box, seen_from
 from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
-from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points
+from softreach.rod.arm_shape import (
+    arm_surface,
+    bundle_skins,
+    marker_points,
+    rest_configuration,
+)
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
+from softreach.studio.scene.axes import NumberedBox, add_label
+from softreach.studio.scene.camera import Viewpoint
 from softreach.studio.scene.clouds import (
     FAINT,
     Clouds,
@@ -26,7 +33,7 @@ from softreach.studio.scene.clouds import (
     shaded,
 )
 from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
-from softreach.studio.state import Appearance, Slice, solvable_rod
+from softreach.studio.state import Appearance, Camera, Slice, StudioState, solvable_rod
 from softreach.support.palette import BODY, bundle_color
 from softreach.workspace import ReachableSolid
 
@@ -36,64 +43,7 @@ if TYPE_CHECKING:
     from softreach.plot.coloring import BundleKey, ScalarKey
 
 
-# Box with numbers around everything; the camera decides which edges are numbered.
-
-
 Array = NDArray[np.float64]
-
-_GRAY = 170, 170, 175
-
-
-class NumberedBox:
-    """One box, drawn into one scene."""
-
-    def __init__(self, api: SceneApi) -> None:
-        """Draw into a scene, around an arm for the time being."""
-        self._api = api
-        self.corners = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
-        """The lowest and the highest [L]."""
-        self._camera: Array = np.array([50.0, -80.0, 30.0])
-        self._focal = np.inf
-
-    def draw(self, *points: Array, shown: bool) -> None:
-        """Surround points [L], shapes (n, 3)."""
-        self.corners = round_box(*points)
-        self._remove()
-        if shown:
-            self._draw()
-
-    def turn(self, camera: Array, focal: float = np.inf) -> None:
-        """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
-        before = seen_from(self._camera, *self.corners, self._focal)
-        self._camera, self._focal = camera, focal
-        if self._is_drawn and seen_from(camera, *self.corners, focal) != before:
-            self._remove()
-            self._draw()
-
-    @property
-    def _is_drawn(self) -> bool:
-        return self._api.get_handle_by_name("/axes/lines") is not None
-
-    def _remove(self) -> None:
-        if self._api.get_handle_by_name("/axes") is not None:
-            self._api.remove_by_name("/axes")
-
-    def _draw(self) -> None:
-        low, high = self.corners
-        box = axes_box(low[None], high[None], camera=self._camera, focal=self._focal)
-        lines = box.lines.astype(np.float32)
-        self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
-        for k, (text, at) in enumerate(box.labels):
-            add_label(self._api, f"/axes/label {k}", text, at)
-
-
-def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
-    """Words at a place [L], as large on the screen wherever the camera is."""
-    api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
-
-
-# Everything that is drawn.
-
 
 MOST_BUNDLES = 100
 """With more the body alone is drawn: skins of hundreds take a minute."""
@@ -115,6 +65,10 @@ _FAINT = 0.2  # opacity of the reach without loads
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
+_AROUND_PLACE = 0.02  # [L] that should be seen
+_AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
+"""Corners around most clouds, seen from the base [L]."""
+_NOTHING = np.empty((0, 3)), np.empty(0)
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
 
@@ -126,7 +80,7 @@ class Scene:
         self._api = api
         self.clouds = Clouds(api)
         self.axes = NumberedBox(api)
-        self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)
+        self.spine: tuple[Array, Array] = _NOTHING
         """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
 
@@ -179,6 +133,19 @@ class Scene:
         """
         length = length or arm.length
         shape = configuration(solvable_rod(arm), np.asarray(activation), _STATIONS)
+        return self._draw_shape(arm, shape, path, length)
+
+    def draw_rest(self, state: StudioState) -> None:
+        """The straight arm, if it is at rest, and a box around where it may go."""
+        arm, look = state.design, state.appearance
+        shape = rest_configuration(arm, _STATIONS)
+        bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
+        if look.arm and not (bent or arm.drives or arm.markers):
+            self._draw_shape(arm, shape, "/arm", arm.length)
+        around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
+        self.axes.draw(around, shape["position"].values / arm.length, shown=look.axes)
+
+    def _draw_shape(self, arm: Manipulator, shape: Any, path: str, length: float) -> Array:
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)
@@ -202,6 +169,22 @@ class Scene:
                 ],
             )
         return shape["position"].values[-1] / length
+
+    def viewpoint(
+        self, camera: Camera, state: StudioState, places: Array | None = None
+    ) -> Viewpoint:
+        """Viewpoint of a camera that should see the arm as it is drawn, and places [L]."""
+        centers, radii = self.spine if state.appearance.arm else _NOTHING
+        if places is not None:
+            centers = np.vstack([centers, places])
+            radii = np.append(radii, np.full(len(places), _AROUND_PLACE))
+        return Viewpoint(
+            position=np.asarray(camera.position),
+            look_at=np.asarray(camera.look_at),
+            base=np.array(state.design.base.position) / state.design.length,
+            centers=centers,
+            radii=radii,
+        )
 
     def see_through_arm(self, clear: bool) -> None:
         """Let what is behind the arm be seen through it, or not."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softreach.plot.coloring import Coloring, color_samples
 from softreach.studio.reach import Reach, nearest_samples
-from softreach.studio.scene.clouds import sample_values, shown_color
+from softreach.studio.scene.clouds import counts_key, sample_values, shown_color
 from softreach.studio.state import LEVELS, Slice
 from softreach.workspace.sheets import clipped
 
@@ -32,6 +32,8 @@ def surface_colors(reach: Reach, color: str) -> Coloring:
         values = sample_values(boundary, LEVELS[-1], color)
         if color == "multiplicity" and not isinstance(values, str | int):
             values = values.clip(1, keep_attrs=True)  # where the set is thinner than looked inside
+            coloring = color_samples(boundary.cloud, values)
+            return coloring._replace(key=counts_key(coloring.rgb, values.values, shares=False))
         return color_samples(boundary.cloud, values)
     values = sample_values(reach, _LEVEL, color)
     if not isinstance(values, str | int):

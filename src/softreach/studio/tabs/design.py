@@ -11,7 +11,12 @@ from softreach.studio.captions import reach_text
 from softreach.studio.fields import Attribute, Fields, attribute, bind_button
 from softreach.studio.markup import Part
 from softreach.studio.reach import beside
-from softreach.studio.shown_parameters import ShownParameter, refusal, slider_parameters
+from softreach.studio.shown_parameters import (
+    ShownParameter,
+    refusal,
+    slider_ends,
+    slider_parameters,
+)
 from softreach.studio.state import StudioState
 from softreach.studio.widgets import Line, SliderField
 from softreach.support.errors import InvalidDesign, SoftreachError
@@ -35,6 +40,8 @@ class DesignPanel:
         """The design that the sliders were made for."""
         self._made: Manipulator | None = None
         """The design that they made of it last."""
+        self._ended: Manipulator | None = None
+        """The design at whose limits they end."""
         self._revision, self._refused = -1, False
         self._sliders, self._others = Fields(session), Fields(session)
         with tab:
@@ -67,6 +74,8 @@ class DesignPanel:
                 self._revision = session.revision
                 if session.state.design != self._made or self._refused:
                     self._build(session.state.design)
+            if not session.busy and session.state.design != self._ended:
+                self._end(session.state.design)
 
     def _forget(self) -> None:
         if self._session.state.side_by_side and self._session.state.reference is not None:
@@ -80,10 +89,18 @@ class DesignPanel:
             shift = beside(session.reach)
             (session.camera.step_back if back else session.camera.step_forth)(shift)
 
+    def _end(self, arm: Manipulator) -> None:
+        """End the sliders where the design does, once nobody drags."""
+        self._ended, ends = arm, slider_ends(arm)
+        for parameter, field in self._rows:
+            low, high = ends.get(parameter.name, field.ends)
+            if (low, high) != field.ends and low < high:
+                field.ends = low, high
+
     def _build(self, arm: Manipulator) -> None:
         self._sliders.remove()
         self._base = self._made = arm
-        self._refused = False
+        self._ended, self._refused = None, False
         self._sliders = Fields(self._session, words=self._words)
         with self._folder:
             self._rows = [
@@ -113,7 +130,8 @@ class DesignPanel:
     def _words(self, error: SoftreachError) -> str:
         if not isinstance(error, InvalidDesign):
             return str(error)
-        return refusal(error, [parameter for parameter, _ in self._rows])
+        rows = [parameter for parameter, _ in self._rows]
+        return refusal(error, rows, self._session.state.design)
 
 
 def _reference_text(session: Session) -> tuple[Part, ...]:

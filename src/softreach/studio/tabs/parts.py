@@ -32,6 +32,11 @@ Change = Callable[[Manipulator], Manipulator]
 
 _AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
 _NEW_RING = "ring"
+_ABOUT_MADE_OF = "Material of all rings, which an actuator that pulls with a force needs"
+_OFFER = (
+    "A {kind} needs Young's modulus E, which this arm leaves open: choose what it is made of, and "
+    "press Add again."
+)
 _ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
 
 
@@ -61,7 +66,11 @@ class PartsPanel:
                 kind = gui.add_dropdown(
                     "kind", kinds, hint="An actuator, or a ring of the cross-section"
                 )
+                self._made_of = gui.add_dropdown(
+                    "made of", tuple(material_names()), hint=_ABOUT_MADE_OF, visible=False
+                )
                 add = gui.add_button("Add", hint="Adds this part, with numbers to be changed below")
+                self._offer = Line(gui)
             self._folder = gui.add_folder("part")
             self._message = Line(gui)
         self._fields = self._new_fields()
@@ -171,9 +180,32 @@ class PartsPanel:
                 edits.with_ring, lambda arm: edits.ring_label(arm, len(arm.section.rings) - 1)
             )
         else:
-            self._edit(
-                lambda arm: edits.with_actuator(arm, kind), lambda arm: arm.actuators[-1].name
+            self._add_actuator(kind)
+
+    def _add_actuator(self, kind: str) -> None:
+        """Add it; where the arm lacks the modulus for it, offer a material first."""
+        lacking, offered = self._lacks_material(kind), self._made_of.visible
+        self._made_of.visible = lacking and not offered
+        self._offer.warn(_OFFER.format(kind=kind) if self._made_of.visible else "")
+        if self._made_of.visible:
+            return
+
+        def added(arm: Manipulator) -> Manipulator:
+            stiff = edits.with_material(arm, self._made_of.value) if lacking else arm
+            return edits.with_actuator(stiff, kind)
+
+        self._edit(added, lambda arm: arm.actuators[-1].name)
+
+    def _lacks_material(self, kind: str) -> bool:
+        """True if the design has no Young's modulus, and the actuator needs one."""
+        try:
+            edits.with_actuator(self._session.state.design, kind)
+        except InvalidDesign as error:
+            return any(
+                fault.value is None and fault.path.endswith("young_modulus")
+                for fault in error.faults
             )
+        return False
 
     def _remove(self, part: Part) -> None:
         ring = part.ring
@@ -208,7 +240,9 @@ class PartsPanel:
         self._fields.apply(edited)
 
     def _words(self, error: SoftreachError) -> str:
-        return refusal(error, self._numbers) if isinstance(error, InvalidDesign) else str(error)
+        if not isinstance(error, InvalidDesign):
+            return str(error)
+        return refusal(error, self._numbers, self._session.state.design)
 
 
 def _of_design(

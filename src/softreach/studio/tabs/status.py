@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from softreach.studio import markup
 from softreach.studio.captions import legend_text, loads_text, reach_text
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.markup import Part, Strong, fields_style
@@ -21,6 +22,7 @@ _HISTORY_HINT = (
     "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
     "reset to what the studio was opened on. The view stays."
 )
+_NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
 _ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
 
@@ -30,27 +32,41 @@ class StatusPanel:
 
     def __init__(self, gui: GuiApi, session: Session) -> None:
         Line(gui).show(fields_style())
-        self._numbers = Line(gui, "computing ...")
-        self._comparison = Line(gui)
-        self._needs = Line(gui)
-        self._key = Line(gui)
-        self._legend = Line(gui)
-        self._refusal = Line(gui)
-        self._coarser = Line(gui)
-        self._note = Line(gui)
+        self._known = Line(gui, "computing ...")
+        self._note, self._toast = "", None
         self._cancel = gui.add_button(_CANCEL, disabled=True, hint=_ABOUT_CANCEL)
         bind_button(self._cancel, session, lambda: _stop_or_go_on(session))
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
-        self._numbers.say(*_numbers_text(session))
-        self._comparison.say(*loads_text(session))
-        check = session.check
-        self._needs.say(*((verdict_text(check),) if check is not None else ()))
-        self._key.show(key_html(session.key))
-        self._explain_marks(session)
-        self._note.say(*((session.note,) if session.note else ()))
+        check, history = session.check, session.history
+        lines = [_numbers_text(session), loads_text(session)]
+        lines.append([verdict_text(check)] if check is not None else [])
+        marks = [markup.paragraph(*line) for line in _marks(session)]
+        steps = {"undo": history.past, "redo": history.future}
+        self._known.show(
+            markup.status(
+                *(markup.paragraph(*line) for line in lines),
+                key_html(session.key),
+                *marks,
+                available=[name for name, states in steps.items() if states],
+            )
+        )
+        self._tell(session)
         self._offer(session)
+
+    def _tell(self, session: Session) -> None:
+        """Show a note over the scene, until the next one or the next change."""
+        if session.note == self._note:
+            return
+        self._note = session.note
+        if self._toast is not None:
+            self._toast.remove()
+        self._toast = (
+            session.client.add_notification("", self._note, auto_close_seconds=_NOTE_SECONDS)
+            if self._note
+            else None
+        )
 
     def _offer(self, session: Session) -> None:
         """Offer to cancel or to go on; the button keeps its place, so that nothing jumps."""
@@ -61,14 +77,19 @@ class StatusPanel:
         if self._cancel.disabled != disabled:
             self._cancel.disabled = disabled
 
-    def _explain_marks(self, session: Session) -> None:
-        reach = session.reach
-        free = session.state.appearance.free and session.free is not None
-        self._legend.say(*(legend_text(reach, free=free) if reach is not None else ()))
-        refusal = reach.refusal if reach is not None else ""
-        self._refusal.say(*((f"No exact volume: {refusal}",) if refusal else ()))
-        notes = reach.notes if reach is not None and reach.fine else ()
-        self._coarser.say(*((f"{'; '.join(notes)}.",) if notes else ()))
+
+def _marks(session: Session) -> list[list[Part]]:
+    """The legend, why there is no exact volume, and what is coarser than wanted."""
+    reach = session.reach
+    if reach is None:
+        return []
+    free = session.state.appearance.free and session.free is not None
+    lines = [legend_text(reach, free=free)]
+    if reach.refusal:
+        lines.append([f"No exact volume: {reach.refusal}"])
+    if reach.fine and reach.notes:
+        lines.append([f"{'; '.join(reach.notes)}."])
+    return lines
 
 
 def is_behind(session: Session) -> bool:
@@ -91,7 +112,8 @@ def _numbers_text(session: Session) -> list[Part]:
 def _work(session: Session) -> str:
     """Work in progress; that there is none, where something is missing."""
     if session.compiling:
-        return "compiling, once on this machine ..."
+        done = f", {session.compiled} kernels so far" if session.compiled else ""
+        return f"compiling, once on this machine{done} ..."
     if session.doing:
         return f"{session.doing} ..."
     if not is_behind(session):
