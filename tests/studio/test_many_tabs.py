@@ -50,9 +50,7 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
     def follow(session, old):
         scene = session.client.scene
         drawn = [scene.get_handle_by_name(path) is not None for path in ("/arm/0", "/axes/lines")]
-        room = (
-            np.ptp(session.scene.axes.corners, axis=0).min() > 1.0
-        )  # the view is framed around it
+        room = np.ptp(session.scene.axes.corners, axis=0).min() > 1.0  # a view is framed by it
         seen.append((*drawn, room, session.doing, loaded.is_set()))
 
     def load():

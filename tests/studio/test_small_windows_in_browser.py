@@ -88,6 +88,65 @@ def test_arm_and_map_are_in_sight_above_the_sheet_of_a_phone(opened):
     assert (places < (390, sheet)).all()
 
 
+LACKING = """() => {
+    const lacking = [];
+    const seen = e => e.checkVisibility({visibilityProperty: true, opacityProperty: true});
+    for (const e of document.querySelectorAll("[role=slider], input, button, [role=tab]")) {
+        const box = e.getBoundingClientRect();
+        if (e.type === "hidden" || e.ariaHidden || !seen(e) || !box.width) continue;
+        const label = [...(e.labels || [])].map(l => l.textContent).join("");
+        if (!(e.ariaLabel || label || e.textContent).trim()) lacking.push(["name", e.outerHTML]);
+        if (Math.min(box.width, box.height) < 23.9) lacking.push(["size", e.outerHTML]);
+    }
+    return lacking;
+}"""
+FAINT = """() => {
+    const pixel = new OffscreenCanvas(1, 1).getContext("2d", {willReadFrequently: true});
+    const color = text => {
+        pixel.clearRect(0, 0, 1, 1);
+        pixel.fillStyle = text;
+        pixel.fillRect(0, 0, 1, 1);
+        return [...pixel.getImageData(0, 0, 1, 1).data].map(value => value / 255);
+    };
+    const light = rgb => rgb.slice(0, 3)
+        .map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
+        .reduce((sum, c, k) => sum + c * [0.2126, 0.7152, 0.0722][k], 0);
+    const faint = [];
+    const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    for (let text = texts.nextNode(); text; text = texts.nextNode()) {
+        const e = text.parentElement;
+        if (!text.data.trim() || ["STYLE", "SCRIPT", "NOSCRIPT"].includes(e.tagName)) continue;
+        if (!e.checkVisibility({visibilityProperty: true, opacityProperty: true})) continue;
+        if (e.closest(":disabled, [data-disabled], .mantine-Notification-root")) continue;
+        let ground = e;
+        while (ground && color(getComputedStyle(ground).backgroundColor)[3] < 1)
+            ground = ground.parentElement;
+        const below = ground ? light(color(getComputedStyle(ground).backgroundColor)) : 1;
+        const above = light(color(getComputedStyle(e).color));
+        const ratio = (Math.max(above, below) + 0.05) / (Math.min(above, below) + 0.05);
+        if (ratio < 4.5) faint.push([text.data, ratio]);
+    }
+    return faint;
+}"""
+
+
+def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
+    tab = opened("phone")
+    tabs = [one.inner_text() for one in tab.page.get_by_role("tab").all()]
+    for name in tabs:
+        tab.open(name)
+        tab.wait(lambda: not tab.page.evaluate(LACKING), f"controls of {name} are named")
+    for dark in (False, True):
+        tab.session.update(lambda s, dark=dark: s.showing(dark=dark))
+        tab.settle()
+        for name in ("Design", "View", "Compare", "Search"):
+            tab.open(name)
+            tab.wait(lambda: not tab.page.evaluate(FAINT), f"letters of {name} are seen")
+    tab.session.update(lambda s: s.showing(dark=False))
+    tab.open("Design")
+    assert tab.slider("taper φ [deg]").get_attribute("aria-label") == "taper φ [deg]"
+
+
 def see_all(tab):
     """Look at everything, once the page has come to rest in its window."""
 

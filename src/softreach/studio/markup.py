@@ -24,7 +24,7 @@ div:has(.mantine-Slider-root) + form
 div:has(.mantine-Slider-root) + form input {padding:0 0.3em;letter-spacing:-0.5px}
 div:has(.mantine-Slider-root) + form div:has(> * > label):not(:has(input)) {display:none}
 """
-_ALERT = f"color:#c92a2a;{_SMALL};white-space:pre-line"
+_ALERT = f"color:var(--alert,#c92a2a);{_SMALL};white-space:pre-line"
 
 _WIDE = "overflow-x:auto;padding:0 0.8em 0.6em"
 _TABLE = (

@@ -43,11 +43,26 @@ document.documentElement.addEventListener("keydown", function (event) {
   if (own && !event.ctrlKey && !event.metaKey) event.stopPropagation();
 });
 
-// What changes with the page: which steps can be undone, and how wide the panel is.
+// What changes with the page: names of controls, which steps can be undone, how wide the panel is.
 (function () {
+  // Readers of screens hear the label in front of a control; buttons that are pictures get words.
+  function name() {
+    var label = "";
+    document.querySelectorAll("label, [role=slider], input, button").forEach(function (control) {
+      if (control.tagName === "LABEL") label = control.textContent.trim() || label;
+      else if (control.getAttribute("aria-label") || control.textContent.trim()) return;
+      else if (control.tagName === "BUTTON") {
+        var picture = control.innerHTML;
+        var words = control.className.includes("CloseButton") ? "close"
+          : picture.includes("search") ? "commands" : "settings of the viewer";
+        control.setAttribute("aria-label", words);
+      } else if (label) control.setAttribute("aria-label", label);
+    });
+  }
   var waiting = false;
   function tidy() {
     waiting = false;
+    name();
     var status = document.querySelector("[data-history]");
     if (!status) return;
     var steps = status.dataset.history;

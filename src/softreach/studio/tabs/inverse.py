@@ -92,7 +92,9 @@ class InversePanel:
             self._answer = session.answer
             self._list(session.answer)
         for activation, button in self._buttons:
-            button.color = "green" if _is_near(activation, session.state) else None
+            is_here, text = _is_near(activation, session.state), _listed(activation)
+            button.color = "green" if is_here else None
+            button.label = f"\N{CHECK MARK} {text}" if is_here else text
 
     def _list(self, answer: Solution | None) -> None:
         for _, button in self._buttons:
@@ -127,12 +129,14 @@ class InversePanel:
 
     def _button(self, activation: Any) -> Any:
         target = tuple(activation.tolist())
-        button = self._gui.add_button(
-            ", ".join(f"{value:.4g}" for value in target), hint="Moves the arm to this solution"
-        )
+        button = self._gui.add_button(_listed(activation), hint="Moves the arm to this solution")
         take = lambda: self._session.update(lambda s: s.replace(activation=target))  # noqa: E731
         bind_button(button, self._session, take)
         return button
+
+
+def _listed(activation: Any) -> str:
+    return ", ".join(f"{value:.4g}" for value in activation)
 
 
 def _straight_tip(session: Session) -> tuple[float, ...]:
@@ -162,7 +166,7 @@ def _answer_text(answer: Solution, arm: Manipulator) -> str:
     names = ", ".join(arm.input_names)
     return (
         f"{count} {place} to {answer.residuals.max() / arm.length:.1e} L. "
-        f"Press one ({names}) to move the arm there; green is where it is."
+        f"Press one ({names}) to move the arm there; the one with a check mark is where it is."
     )
 
 
