@@ -8,6 +8,7 @@ from softreach.workspace.directions import direction_spread
 from softreach.workspace.gradient import VolumeGradient, volume_gradient
 from softreach.workspace.image import Image, Lattice
 from softreach.workspace.reach import reachable_set
+from softreach.workspace.sheets import Sheets
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import ReachableCurve, ReachablePoint, ReachableSurface
 
@@ -19,6 +20,7 @@ __all__ = [
     "ReachableSet",
     "ReachableSolid",
     "ReachableSurface",
+    "Sheets",
     "Surface",
     "VolumeGradient",
     "direction_spread",
