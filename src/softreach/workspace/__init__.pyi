@@ -6,6 +6,7 @@ from .gradient import volume_gradient as volume_gradient
 from .image import Image as Image
 from .image import Lattice as Lattice
 from .reach import reachable_set as reachable_set
+from .sheets import Sheets as Sheets
 from .solid import ReachableSolid as ReachableSolid
 from .solid import Surface as Surface
 from .thin import ReachableCurve as ReachableCurve
