@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter
 from softreach.arm.parameters.shown import written_name
@@ -151,7 +152,7 @@ def _design(space: DesignSpace, number: int, unit: str, folder: Path, overwrite:
     try:
         arm = space.design(number)
     except InvalidDesign as error:
-        return _Entry({"gap": "; ".join(str(error).splitlines())}, None, False)
+        return _Entry(_gap(in_file_terms(error, "")), None, False)
     key = _key(arm, unit)
     path = folder / f"{key}.js"
     if (content := _read(path, key)) is not None:
@@ -162,6 +163,10 @@ def _design(space: DesignSpace, number: int, unit: str, folder: Path, overwrite:
     with writing(path, _DESIGN, overwrite=overwrite, name="static") as file:
         file.write(f"{_MARK} {key} {_digest(body)}\n{body}".encode())
     return _Entry(_brief(content), path, True)
+
+
+def _gap(error: SoftreachError) -> dict[str, Any]:
+    return {"gap": "; ".join(str(error).strip().splitlines())}
 
 
 def _brief(content: dict[str, Any]) -> dict[str, Any]:
@@ -208,7 +213,7 @@ def _content(arm: Manipulator, unit: LengthUnit) -> dict[str, Any]:
     except (MissingExtra, NotWritten):
         raise
     except SoftreachError as error:
-        return {"gap": "; ".join(str(error).splitlines())}
+        return _gap(error)
     box = bounding_box(*scene.points())
     return {
         "numbers": numbers,
