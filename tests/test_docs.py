@@ -8,8 +8,8 @@ A fence in `README.md` or `docs/` is one of these, or the test fails:
   is written to a file of this name, from which others can import.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
   `# exit code 2` must fail so, one in `# exit code 1` find a requirement missed, and
-  `softreach studio` is ended once it serves its page. Other lines set up a machine and are not
-  executed.
+  `softreach studio` is ended once it serves its page; with `--static` it ends by itself. Other
+  lines set up a machine and are not executed.
 - `python` or `bash` that begins with `# takes a minute` is executed by `make test-all` only.
 - `toml`: read as a design; with `[[reach]]` or `[search]`, as requirements.
 - `text` right after one of these: what it printed. Numbers may differ by 0.1 %; `...` stands for
@@ -190,7 +190,7 @@ def run_commands(example):
     with printed_into(example):
         for line in example.parsed.replace("\\\n", " ").splitlines():
             words = shlex.split(line, comments=True)
-            if words[:2] == ["softreach", "studio"]:
+            if words[:2] == ["softreach", "studio"] and "--static" not in words:
                 serve_and_end(words[1:])
             elif words and words[0] == "softreach":
                 told = re.search(r"# exit code ([12])$", line.rstrip())

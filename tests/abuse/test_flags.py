@@ -99,6 +99,16 @@ WRONG = [
     case(f"studio {TRUNK} --port 80.5", f"port = 80.5: {WHOLE_NUMBER}"),
     case(f"studio {TRUNK} --no-open --host=", "host = '': must be an address to listen on"),
     case(f"studio {TRUNK} --no-open --host=\t", "host = '\\t': must be an address to listen on"),
+    case(f"studio {TRUNK} --vary taper_deg=0:3:4", "left out without --static and its folder"),
+    case(f"studio {TRUNK} --unit mm", "unit = mm: must be left out without --static"),
+    case(f"studio {TRUNK} --static a --vary taper_deg=0,1 --port 8080", "which serves nothing"),
+    case(f"studio {TRUNK} --static a --vary taper_deg=0:3:2000", "designs = 2,000: must be a grid"),
+    case(
+        f"studio {TRUNK} --static a --vary taper_deg=0,1 --unit ell", "unit = 'ell': must be one of"
+    ),
+    case(f"studio {TRUNK} --static a", "parameters = none: must be at least one of"),
+    case(f"studio {TRUNK} --static a --vary taper=0,1", "taper_deg"),
+    case("studio a.zarr --static a --vary taper_deg=0,1", "a.zarr"),
     # finite numbers
     *(
         case(f"cloud {TRUNK} --tol={value}", f"tol = {value or repr('')}: {FINITE}")

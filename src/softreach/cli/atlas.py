@@ -25,6 +25,7 @@ from softreach.support.errors import InvalidInput, MissingExtra
 from softreach.support.quantity import numbers_in, shortened
 
 if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
     from softreach.atlas import AtlasStatus
     from softreach.atlas.executor import ExecutorLike
     from softreach.atlas.space import DesignSpace
@@ -223,8 +224,7 @@ def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
 ) -> DesignSpace:
     from softreach.arm.design_file import LONGEST
-    from softreach.atlas.space import DesignSpace
-    from softreach.atlas.space_file import parse_parameter, parse_space
+    from softreach.atlas.space_file import parse_space
     from softreach.support.files.text import read_text
 
     if (path is None) == (vary is None):
@@ -233,9 +233,16 @@ def _space_of(
         refuse(_NAMED_IN_FILE, design=design)
         changes.refuse(_NAMED_IN_FILE)
         return parse_space(read_text("space", path, LONGEST), design_from)
-    base = design_from(design or "minimal_trunk", changes)
+    return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
+
+
+def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
+    """The grid that `--vary` asks for."""
+    from softreach.atlas.space import DesignSpace
+    from softreach.atlas.space_file import parse_parameter
+
     return DesignSpace.grid(
-        base, **dict(parse_parameter(base, *_key_and_values(text)) for text in vary or ())
+        base, **dict(parse_parameter(base, *_key_and_values(text)) for text in vary)
     )
 
 

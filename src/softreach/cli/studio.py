@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.atlas import grid_of
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
-from softreach.cli.options import refuse
+from softreach.cli.lengths import check_unit
+from softreach.cli.options import OUTPUT, Overwrite, Unit, refuse
 from softreach.cli.values import WHOLE
 
 if TYPE_CHECKING:
     from softreach.studio import Start
     from softreach.studio.start import KeptWork
+
+
+_HERE = "127.0.0.1"
 
 
 def studio(
@@ -25,7 +31,7 @@ def studio(
     *,
     host: Annotated[
         str, Parameter(help="Address to listen on; beyond this machine the page asks for a token.")
-    ] = "127.0.0.1",
+    ] = _HERE,
     port: Annotated[int | None, WHOLE, Parameter(help="A free port by default.")] = None,
     fresh: Annotated[
         bool,
@@ -42,6 +48,19 @@ def studio(
             help="Ask pages for a secret; by default where other machines can connect.",
         ),
     ] = None,
+    static: Annotated[
+        Path | None,
+        Parameter(
+            group=OUTPUT,
+            help="Write a page with sliders into this folder, which needs no studio, and end.",
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        Parameter(group=OUTPUT, help="A slider of that page: taper_deg=0:3:8. May be repeated."),
+    ] = None,
+    unit: Unit = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Open the design desk in the browser.
 
@@ -50,6 +69,13 @@ def studio(
 
     Example: softreach studio redundant_trunk --no-open
     """
+    if static is not None:
+        local = {"host": None if host == _HERE else host, "port": port}
+        refuse("left out with --static, which serves nothing", **local, fresh=fresh, token=token)
+        _write_static(source, static, vary, unit, overwrite=overwrite)
+        return
+    without = "left out without --static and its folder"
+    refuse(without, vary=vary, unit=unit, overwrite=overwrite)
     import threading
     import warnings
     import webbrowser
@@ -73,6 +99,29 @@ def studio(
         if open_page:
             webbrowser.open(running.url)
         threading.Event().wait()
+
+
+def _write_static(
+    source: str, folder: Path, vary: list[str] | None, unit: str | None, *, overwrite: bool
+) -> None:
+    """Write the page, and say how large it is and what is missing in it."""
+    from softreach.studio.static import write_static
+    from softreach.support import progress
+    from softreach.support.errors import counted
+
+    check_unit(unit)
+    space = grid_of(design_from(source), vary or [])
+    with progress.bar("computing designs", space.size) as step:
+        title = Path(source).stem
+        written = write_static(
+            space, folder, unit=unit, title=title, overwrite=overwrite, progress=step
+        )
+    gaps = f", {counted(written.gaps, 'gap')}" if written.gaps else ""
+    console.line(str(written.page))
+    console.line(
+        f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB; "
+        f"{written.computed} computed now"
+    )
 
 
 def _warning(*, with_token: bool) -> str:

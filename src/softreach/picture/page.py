@@ -1,7 +1,8 @@
 """A figure in space as one web page, which turns in a browser and asks nothing of a network.
 
 The page has its own few lines of WebGL. Arrays are in it as base64: a place in 16 bits of the box
-along each axis, a 65,536th of its side, and a color in 8 bits a channel.
+along each axis, a 65,536th of its side, a corner of a triangle in 16 bits where they suffice, and a
+color in 8 bits a channel.
 """
 
 from __future__ import annotations
@@ -22,7 +23,18 @@ from softreach.picture.thumbnail import Dots, Skin
 from softreach.support.arrays import Array
 from softreach.support.units import LengthUnit
 
-__all__ = ["ColorScale", "Figure3D", "PagePart", "Swatches", "css_color", "web_page"]
+__all__ = [
+    "ColorScale",
+    "Figure3D",
+    "PackedPart",
+    "PagePart",
+    "Swatches",
+    "css_color",
+    "packed",
+    "packed_keys",
+    "script_text",
+    "web_page",
+]
 
 _STEPS = 65535
 _HEIGHT = 560  # pixels, in notebooks
@@ -42,6 +54,10 @@ class PagePart(NamedTuple):
     """True if a slider changes its opacity."""
     size: float = 0.0
     """Diameter of dots, in the unit of the page."""
+
+
+PackedPart = dict[str, Any]
+"""A part as the script of a page reads it."""
 
 
 class Swatches(NamedTuple):
@@ -84,7 +100,7 @@ class Figure3D:
 
 
 def web_page(
-    parts: Sequence[PagePart],
+    parts: Sequence[PagePart | PackedPart],
     box: Array,
     unit: LengthUnit,
     *,
@@ -92,6 +108,8 @@ def web_page(
     caption: str = "",
     note: str = "",
     view: View = "oblique",
+    more: str = "",
+    scripts: str = "",
 ) -> str:
     """The page as HTML.
 
@@ -103,6 +121,8 @@ def web_page(
         caption: Text below the figure.
         note: Small text below that.
         view: The direction of sight at first.
+        more: HTML at the end of the page, whose scripts know the names of the page's own.
+        scripts: Where else scripts may come from, as a Content-Security-Policy has it.
 
     Raises:
         InvalidInput: An unknown view.
@@ -113,17 +133,33 @@ def web_page(
         "labels": [unit.label(axis) for axis in "xyz"],
         "views": [(name, *VIEWS[name]) for name in _BUTTONS],
         "start": view_angles(view),
-        "keys": [key._asdict() for key in keys],
+        "keys": packed_keys(keys),
         "caption": caption,
         "note": note,
-        "parts": [_packed(part, box) for part in parts],
+        "parts": [part if isinstance(part, dict) else _packed(part, box) for part in parts],
     }
-    # no text may end the script that it stands in
-    text = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    text = script_text(content)
     page = files("softreach.picture").joinpath("page.html").read_text(encoding="utf-8")
     title = html.escape(caption.partition("\n")[0] or "softreach")
     head, body = page.split("@DATA@")
-    return head.replace("@TITLE@", title) + text + body
+    head = head.replace("@SCRIPTS@", scripts and f" {scripts}").replace("@TITLE@", title)
+    return head + text + body.replace("@MORE@", more)
+
+
+def script_text(content: Any) -> str:
+    """A value as JSON, no text of which can end the script that it stands in."""
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def packed_keys(keys: Sequence[Swatches | ColorScale]) -> list[dict[str, Any]]:
+    """Keys of colors as the script of a page reads them."""
+    return [key._asdict() for key in keys]
+
+
+def packed(part: PagePart, box: Array) -> PackedPart:
+    """A part in a box of its own, shape (2, 3), around it."""
+    return _packed(part, box) | {"box": box.tolist()}
 
 
 def css_color(rgb: ArrayLike) -> str:
@@ -132,16 +168,19 @@ def css_color(rgb: ArrayLike) -> str:
     return f"#{red:02x}{green:02x}{blue:02x}"
 
 
-def _packed(part: PagePart, box: Array) -> dict[str, Any]:
+def _packed(part: PagePart, box: Array) -> PackedPart:
     shape, common = part.shape, {"name": part.name, "through": part.through}
     common |= {"opacity": 1.0 if part.surface else part.opacity, "surface": part.surface}
     if isinstance(shape, Dots):
         points = np.asarray(shape.points, float)
         colors = np.broadcast_to(np.asarray(shape.colors, np.uint8), points.shape)
         return common | {"xyz": _places(points, box), "rgb": _text(colors), "size": part.size}
+    vertices = np.asarray(shape.vertices, float)
+    wide = len(vertices) > _STEPS
     return common | {
-        "xyz": _places(np.asarray(shape.vertices, float), box),
-        "faces": _text(np.asarray(shape.faces, "<u4")),
+        "xyz": _places(vertices, box),
+        "faces": _text(np.asarray(shape.faces, "<u4" if wide else "<u2")),
+        "wide": wide,
         "color": list(shape.color),
         "start": part.opacity,
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,11 +39,10 @@ from softreach.support.units import LengthUnit
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Figure3D", "plot_3d"]
+__all__ = ["Detail", "Figure3D", "Scene", "plot_3d"]
 
 _POINTS = 200_000  # of a cloud: 2.4 MB of the page
-_TRIANGLES = 120_000  # of a surface: about as much
-_SIDES, _STATIONS = 48, 121
+_STATIONS = 121  # of equilibria
 _PALE = 0.62  # how far the colors of the arm at rest go toward white
 _CLEAR = 0.4  # opacity of surfaces beside others or around a cloud
 _BODY_CLEAR = 0.45  # of a body that has something inside
@@ -89,9 +88,8 @@ def plot_3d(
     said = None if caption is None else as_text("caption", caption)
     lengths = {length for thing in things if (length := _length(thing)) is not None}
     shown_in = unit_for(lengths.pop() if len(lengths) == 1 else None, unit)
-    scene = _Scene(shown_in, color, kinds)
-    for kind, thing in zip(kinds, things, strict=True):
-        _ADD[kind](scene, thing)
+    scene = Scene(shown_in, color, kinds)
+    scene.add(things)
     box = bounding_box(*scene.points())
     page = web_page(
         scene.parts,
@@ -105,15 +103,40 @@ def plot_3d(
     return Figure3D(page, "; ".join(scene.notes))
 
 
-class _Scene:
+class Detail(NamedTuple):
+    """Fineness of surfaces on a page."""
+
+    triangles: int = 120_000
+    """The most of a surface; so many take 1.4 MB of the page."""
+    sides: int = 48
+    """Corners around an arm."""
+    stations: int = 101
+    """Corners along one that is not activated."""
+
+
+_DETAIL = Detail()
+
+
+class Scene:
     """Parts of a page, with what explains them."""
 
-    def __init__(self, unit: LengthUnit, color: Any, kinds: Sequence[str]) -> None:
-        self.unit, self.color, self.kinds = unit, color, kinds
+    def __init__(
+        self,
+        unit: LengthUnit,
+        color: Any = None,
+        kinds: Sequence[str] = (),
+        detail: Detail = _DETAIL,
+    ) -> None:
+        self.unit, self.color, self.kinds, self.detail = unit, color, kinds, detail
         self.parts: list[PagePart] = []
         self.keys: list[Swatches | ColorScale] = []
         self.captions: list[str] = []
         self.notes: list[str] = []
+
+    def add(self, things: Sequence[Any]) -> None:
+        """Things to show, one after the other."""
+        for thing in things:
+            _ADD[_kind(thing)](self, thing)
 
     def points(self) -> list[ArrayLike]:
         """All places, one array for each part."""
@@ -163,9 +186,9 @@ class _Scene:
         """Triangles, fewer of them if they are many."""
         mesh = a_surface("data", mesh)
         vertices, faces = self.unit.of(mesh.vertices), np.asarray(mesh.faces)
-        if len(faces) > _TRIANGLES:
+        if len(faces) > self.detail.triangles:
             every = len(faces)
-            vertices, faces = simplified(vertices, faces, _TRIANGLES)
+            vertices, faces = simplified(vertices, faces, self.detail.triangles)
             self.notes.append(f"{len(faces):,} instead of {every:,} triangles")
         else:
             self.notes.append(f"{len(faces):,} triangles")
@@ -182,7 +205,8 @@ class _Scene:
         """An arm before activation, pale beside configurations."""
         beside = "configuration" in self.kinds
         name = self._name("arm at rest" if beside else "arm")
-        self._add_body(arm, rest_configuration(arm), name, _PALE if beside else 0.0)
+        shape = rest_configuration(arm, self.detail.stations)
+        self._add_body(arm, shape, name, _PALE if beside else 0.0)
         self._explain_bundles(arm)
 
     def add_configuration(self, configuration: xr.Dataset) -> None:
@@ -212,7 +236,8 @@ class _Scene:
         self._explain_bundles(arm)
 
     def _add_body(self, arm: Manipulator, shape: xr.Dataset, name: str, fade: float = 0.0) -> None:
-        body, caps = arm_surface(arm, shape, _SIDES), 2 * _SIDES
+        sides = self.detail.sides
+        body, caps = arm_surface(arm, shape, sides), 2 * sides
         opacity = _BODY_CLEAR if any(inside(arm)) else 1.0
         for faces in (body.faces[:-caps], body.faces[-caps:]):  # so that light breaks at the rim
             vertices, faces = compact_surface(body.vertices, faces)
@@ -243,14 +268,14 @@ class _Scene:
         return word if number == 1 else f"{word} #{number}"
 
 
-_ADD: dict[str, Callable[[_Scene, Any], None]] = {
-    "cloud": _Scene.add_cloud,
-    "set": _Scene.add_set,
-    "hull": _Scene.add_hull,
-    "surface": _Scene.add_surface,
-    "arm": _Scene.add_arm,
-    "configuration": _Scene.add_configuration,
-    "equilibria": _Scene.add_equilibria,
+_ADD: dict[str, Callable[[Scene, Any], None]] = {
+    "cloud": Scene.add_cloud,
+    "set": Scene.add_set,
+    "hull": Scene.add_hull,
+    "surface": Scene.add_surface,
+    "arm": Scene.add_arm,
+    "configuration": Scene.add_configuration,
+    "equilibria": Scene.add_equilibria,
 }
 
 
