@@ -16,7 +16,7 @@ from softreach.inverse.descent import descend
 from softreach.inverse.nearest import Reached, first_of_each, reach
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.sqp import constrained_minima, sqp, survey
+from softreach.inverse.sqp import Minima, constrained_minima, sqp
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 
@@ -131,32 +131,57 @@ def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = No
 
 def _least_change(prepared: PreparedMap, request: Request, known: Array | None) -> Reached:
     """The least of the local minima found; where none reaches its target, the nearest place."""
-    count = len(request.targets)
+    count, rod = len(request.targets), prepared.rod
     owner, start = _promising(prepared, request, *_starts(prepared, request))
     if known is not None:
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
-    gamma, residual = sqp(prepared.rod, request.of(owner), start)
-    best = _least(owner, gamma, residual, request)
-    ends = Reached(gamma[best], residual[best])
+    coarse = sqp(prepared.coarse_rod, request, owner, start, settled=_SETTLED, most=_MOST_COARSE)
+    rows = _leading(prepared, owner, coarse, count)
+    begin, sigma = coarse.gamma[rows], coarse.proximity[rows]
+    ends = _hit(rod, request, owner[rows], sqp(rod, request, owner[rows], begin, proximity=sigma, settled=_POLISHED, most=_MOST_POLISHING))
+    apart = ends.residual > request.residual
+    best = _least(owner[rows], ends.gamma, ends.residual, request)
+    STATS["fine"] += len(rows); STATS["n"] += count; STATS["coarse"] += len(owner)
+    ends = Reached(ends.gamma[best], ends.residual[best])
     left = np.flatnonzero(ends.residual > request.residual)
+    STATS["left"] += len(left)
     more = reach(prepared, request.of(left), ends.gamma[left])
     ends.gamma[left], ends.residual[left] = more
     # Where some search lost its target, the target lies next to a fold or a boundary.
-    lost = np.bincount(owner, residual > request.residual, count) > 0
-    ends = _searched_again(prepared, request, ends, np.flatnonzero(lost), owner, start)
-    return _polished(prepared, request, ends)
+    lost = np.zeros(count, bool)
+    lost[owner[rows][apart]] = True
+    lost[left] = True
+    STATS["lost"] += lost.sum()
+    return _searched_again(prepared, request, ends, np.flatnonzero(lost), owner, start)
 
 
-def _polished(prepared: PreparedMap, request: Request, ends: Reached) -> Reached:
-    """The best once more, until its steps are negligible; kept where that changes less."""
-    gamma, residual = sqp(
-        prepared.rod, request, ends.gamma, settled=_POLISHED, most=_MOST_POLISHING
-    )
-    owner = np.tile(np.arange(len(gamma)), 2)
-    gamma = np.concatenate([ends.gamma, gamma])
-    residual = np.concatenate([ends.residual, residual])
-    best = _least(owner, gamma, residual, request)
-    return Reached(gamma[best], residual[best])
+def _leading(prepared: PreparedMap, owner: Index, ends: Minima, count: int) -> Index:
+    """Searches whose ends are apart and may be the least of their target."""
+    order = np.lexsort((ends.merit, owner))
+    counts = np.bincount(owner, minlength=count)
+    first = np.cumsum(counts) - counts
+    places = first[:, None] + np.arange(counts.max(initial=0))
+    is_place = places < (first + counts)[:, None]
+    places = order[np.where(is_place, places, first[:, None])]
+    chosen = np.zeros(places.shape, bool)
+    prepared.seeds.choose(ends.gamma[places], chosen, 4, _ONE)
+    merit = ends.merit[places]
+    chosen &= merit <= merit[:, :1] + _MARGIN * (1.0 + merit[:, :1])
+    return places[chosen]
+
+
+def _hit(rod: TipMap, request: Request, owner: Index, ends: Minima) -> Reached:
+    """The ends of searches, brought to their targets where these were not quite reached."""
+    off = np.flatnonzero(ends.residual > request.residual)
+    more = descend(rod, request.targets[owner[off]], ends.gamma[off], request.residual, most=20)
+    STATS["off"] += len(off)
+    ends.gamma[off], ends.residual[off] = more.gamma, more.residual
+    return Reached(ends.gamma, ends.residual)
+
+
+from collections import Counter
+STATS = Counter()
+_SETTLED, _ONE, _MARGIN, _LOST, _MOST_COARSE = 1e-4, 0.01, 1e-2, 1e-5, 20
 
 
 def _searched_again(
@@ -167,12 +192,13 @@ def _searched_again(
     owner = np.concatenate([owner[chosen], rows])
     start = np.concatenate([start[chosen], ends.gamma[rows]])
     at = descend(rod, request.targets[owner], start, request.residual)
-    hit = at.residual <= request.residual
-    gamma, residual = sqp(rod, request.of(owner[hit]), at.gamma[hit], penalty=_HIGH_PENALTY)
+    hit = np.flatnonzero(at.residual <= request.residual)
+    more = sqp(rod, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY, settled=_POLISHED, most=60)
+    more = _hit(rod, request, owner[hit], more)
     count = len(request.targets)
     owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
-    gamma = np.concatenate([ends.gamma, at.gamma[hit], gamma])
-    residual = np.concatenate([ends.residual, at.residual[hit], residual])
+    gamma = np.concatenate([ends.gamma, at.gamma[hit], more.gamma])
+    residual = np.concatenate([ends.residual, at.residual[hit], more.residual])
     best = _least(owner, gamma, residual, request)
     return Reached(gamma[best], residual[best])
 
@@ -203,7 +229,8 @@ def _promising(
     prepared: PreparedMap, request: Request, owner: Index, start: Array
 ) -> tuple[Index, Array]:
     """Activations of the best searches of each target after a few steps, those that are apart."""
-    gamma, merit = survey(prepared.rod, request.of(owner), start, _SURVEY)
+    found = sqp(prepared.coarse_rod, request, owner, start, most=_SURVEY)
+    gamma, merit = found.gamma, found.merit
     order = np.lexsort((merit, owner))
     counts = np.bincount(owner, minlength=len(request.targets))
     first = np.cumsum(counts) - counts

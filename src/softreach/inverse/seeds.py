@@ -45,6 +45,9 @@ class Seeds:
         rows = np.asarray(self.tree.query(targets, k=count)[1], np.int64)
         return self.gamma[rows.reshape(-1, count)]
 
+    def choose(self, candidates, chosen, most, least_distance):
+        choose_apart(candidates, self.scales, most, least_distance, chosen)
+
     def starts(
         self, candidates: Array, most: int = _STARTS, least_distance: float = _APART
     ) -> tuple[Index, Array]:
@@ -59,7 +62,7 @@ class Seeds:
             Number of the target and activation of each start, sorted by target.
         """
         chosen = np.zeros(candidates.shape[:2], bool)
-        choose_apart(candidates, self.scales, most, least_distance, chosen)
+        self.choose(candidates, chosen, most, least_distance)
         return np.nonzero(chosen)[0], candidates[chosen]
 
 
