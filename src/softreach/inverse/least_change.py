@@ -24,10 +24,13 @@ __all__ = ["least_changes"]
 
 
 _CANDIDATES = 300
-_STARTS, _FACE_STARTS = 14, 10
+import os
+_STARTS, _FACE_STARTS = map(int,os.environ.get('STARTS','14,10').split(','))
 _APART = 0.15
-_SURVEY = 5  # steps after which searches are compared
-_SURVIVORS, _MERGED = 6, 0.05  # searches of a target that go on, and how far they are apart
+import os
+_SURVEY = int(os.environ.get('SURVEY','5'))  # steps after which searches are compared
+import os
+_SURVIVORS, _MERGED = int(os.environ.get('SURV','6')), 0.05  # searches of a target that go on, and how far they are apart
 _HIGH_PENALTY = 1e4
 _EQUAL = 1e-6  # difference of changes below which neither is less
 _APART_IN_FAMILY = 1e-3  # least difference of two of a family, in ranges
@@ -132,14 +135,16 @@ def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = No
 def _least_change(prepared: PreparedMap, request: Request, known: Array | None) -> Reached:
     """The least of the local minima found; where none reaches its target, the nearest place."""
     count, rod = len(request.targets), prepared.rod
-    owner, start = _promising(prepared, request, *_starts(prepared, request))
+    every = _starts(prepared, request)
+    owner, start = _promising(prepared, request, *every)
     if known is not None:
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
     coarse = sqp(prepared.coarse_rod, request, owner, start, settled=_SETTLED, most=_MOST_COARSE)
-    rows = _leading(prepared, owner, coarse, count)
+    rows = _leading(prepared, request, owner, coarse)
     begin, sigma = coarse.gamma[rows], coarse.proximity[rows]
-    ends = _hit(rod, request, owner[rows], sqp(rod, request, owner[rows], begin, proximity=sigma, settled=_POLISHED, most=_MOST_POLISHING))
-    apart = ends.residual > request.residual
+    fine = sqp(rod, request, owner[rows], begin, proximity=sigma, settled=_POLISHED, most=_MOST_POLISHING)
+    apart = fine.residual > 1e-8 * rod.length
+    ends = _hit(rod, request, owner[rows], fine)
     best = _least(owner[rows], ends.gamma, ends.residual, request)
     STATS["fine"] += len(rows); STATS["n"] += count; STATS["coarse"] += len(owner)
     ends = Reached(ends.gamma[best], ends.residual[best])
@@ -151,13 +156,22 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
     lost = np.zeros(count, bool)
     lost[owner[rows][apart]] = True
     lost[left] = True
+    import os
+    hit = coarse.residual <= float(os.environ.get("LOST", "1e-5")) * rod.length
+    lost |= np.bincount(owner, hit, count) < float(os.environ.get("HITS", "1"))
+    steep = fine.penalty > float(os.environ.get("PEN", "100"))
+    lost |= np.bincount(owner[rows], steep, count) > 0
     STATS["lost"] += lost.sum()
-    return _searched_again(prepared, request, ends, np.flatnonzero(lost), owner, start)
+    return _searched_again(prepared, request, ends, np.flatnonzero(lost), *every)
 
 
-def _leading(prepared: PreparedMap, owner: Index, ends: Minima, count: int) -> Index:
+def _leading(prepared: PreparedMap, request: Request, owner: Index, ends: Minima) -> Index:
     """Searches whose ends are apart and may be the least of their target."""
-    order = np.lexsort((ends.merit, owner))
+    count = len(request.targets)
+    change = np.linalg.norm(ends.gamma - request.near[owner], axis=1)
+    off = ends.residual / prepared.rod.length
+    worth = np.where(off > _LOST, 1e3 * (1.0 + off), change)
+    order = np.lexsort((worth, owner))
     counts = np.bincount(owner, minlength=count)
     first = np.cumsum(counts) - counts
     places = first[:, None] + np.arange(counts.max(initial=0))
@@ -165,8 +179,8 @@ def _leading(prepared: PreparedMap, owner: Index, ends: Minima, count: int) -> I
     places = order[np.where(is_place, places, first[:, None])]
     chosen = np.zeros(places.shape, bool)
     prepared.seeds.choose(ends.gamma[places], chosen, 4, _ONE)
-    merit = ends.merit[places]
-    chosen &= merit <= merit[:, :1] + _MARGIN * (1.0 + merit[:, :1])
+    worth = worth[places]
+    chosen &= worth <= worth[:, :1] * (1.0 + _MARGIN) + _MARGIN
     return places[chosen]
 
 
@@ -181,7 +195,7 @@ def _hit(rod: TipMap, request: Request, owner: Index, ends: Minima) -> Reached:
 
 from collections import Counter
 STATS = Counter()
-_SETTLED, _ONE, _MARGIN, _LOST, _MOST_COARSE = 1e-4, 0.01, 1e-2, 1e-5, 20
+_SETTLED, _ONE, _MARGIN, _LOST, _MOST_COARSE = 1e-4, 0.01, 1e-2, 1e-5, int(os.environ.get('MC','20'))
 
 
 def _searched_again(
@@ -191,12 +205,16 @@ def _searched_again(
     rod, chosen = prepared.rod, np.isin(owner, rows)
     owner = np.concatenate([owner[chosen], rows])
     start = np.concatenate([start[chosen], ends.gamma[rows]])
+    more = sqp(rod, request, owner, start, settled=_POLISHED)
+    more = _hit(rod, request, owner, more)
     at = descend(rod, request.targets[owner], start, request.residual)
     hit = np.flatnonzero(at.residual <= request.residual)
-    more = sqp(rod, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY, settled=_POLISHED, most=60)
-    more = _hit(rod, request, owner[hit], more)
+    again = sqp(rod, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY, settled=_POLISHED)
+    again = _hit(rod, request, owner[hit], again)
+    ends = Reached(np.concatenate([ends.gamma, more.gamma]), np.concatenate([ends.residual, more.residual]))
+    more, first = again, owner
     count = len(request.targets)
-    owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
+    owner = np.concatenate([np.arange(count), first, owner[hit], owner[hit]])
     gamma = np.concatenate([ends.gamma, at.gamma[hit], more.gamma])
     residual = np.concatenate([ends.residual, at.residual[hit], more.residual])
     best = _least(owner, gamma, residual, request)

@@ -39,6 +39,8 @@ class Minima(NamedTuple):
     """½|γ - near|² and the penalty of the miss, shape (n,)."""
     proximity: Array
     """σ of the last step, shape (n,)."""
+    penalty: Array
+    """Penalty of the miss, in 1/L: half as much again as its multiplier, shape (n,)."""
 
 
 def sqp(
@@ -73,7 +75,7 @@ def sqp(
     n, m = start.shape
     begin = np.empty(n)
     begin[:] = proximity
-    minima = Minima(start.copy(), np.empty(n), np.empty(n), begin)
+    minima = Minima(start.copy(), np.empty(n), np.empty(n), begin, np.empty(n))
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-n // parallel.thread_count()))
     rod.prepare()

@@ -27,7 +27,7 @@ _MET = 1e-2  # part of a miss that may be left where the linearized target is me
 _MISS = 1e-9  # in L, that counts as none
 _RESTORING = 1e6  # penalty of a miss where it is not: nothing else counts
 _SHORT = 0.1  # steps that tell the curvature, in ranges
-_LEAST_PENALTY = 30.0  # in merits that are compared
+_LEAST_PENALTY = 1000.0  # in merits that are compared
 _SOFTNESS, _SOFTNESS_NEARBY = 1e-6, 1e-15  # of the linearized target, in |J|²
 _NEARBY = 1e-3  # miss in L
 
@@ -86,13 +86,13 @@ def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, en
         box: Lower and upper bounds and ranges, shape (m,) each.
         length: L [m].
         limits: Step at which a search has settled, in ranges, and the most steps.
-        ends: Activations, |tip - target|/L, merits and σ at the ends of all searches.
+        ends: Activations, |tip - target|/L, merits, σ and penalties at the ends of all searches.
 
     Returns:
         Number of those that go on.
     """
     low, high, scales = box
-    at_end, residual, merit, proximity = ends
+    at_end, residual, merit, proximity, penalties = ends
     settled, most = limits
     m, kept = len(low), 0
     for i in range(n):
@@ -156,8 +156,8 @@ def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, en
             for j in range(m):
                 at_end[row, j] = running.gamma[kept, j]
             residual[row] = math.sqrt(x * x + y * y + z * z)
-            merit[row] = _merit(running, kept, near[target], max(penalty, _LEAST_PENALTY))
-            proximity[row] = sigma
+            merit[row] = _merit(running, kept, near[target], _LEAST_PENALTY)
+            proximity[row], penalties[row] = sigma, penalty
             continue
         running.row[kept], running.steps[kept] = row, steps + 1
         square = 0.0
