@@ -17,6 +17,7 @@ from softreach.inverse.nearest import Reached, first_of_each, reach
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.sqp import Minima, constrained_minima, sqp
+from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 
@@ -178,7 +179,7 @@ def _leading(prepared: PreparedMap, request: Request, owner: Index, ends: Minima
     is_place = places < (first + counts)[:, None]
     places = order[np.where(is_place, places, first[:, None])]
     chosen = np.zeros(places.shape, bool)
-    prepared.seeds.choose(ends.gamma[places], chosen, 4, _ONE)
+    choose_apart(ends.gamma[places], prepared.seeds.scales, 4, _ONE, chosen)
     worth = worth[places]
     chosen &= worth <= worth[:, :1] * (1.0 + _MARGIN) + _MARGIN
     return places[chosen]
@@ -234,10 +235,7 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     owners = [np.arange(len(request.targets))]
     starts = [prepared.rod.box.clip(request.near)]
     for marks, most in ((prepared.seeds, _STARTS), (prepared.face_seeds, _FACE_STARTS)):
-        gamma = marks.nearest(request.targets, _CANDIDATES)
-        order = ((gamma - request.near[:, None]) ** 2).sum(axis=2).argsort(axis=1, kind="stable")
-        gamma = np.take_along_axis(gamma, order[:, :, None], axis=1)
-        owner, start = marks.starts(gamma, most, _APART)
+        owner, start = marks.near(request.targets, request.near, _CANDIDATES, most, _APART)
         owners.append(owner)
         starts.append(start)
     return np.concatenate(owners), np.concatenate(starts)

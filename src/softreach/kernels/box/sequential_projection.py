@@ -26,6 +26,7 @@ LONGEST_STEP = 0.5
 _MET = 1e-2  # part of a miss that may be left where the linearized target is met
 _MISS = 1e-9  # in L, that counts as none
 _RESTORING = 1e6  # penalty of a miss where it is not: nothing else counts
+_PROGRESS, _PATIENCE = 0.02, 6  # part of a miss, and steps after which less ends a search
 _SHORT = 0.1  # steps that tell the curvature, in ranges
 _LEAST_PENALTY = 1000.0  # in merits that are compared
 _SOFTNESS, _SOFTNESS_NEARBY = 1e-6, 1e-15  # of the linearized target, in |J|²
@@ -129,6 +130,9 @@ def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, en
                     reach = 0.3 * step
             else:
                 reach = min(LONGEST_STEP, 2.0 * reach)
+                # A minimum of the distance that is no root is approached ever more slowly.
+                stuck = gained < _PROGRESS * weight * miss and steps > _PATIENCE
+                ended = ended or (weight >= _RESTORING and stuck)
                 if weight < _RESTORING and step < _SHORT:
                     bend = (1.0 + sigma) * bend / max(square, 1e-300)
                     sigma = min(max(bend, _LEAST_PROXIMITY), 4.0 * max(sigma, 0.0) + 1.0)
