@@ -72,7 +72,7 @@ def sqp(
         settled: Step at which a search ends, in ranges.
         most: Steps.
     """
-    n, m = start.shape
+    n = len(start)
     begin = np.empty(n)
     begin[:] = proximity
     minima = Minima(start.copy(), np.empty(n), np.empty(n), begin, np.empty(n))

@@ -55,23 +55,29 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):
             elif climbs(ends, best, ascent, _SHORTEST_NEWTON):
                 boost = 1.0
             else:
-                # Too few variables are between their bounds: a step that grows the dual function
-                # however many there are, and longer ones as long as they do.
                 _whole_gram(slope, softness, n, gram)
                 newton(gram, error, step)
-                for i in range(3):
-                    trial[i] = y[i] + boost * step[i]
-                while boost > 1.0:
-                    if _value(center, slope, wanted, softness, low, high, n, trial) > best:
-                        break
-                    boost = max(1.0, 0.125 * boost)
-                    for i in range(3):
-                        trial[i] = y[i] + boost * step[i]
-                boost *= 4.0
+                boost = _lengthen(ends, best, boost)
             y[:] = trial
             best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for i in range(3):
             multiplier[n, i] = y[i]
+
+
+@inline
+def _lengthen(ends, best, boost):
+    """Write the end of a step that grows the dual function; how much longer the next may be.
+
+    Where too few variables are between their bounds for Newton's step, one with the Gram matrix of
+    all of them grows it, however many there are; so do longer ones as long as they do.
+    """
+    center, slope, wanted, softness, low, high, n, y, step, trial = ends
+    while True:
+        for i in range(3):
+            trial[i] = y[i] + boost * step[i]
+        if boost == 1.0 or _value(center, slope, wanted, softness, low, high, n, trial) > best:
+            return 4.0 * boost
+        boost = max(1.0, 0.125 * boost)
 
 
 @inline

@@ -221,7 +221,9 @@ def next_trials(running, n, owner, near):
             z += running.slope[i, 2, j] * moved
         ahead = math.sqrt(x * x + y * y + z * z)
         weight = _RESTORING
-        if ahead <= max(_MET * before, _MISS):  # else the multiplier says no more than that nothing meets it
+        if ahead <= max(
+            _MET * before, _MISS
+        ):  # else the multiplier says no more than that nothing meets it
             x, y, z = running.multiplier[i, 0], running.multiplier[i, 1], running.multiplier[i, 2]
             force = (1.0 + running.proximity[i]) * math.sqrt(x * x + y * y + z * z)
             weight = max(running.penalty[i], 1.5 * force)
