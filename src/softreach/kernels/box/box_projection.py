@@ -21,7 +21,7 @@ _SHORTEST_NEWTON = 0.02  # part of a step below which another direction is taken
 
 
 @kernel
-def project(center, slope, wanted, softness, low, high, out, multiplier):
+def project(center, slope, wanted, softness, low, high, out, multiplier):  # noqa: C901
     """Write x into `out` (n, m) and y into `multiplier` (n, 3).
 
     Args:
