@@ -25,12 +25,13 @@ __all__ = ["least_changes"]
 
 
 _CANDIDATES = 300
-_STARTS, _FACE_STARTS = 8, 6
+_STARTS, _FACE_STARTS = 14, 10
 _APART = 0.15
-_SURVEY = 3  # steps after which searches are compared
+_SURVEY = 5  # steps after which searches are compared
 _SURVIVORS, _MERGED = 6, 0.05  # searches of a target that go on, and how far they are apart
 _SETTLED, _MOST_COARSE = 1e-4, 30  # step and steps at which searches of the coarse map end
 _HIT = 1e-5  # miss of the coarse map in L, below which a search is on its target
+_NEARBY = 0.05  # the same, below which it may be on it on the exact map
 _LEADING, _DISTINCT, _MARGIN = 4, 0.01, 1e-2  # searches that go on to the exact map, and how far
 # they are apart; the part by which a change may be above the least
 _NEARLY_HIT = 1e-8  # miss of the exact map in L, above which a search lost its target
@@ -179,7 +180,10 @@ def _leading(prepared: PreparedMap, request: Request, owner: Index, ends: Minima
     chosen = np.zeros(places.shape, bool)
     choose_apart(ends.gamma[places], prepared.seeds.scales, _LEADING, _DISTINCT, chosen)
     worth = worth[places]
-    return places[chosen & (worth <= worth[:, :1] * (1.0 + _MARGIN) + _MARGIN)]
+    chosen &= worth <= worth[:, :1] * (1.0 + _MARGIN) + _MARGIN
+    # Next to a fold the coarse map may miss by a little what the exact one reaches.
+    nearly = (miss[places] > _HIT) & (miss[places] < _NEARBY) & (change[places] < worth[:, :1])
+    return np.unique(places[chosen | nearly])
 
 
 def _by_owner(owner: Index, value: Array, count: int) -> Index:
