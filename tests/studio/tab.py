@@ -28,7 +28,7 @@ CHEAP = """
     };
     addEventListener("DOMContentLoaded", () => {
         const style = document.createElement("style");
-        style.textContent = "* {transition: none !important; animation: none !important}";
+        style.textContent = "* {transition: none !important}";
         document.head.append(style);
     });
 """

@@ -25,7 +25,7 @@ def test_needs_are_seen_met_and_missed_and_a_search_finds_a_design_that_meets_th
 
     tab.open("Design")
     tab.page.get_by_text("needs: 1 of 2 met · place 2 missed by").wait_for()
-    tab.drag("taper φ [deg]", -60)
+    tab.drag("taper φ [deg]", -85)
     tab.wait(lambda: tab.drawn("/needs/missed") is None, "the cross is a ball")
     tab.page.get_by_text("needs: 2 of 2 met").wait_for()
     tab.settle()
