@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from softreach.kernels.branches.spread import choose_apart, choose_in_bins
+from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.sampling import sample_cube
-from softreach.support import parallel
 from softreach.support.arrays import Array, Index
-from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    from scipy.spatial import KDTree
 
 __all__ = ["Seeds", "face_seeds", "seeds"]
 
@@ -28,11 +20,6 @@ _MOST_ON_FACES = 60_000
 _SEED = 0
 _CANDIDATES = 24
 _STARTS = 3
-_IN_BIN, _BINS = 4, 512  # seeds in a bin, roughly, and the most bins along an axis
-_MOST_IN_BINS = 1024  # seeds that are looked at for one target
-_BLOCK = 1024
-
-_Grid = tuple[Array, float, tuple[int, int, int]]
 _APART = 0.15  # of the ranges: two starts lead to different minima
 
 
@@ -47,55 +34,10 @@ class Seeds:
             tip: Their tips [m], shape (n, 3).
             scales: By which distances of activations are measured, shape (m,).
         """
-        self.gamma, self.tip, self.scales = gamma, tip, scales
-
-    @lazy
-    def tree(self) -> KDTree:
-        """The tips."""
         from scipy.spatial import KDTree
 
-        return KDTree(self.tip)
-
-    @lazy
-    def _bins(self) -> tuple[Array, Index, _Grid]:
-        """Activations bin by bin of their tips, the first row of each bin, and the bins."""
-        corner, extent = self.tip.min(axis=0), np.ptp(self.tip, axis=0)
-        extent = np.maximum(extent, 1e-3 * extent.max() + 1e-300)
-        width = float(np.cbrt(extent.prod() * _IN_BIN / len(self.tip)))
-        width = max(width, float(extent.max()) / _BINS)
-        nx, ny, nz = (int(n) for n in extent // width + 1)
-        x, y, z = ((self.tip - corner) // width).astype(np.int64).T
-        bins = (x * ny + y) * nz + z
-        first = np.zeros(nx * ny * nz + 1, np.int64)
-        first[1:] = np.bincount(bins, minlength=nx * ny * nz).cumsum()
-        return self.gamma[bins.argsort(kind="stable")], first, (corner, width, (nx, ny, nz))
-
-    def near(
-        self, targets: Array, near: Array, count: int, most: int, least_distance: float
-    ) -> tuple[Index, Array]:
-        """Seeds with tips near each target, those nearest to an activation, that lie apart.
-
-        Args:
-            targets: Shape (t, 3) [m].
-            near: An activation for each target, shape (t, m).
-            count: Seeds to look at, at least.
-            most: Largest number for one target.
-            least_distance: Between any two, in ranges.
-
-        Returns:
-            Number of the target and activation of each start, sorted by target.
-        """
-        gamma, first, grid = self._bins
-        rows = np.empty((len(targets), most), np.int64)
-
-        def task(block: slice) -> None:
-            room, places = (np.empty(_MOST_IN_BINS), np.empty(_MOST_IN_BINS, np.int64)), targets
-            found = near[block], self.scales, count, least_distance, room, rows[block]
-            choose_in_bins(gamma, first, grid, places[block], *found)
-
-        parallel.run(partial(task, block) for block in parallel.blocks(len(targets), _BLOCK))
-        owner, slot = np.nonzero(rows >= 0)
-        return owner, gamma[rows[owner, slot]]
+        self.gamma, self.tip, self.scales = gamma, tip, scales
+        self.tree = KDTree(tip)
 
     def nearest(self, targets: Array, count: int = _CANDIDATES) -> Array:
         """Activations whose tips are nearest to each target, nearest first, (t, count, m)."""

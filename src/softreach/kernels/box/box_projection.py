@@ -17,11 +17,11 @@ __all__ = ["climbs", "dual", "newton", "project"]
 
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-13  # of the largest terms
-_SHORTEST_NEWTON = 0.02  # part of a step below which another direction is taken
+_SHORTEST = 1e-9  # part of a step below which a search ends
 
 
 @kernel
-def project(center, slope, wanted, softness, low, high, out, multiplier):  # noqa: C901
+def project(center, slope, wanted, softness, low, high, out, multiplier):
     """Write x into `out` (n, m) and y into `multiplier` (n, 3).
 
     Args:
@@ -32,32 +32,20 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):  # noq
         low: Lower bounds, shape (n, m).
         high: Upper bounds, shape (n, m).
         out: x, shape (n, m).
-        multiplier: y to begin with, 0 where nothing is known, and then y, shape (n, 3).
+        multiplier: y, shape (n, 3).
     """
     y, error, step, trial = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     gram = np.zeros((3, 3))
     for n in range(center.shape[0]):
-        known = False
-        for i in range(3):
-            y[i] = multiplier[n, i]
-            known = known or y[i] != 0.0
-        best, boost = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram), 1.0
+        y[:] = 0.0
+        best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for _ in range(_MOST_ITERATIONS):
             ascent = newton(gram, error, step)
-            ends = center, slope, wanted, softness, low, high, n, y, step, trial
             if not ascent > _CONVERGED * (abs(best) + 1e-30):
-                if not known:
-                    break
-                # Newton's last step from afar ends far below the tolerance.
-                known = False
-                for i in range(3):
-                    trial[i] = y[i] + step[i]
-            elif climbs(ends, best, ascent, _SHORTEST_NEWTON):
-                boost = 1.0
-            else:
-                _whole_gram(slope, softness, n, gram)
-                newton(gram, error, step)
-                boost = _lengthen(ends, best, boost)
+                break
+            ends = center, slope, wanted, softness, low, high, n, y, step, trial
+            if not climbs(ends, best, ascent):
+                break
             y[:] = trial
             best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for i in range(3):
@@ -65,37 +53,11 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):  # noq
 
 
 @inline
-def _lengthen(ends, best, boost):
-    """Write the end of a step that grows the dual function; how much longer the next may be.
-
-    Where too few variables are between their bounds for Newton's step, one with the Gram matrix of
-    all of them grows it, however many there are; so do longer ones as long as they do.
-    """
-    center, slope, wanted, softness, low, high, n, y, step, trial = ends
-    while True:
-        for i in range(3):
-            trial[i] = y[i] + boost * step[i]
-        if boost == 1.0 or _value(center, slope, wanted, softness, low, high, n, trial) > best:
-            return 4.0 * boost
-        boost = max(1.0, 0.125 * boost)
-
-
-@inline
-def _whole_gram(slope, softness, n, gram):
-    """A Aᵀ + s, which minus the Hessian of the dual function never exceeds."""
-    for i in range(3):
-        for k in range(i + 1):
-            gram[i, k] = softness[n] if i == k else 0.0
-            for j in range(slope.shape[2]):
-                gram[i, k] += slope[n, i, j] * slope[n, k, j]
-
-
-@inline
-def climbs(ends, best, ascent, shortest):
-    """Shorten a step until the dual function grows as it should; whether it does in time."""
+def climbs(ends, best, ascent):
+    """Shorten a step until the dual function grows as it should; whether it does."""
     center, slope, wanted, softness, low, high, n, y, step, trial = ends
     size = 1.0
-    while size > shortest:
+    while size > _SHORTEST:
         for i in range(3):
             trial[i] = y[i] + size * step[i]
         value = _value(center, slope, wanted, softness, low, high, n, trial)
