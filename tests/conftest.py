@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from collections.abc import Iterator
 
 os.environ.setdefault("MPLBACKEND", "agg")
@@ -51,6 +52,14 @@ def coarse() -> Iterator[None]:
             patch.setattr(f"softreach.plot.{module}.DPI", 60)
         patch.setitem(style._SAVING, "pdf.use14corefonts", True)
         yield
+
+
+@pytest.fixture(autouse=True)
+def closed_figures() -> Iterator[None]:
+    """No figure of one test is seen by the next, on which worker it may run."""
+    yield
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        pyplot.close("all")
 
 
 @pytest.fixture

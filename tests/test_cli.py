@@ -267,11 +267,10 @@ class TestShow:
         ],
     )
     def test_the_picture_is_where_it_says(self, stored, folder, capsys, options):
-        plt = pytest.importorskip("matplotlib.pyplot")
+        pytest.importorskip("matplotlib.pyplot")
         assert run(["show", stored, *options]) == 0
         assert capsys.readouterr().out.strip() == options[1]
         assert (folder / options[1]).stat().st_size > 10_000
-        plt.close("all")
 
 
 class TestExport:
@@ -293,7 +292,7 @@ class TestExport:
 
 @pytest.mark.parametrize("output", ["table", "json"])
 def test_the_demo_writes_every_file_it_names(output, folder, capsys):
-    plt = pytest.importorskip("matplotlib.pyplot")
+    pytest.importorskip("matplotlib.pyplot")
     pytest.importorskip("trimesh")
     assert run(["demo", "--out", "results", "--n", "4000", *["--json"][: output == "json"]]) == 0
     text = capsys.readouterr().out
@@ -304,7 +303,6 @@ def test_the_demo_writes_every_file_it_names(output, folder, capsys):
         assert json.loads(text)["points"] == 4000
     assert sr.Manipulator.load("results/design.toml") == sr.designs.minimal_trunk()
     assert sr.open_cloud("results/cloud.zarr").sizes["sample"] == 4000
-    plt.close("all")
 
 
 BAD_DESIGN = """

@@ -51,6 +51,5 @@ def test_the_picture_in_the_documentation_is_the_one_that_is_drawn(tmp_path):
 
     conventions_figure().savefig(tmp_path / "new.png", dpi=DPI)
     old, new = plt.imread(PICTURE), plt.imread(tmp_path / "new.png")
-    plt.close("all")
     assert old.shape == new.shape, "run python -m tools.conventions"
     assert np.abs(old - new).mean() < 0.01, "run python -m tools.conventions"

@@ -66,7 +66,7 @@ def on_page(page: Path) -> str:
 @pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
 def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch, request):
-    plt = pytest.importorskip("matplotlib.pyplot")
+    pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     for file in EXAMPLES:
@@ -83,7 +83,6 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     document.namespace["_all"] = request.config.option.markexpr != "not large"
     for example in document.examples():
         example.evaluate()
-    plt.close("all")
     for name in {*sys.modules} - known:
         if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
             del sys.modules[name]

@@ -22,13 +22,6 @@ trimesh = pytest.importorskip("trimesh")
 SUFFIXES = ("ply", "stl", "obj", "glb", "vtu", "vtk")
 
 
-@pytest.fixture(autouse=True)
-def close_figures(monkeypatch):
-    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
-    yield
-    plt.close("all")
-
-
 @pytest.fixture(params=MADE_ARMS)
 def arm(request):
     return MADE_ARMS[request.param]()

@@ -15,12 +15,6 @@ from softreach.support.palette import activation_colors, bundle_color
 plt = pytest.importorskip("matplotlib.pyplot")
 
 
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
-
-
 @pytest.fixture(scope="module")
 def cloud(trunk):
     return sr.compute_cloud(trunk, n=2000, seed=1)

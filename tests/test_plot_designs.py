@@ -13,12 +13,6 @@ from softreach.support.palette import bundle_color
 plt = pytest.importorskip("matplotlib.pyplot")
 
 
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
-
-
 def sectors(ax):
     from matplotlib.patches import Wedge
 

@@ -115,14 +115,6 @@ def ignorant(everything) -> SimpleNamespace:
     return found
 
 
-@pytest.fixture(autouse=True)
-def few_pixels(monkeypatch):
-    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
-    monkeypatch.setattr("softreach.plot.sheet.DPI", 60)
-    yield
-    plt.close("all")
-
-
 @case(may_not_know=True)
 def plot_cloud(of):
     yield from plane(plot.plot_cloud(of.cloud, view="back"), of.tips)

@@ -26,14 +26,6 @@ def drawn():
     return cloud, activation_distance(cloud, 1 / 60)
 
 
-@pytest.fixture(autouse=True)
-def few_pixels(monkeypatch):
-    """No law here depends on their number."""
-    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
-    yield
-    plt.close("all")
-
-
 def image_colors(ax) -> set[tuple[int, ...]]:
     rgba = np.asarray(ax.images[0].get_array())
     return {tuple(int(c) for c in rgb) for rgb in rgba[rgba[..., 3] == 255][:, :3]}

@@ -215,12 +215,6 @@ def figures(lce, shape, cloud):
 
 
 class TestDrawn:
-    @pytest.fixture(autouse=True)
-    def _closed(self):
-        plt = pytest.importorskip("matplotlib.pyplot")
-        yield
-        plt.close("all")
-
     @pytest.mark.parametrize("name", FIGURES)
     def test_a_picture_in_mm_is_a_thousand_times_one_in_m(self, name, figures):
         limits = {}

@@ -117,7 +117,7 @@ def test_a_search_replaces_files_of_searches_and_no_others(one, several, tmp_pat
 
 
 def test_pictures_say_their_units_and_tell_the_infeasible_by_shape(one, several):
-    plt = pytest.importorskip("matplotlib.pyplot")
+    pytest.importorskip("matplotlib.pyplot")
     figure = sr.plot.plot_search(one, unit="mm")
     assert figure.axes[0].get_ylabel() == "mass [kg]"
     labels = figure.axes[0].get_legend_handles_labels()[1]
@@ -130,7 +130,6 @@ def test_pictures_say_their_units_and_tell_the_infeasible_by_shape(one, several)
     met = met.isel(design=met.front.values)
     drawn = np.concatenate([c.get_offsets() for c in figure.axes[0].collections[-1:]])
     np.testing.assert_allclose(drawn[:, 1], 1e2 * met.objective_value.values[:, 1])
-    plt.close("all")
 
 
 def test_a_file_says_the_same_as_the_call(folder):

@@ -61,7 +61,7 @@ def test_the_example_of_five_places_is_met():
 
 
 def test_reached_and_missed_places_differ_by_their_markers_and_gaps_are_lines():
-    plt = pytest.importorskip("matplotlib.pyplot")
+    pytest.importorskip("matplotlib.pyplot")
     arm = sr.designs.minimal_trunk()
     tips = sr.tip_positions(arm, [[-0.5, -0.4, -0.3], [-0.1, -0.2, -0.9]])
     places = np.concatenate([tips, [[0.0, 0.0, 1.2]]])
@@ -74,4 +74,3 @@ def test_reached_and_missed_places_differ_by_their_markers_and_gaps_are_lines():
     (gap,) = [line for line in lines if line.get_label() == "gap"]
     ends = np.array([places[2], check.nearest[0, 2]])[:, [0, 2]]
     np.testing.assert_allclose(gap.get_xydata(), ends, atol=1e-12)
-    plt.close("all")
