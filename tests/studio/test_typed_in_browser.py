@@ -105,7 +105,7 @@ def test_refused_numbers_say_why_under_their_field_in_its_own_unit(tab):
 
 @pytest.mark.large
 def test_an_activation_below_zero_is_typed(tab):
-    tab.open("Activation")
+    tab.open("Move")
     typed(tab, "γ left", "-0.05")
     tab.wait(lambda: tab.session.state.activation[0] == -0.05, "the bundle pulls")
 

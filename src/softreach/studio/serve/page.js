@@ -64,9 +64,9 @@ document.documentElement.addEventListener("keydown", function (event) {
   }
 
   function toggleTable() {
-    var table = document.querySelector("dialog.keys") || tableOfKeys();
-    if (table.open) table.close();
-    else table.showModal();
+    var shown = document.querySelector("dialog.keys");
+    if (shown) shown.close();
+    else tableOfKeys().showModal();
   }
 
   function tableOfKeys() {
@@ -80,6 +80,7 @@ document.documentElement.addEventListener("keydown", function (event) {
     });
     dialog.append(table);
     dialog.addEventListener("click", function () { dialog.close(); });
+    dialog.addEventListener("close", function () { dialog.remove(); });
     return document.body.appendChild(dialog);
   }
 
