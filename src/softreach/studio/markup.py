@@ -25,7 +25,8 @@ div:has(.mantine-Slider-root) + form
 div:has(.mantine-Slider-root) + form input {padding:0 0.3em;letter-spacing:-0.5px}
 div:has(.mantine-Slider-root) + form div:has(> * > label):not(:has(input)) {display:none}
 div:has(> [data-softreach]) + div:has(> button)
-  {width:max-content;margin:-2.5em 0.5em 0 auto !important;position:relative;z-index:4}
+  {width:max-content;height:0;padding:0 !important;margin:0 0.5em 0 auto !important;
+  position:relative;top:-2.5em;z-index:4}
 """
 _ALERT = f"color:var(--alert,#c92a2a);{_SMALL};white-space:pre-line"
 
