@@ -9,11 +9,12 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
+from softreach.studio.expressions import vector_kind
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.state import StudioState, rod_of
-from softreach.studio.widgets import VECTOR, Line, TypedField
+from softreach.studio.widgets import Line, TypedField
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -66,9 +67,9 @@ class InversePanel:
         self._buttons: list[tuple[Any, Any]] = []
         with tab:
             self._text = Line(gui, _HINT)
-            self._target = TypedField(
-                gui, "target / L", _straight_tip(session), "Where the tip should go [L]", VECTOR
-            )
+            kind = vector_kind("L", lambda: session.state.design.length)
+            hint = "Where the tip should go [L]"
+            self._target = TypedField(gui, "target / L", _straight_tip(session), hint, kind)
             self._clicks = gui.add_checkbox("clicks set the target", False, hint=_ABOUT_CLICKS)
             solve = gui.add_button("Solve", hint="Finds every activation that reaches the target")
             self._fields.checkbox(
