@@ -17,7 +17,8 @@ from softreach.studio.shown_parameters import (
     slider_ends,
     slider_parameters,
 )
-from softreach.studio.state import StudioState
+from softreach.studio.slopes import NO_BAR, slope_bars
+from softreach.studio.state import StudioState, rod_of
 from softreach.studio.widgets import Line, SliderField
 from softreach.support.errors import InvalidDesign, SoftreachError
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
+_ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_KEEP = "Keeps what the design reaches now, in gray, to compare others with"
 _ABOUT_BESIDE = "Stands the reference beside the design, pulled as the design is"
 
@@ -34,8 +36,10 @@ class DesignPanel:
     """All sliders of a design together; a change may be valid only together with others."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._session, self._lock = session, threading.RLock()
+        self._gui, self._session, self._lock = gui, session, threading.RLock()
         self._rows: list[tuple[ShownParameter, SliderField]] = []
+        self._bars: dict[str, Line] = {}
+        """Under each slider, by the name of its parameter."""
         self._base: Manipulator | None = None
         """The design that the sliders were made for."""
         self._made: Manipulator | None = None
@@ -46,6 +50,8 @@ class DesignPanel:
         self._sliders, self._others = Fields(session), Fields(session)
         with tab:
             self._folder = gui.add_folder("design")
+            with self._folder:
+                self._about_bars = Line(gui)
             with gui.add_folder("compare"):
                 self._reference = Line(gui)
                 self._others.button(
@@ -76,6 +82,19 @@ class DesignPanel:
                     self._build(session.state.design)
             if not session.busy and session.state.design != self._ended:
                 self._end(session.state.design)
+            self._show_slopes(session)
+
+    def _show_slopes(self, session: Session) -> None:
+        """Bars of the same scale under the sliders; until they are known, room for them."""
+        slopes, design = session.slopes, session.state.design
+        if slopes is None:
+            bars = dict.fromkeys(self._bars, NO_BAR) if rod_of(design).box.dimension > 2 else {}
+        else:
+            sliders = {row.name: (row, field.ends[1] - field.ends[0]) for row, field in self._rows}
+            bars = slope_bars(slopes, sliders, old=slopes.arm != design)
+        self._about_bars.say(*([_ABOUT_BARS] if bars else []))
+        for name, line in self._bars.items():
+            line.show(bars.get(name, ""))
 
     def _forget(self) -> None:
         if self._session.state.side_by_side and self._session.state.reference is not None:
@@ -99,6 +118,9 @@ class DesignPanel:
 
     def _build(self, arm: Manipulator) -> None:
         self._sliders.remove()
+        for line in self._bars.values():
+            line.remove()
+        self._bars = {}
         self._base = self._made = arm
         self._ended, self._refused = None, False
         self._sliders = Fields(self._session, words=self._words)
@@ -109,9 +131,11 @@ class DesignPanel:
 
     def _slider(self, parameter: ShownParameter) -> SliderField:
         at = Attribute(lambda _: parameter.shown, lambda state, _: self._changed(state))
-        return self._sliders.slider(
+        field = self._sliders.slider(
             parameter.label, parameter.limits, parameter.step, at, parameter.hint
         )
+        self._bars[parameter.name] = Line(self._gui)
+        return field
 
     def _changed(self, state: StudioState) -> StudioState:
         """The design of all sliders; a slider may show rounded what stays as it is."""
