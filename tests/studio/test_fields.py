@@ -231,6 +231,27 @@ def test_fields_follow_a_design_that_others_change(page):
     assert bound.value == 1.2
 
 
+def test_an_expression_is_applied_and_its_number_shown_in_its_place(page):
+    _, bound, _, form, text, line = field(page)
+    typed(text, form, "1/2 - 0.2")
+    assert (bound.value, text.value, line.content) == (0.3, "0.3", "")
+    page.state = page.state.replace(design=changed(page.state.design, {"length": 0.2}))
+    typed(text, form, "5 cm")
+    assert (page.state.appearance.slice.center, text.value) == (0.25, "0.25")
+
+
+def test_a_wrong_expression_stays_beside_one_line_and_changes_nothing(page):
+    _, bound, _, form, text, line = field(page)
+    for wrong, why in (("5 deg", "deg is not expected there"), ("1/(2-2)", "it is not finite")):
+        typed(text, form, wrong)
+        assert (bound.value, text.value, page.updates) == (0.0, wrong, 0)
+        assert f"&#x27;{wrong}&#x27;: must be a number" in line.content
+        assert why in line.content
+    typed(text, form, "9000 - 4000")  # read, but no place of a slice
+    assert (text.value, page.updates) == ("9000 - 4000", 0)
+    assert "slice.center = 5000" in line.content
+
+
 def test_fields_that_are_removed_leave_nothing(page):
     fields = field(page)[0]
     fields.button("Rest", lambda state: state, "hint")

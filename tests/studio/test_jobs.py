@@ -15,6 +15,7 @@ from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
 from softreach.studio.jobs.plots import PLOT_JOBS
 from softreach.studio.jobs.reach import (
     ComputeReach,
+    DifferentiateVolume,
     DrawArm,
     DrawCloud,
     DrawSurfaces,
@@ -54,7 +55,13 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
         state.showing(dark=True): {SetTheme, DrawSearch, DrawSurfaces},
         state.replace(needs=NEEDS): {CheckNeeds, FollowCamera},
         state.replace(reference=trunk): {DrawReference},
-        state.replace(design=other): {ComputeReach, DrawArm, DrawMap, DrawSample},
+        state.replace(design=other): {
+            ComputeReach,
+            DifferentiateVolume,
+            DrawArm,
+            DrawMap,
+            DrawSample,
+        },
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
     }
     for new, jobs in changes.items():
@@ -70,6 +77,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
     moves = {
         full.replace(design=other): {
             ComputeReach,
+            DifferentiateVolume,
             DrawArm,
             DrawMap,
             DrawSample,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm.parameters import changed
+from softreach.arm.parameters import changed, find_parameter
 from softreach.cloud.volume import volume_curve
 from softreach.studio.settings import PlotSettings
 from softreach.studio.state import Slice
@@ -65,9 +65,31 @@ def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
     assert found.complete
     assert (np.diff(found.value) > 0).all()
     assert found.refused  # the steepest tapers leave no tip
-    tab.page.get_by_text(f"{found.refused} values make no design").wait_for()
+    tab.page.get_by_text(f"{len(found.refused)} values make no design").wait_for()
     made = changed(design, {"taper": np.radians(found.value[1])})
     assert found.volume[1] == pytest.approx(sr.reachable_set(made).volume, rel=0.02)
+
+
+LINES = """Object.values(window.__viserTestpoints?.uplots ?? {}).map(({chart}) => {
+    const x = chart.data[0], line = chart.data[chart.data.length - 1];
+    return [...x].filter((_, k) => line[k] === 0 || line[k] === 1);
+})"""
+"""Places of the two ends of the line in each chart of the page."""
+
+
+def test_a_line_stands_at_the_value_of_the_slider_and_follows_it(tab):
+    settings = PlotSettings(shown=("sweep",), parameter="taper")
+    tab.session.update(lambda s: s.showing(plots=settings))
+    tab.settle()
+    tab.wait(lambda: [2, 2] in tab.page.evaluate(LINES), "the line stands at 2 degrees")
+    known = tab.session.figures.plots["sweep"]
+    tab.drag("taper φ [deg]", -20)
+    tab.settle()
+    arm = tab.session.state.design
+    there = pytest.approx([np.degrees(find_parameter(arm, "taper").value(arm))] * 2)
+    tab.wait(lambda: there in tab.page.evaluate(LINES), "the line follows")
+    after = tab.session.figures.plots["sweep"]
+    assert {*known.value} < {*after.value}  # nothing was computed twice
 
 
 @pytest.mark.large

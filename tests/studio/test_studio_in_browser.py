@@ -18,6 +18,7 @@ from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.start import start_on_store
 from softreach.studio.state import Slice
 from softreach.studio.tabs.inverse import InversePanel
+from softreach.studio.work import all_cores
 from tests.studio.conftest import SMALL
 from tests.studio.tab import PATIENCE, SIZE, Tab, unit
 
@@ -270,3 +271,22 @@ def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
         tab.wait(lambda: tab.drawn("/atlas/here"), "it is marked on the map")
         assert not tab.errors
         tab.close()
+
+
+def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_design(tab):
+    bars = tab.page.locator("[role=img][title*='change of V']")
+    tab.wait(lambda: tab.session.slopes and bars.count(), "the bars are there")
+    slopes = tab.session.slopes
+    assert bars.count() == len(slopes.slopes)
+    slope, first = slopes.slopes["revolution"], bars.first
+    assert f"∂V/∂(revolution) = {slope.value:.5f}"[:22] in first.get_attribute("title")
+    percent = 100 * 0.01 * 359 * slope.value / slopes.volume
+    assert float(first.inner_text().split()[0]) == pytest.approx(percent, rel=0.01)
+    box, thumb = first.bounding_box(), tab.slider("revolution Ω [deg]").bounding_box()
+    assert 0 < box["y"] - thumb["y"] < 45
+    with all_cores:  # so that the new volume waits
+        tab.drag("revolution Ω [deg]", 20)
+        tab.page.locator("[role=img][title^='of the design before']").first.wait_for()
+    tab.settle()
+    assert tab.session.slopes.arm == tab.session.state.design
+    tab.page.locator("[role=img][title^='of the design before']").first.wait_for(state="detached")

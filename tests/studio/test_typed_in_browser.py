@@ -150,3 +150,29 @@ def test_keys_choose_tabs_and_show_their_table_but_not_while_one_types(tab):
         assert chosen() == names[0]
         assert not table.is_visible()
     tab.page.keyboard.press("Escape")  # restores what was in the field
+
+
+def test_an_expression_with_a_unit_is_worked_out_and_a_wrong_one_says_why(tab):
+    place = typed(tab, "taper φ [deg]", "pi/120 rad")
+    tab.wait(lambda: value(tab, "taper") == pytest.approx(np.radians(1.5)), "it is applied")
+    tab.wait(lambda: place.input_value() == "1.5", "its number is shown")
+    before = tab.session.state.design
+    place = typed(tab, "taper φ [deg]", "2 cm")
+    alert = tab.page.get_by_role("alert").filter(has_text="cm is not expected there")
+    alert.wait_for()
+    assert place.input_value() == "2 cm"
+    assert tab.session.state.design == before
+    typed(tab, "taper φ [deg]", "2*0.75")  # what it is already
+    alert.wait_for(state="hidden")
+
+
+def test_components_of_a_typed_target_are_expressions(tab):
+    tab.open("Move")
+    place = tab.page.locator("xpath=//label[normalize-space()='target / L']/following::input[1]")
+    place.fill("(0.1*2 m, 0, 30 cm + 0.4 m)")
+    place.press("Enter")
+    tab.wait(lambda: tab.session.state.target is not None, "it is applied")
+    np.testing.assert_allclose(tab.session.state.target, (0.2, 0.0, 0.7), atol=1e-12)
+    length = tab.session.state.design.length
+    shown = f"{0.2 / length:.12g}, 0, {0.7 / length:.12g}"
+    tab.wait(lambda: place.input_value() == shown, "its numbers are shown")

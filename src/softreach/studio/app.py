@@ -22,6 +22,7 @@ from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
 from softreach.studio.jobs.plots import PLOT_JOBS
 from softreach.studio.jobs.reach import (
     ComputeReach,
+    DifferentiateVolume,
     DrawArm,
     DrawCloud,
     DrawSurfaces,
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
 __all__ = ["JOBS", "Studio"]
 
 JOBS: tuple[type[Job], ...] = (
-    ComputeReach, DrawArm, DrawCloud, DrawSurfaces, FollowCamera,
+    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurfaces, FollowCamera,
     DrawFree, DrawReference, DrawReferenceArm,
     SolveInverse, DragTip,
     FollowPath, PlayPath, WriteMovie,

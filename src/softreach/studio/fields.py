@@ -9,8 +9,9 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from softreach.studio.expressions import number_kind, unit_in, vector_kind
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import VECTOR, Line, SliderField, TypedField
+from softreach.studio.widgets import Line, SliderField, TypedField
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -97,15 +98,18 @@ class Fields:
         self, label: str, ends: tuple[float, float], step: float, at: Attribute, hint: str
     ) -> SliderField:
         """Add a slider beside a field for the same number."""
-        return self.bind(SliderField(self._gui, label, ends, step, self._read(at), hint), at)
+        kind = number_kind(unit_in(label), self._length)
+        return self.bind(SliderField(self._gui, label, ends, step, self._read(at), hint, kind), at)
 
     def number(self, label: str, at: Attribute, hint: str) -> TypedField:
         """Add a field for a number."""
-        return self.bind(TypedField(self._gui, label, self._read(at), hint), at)
+        kind = number_kind(unit_in(label), self._length)
+        return self.bind(TypedField(self._gui, label, self._read(at), hint, kind), at)
 
     def vector(self, label: str, at: Attribute, hint: str) -> TypedField:
         """Add a field for three numbers."""
-        return self.bind(TypedField(self._gui, label, self._read(at), hint, VECTOR), at)
+        kind = vector_kind(unit_in(label), self._length)
+        return self.bind(TypedField(self._gui, label, self._read(at), hint, kind), at)
 
     def button(
         self, label: str, change: Callable[[StudioState], StudioState], hint: str, **looks: Any
@@ -188,6 +192,10 @@ class Fields:
         for widget in self._widgets:
             widget.remove()
         self._bound, self._widgets, self._refused = [], [], None
+
+    def _length(self) -> float:
+        """L [m], which may be typed as a unit."""
+        return self._session.state.design.length
 
     def _read(self, at: Attribute) -> Any:
         return at.read(self._session.state)

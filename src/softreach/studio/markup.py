@@ -30,6 +30,15 @@ div:has(> [data-softreach]) + div:has(> button)
 """
 _ALERT = f"color:var(--alert,#c92a2a);{_SMALL};white-space:pre-line"
 
+_BAR = (
+    "display:flex;align-items:center;padding:0 7.4rem 0.4em 0.8em;font-size:0.72em;"
+    "min-height:1.2em;line-height:1.2;cursor:help;font-variant-numeric:tabular-nums"
+)
+_TRACK = "flex:1;position:relative;height:5px;background:rgba(128,128,128,0.2)"
+_IN_TRACK = "position:absolute;top:0;height:100%"
+_BEFORE = "flex:none;width:102px;white-space:nowrap"
+_GROWS, _SHRINKS = "#3a7fc8", "#d9731a"  # told apart by the color-blind, on white and on black
+
 _WIDE = "overflow-x:auto;padding:0 0.8em 0.6em"
 _TABLE = (
     "border-collapse:collapse;font-size:0.8em;line-height:1.35;font-variant-numeric:tabular-nums"
@@ -105,6 +114,26 @@ def link(address: str, text: str, rest: str) -> str:
     """A link that opens a new tab, and text after it, as HTML."""
     target = f'<a href="{inline(address)}" target="_blank" rel="noopener">{inline(text)}</a>'
     return f'<div style="{_SMALL}">{target}{inline(rest)}</div>'
+
+
+def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
+    """A bar from the middle of its track under a slider, text under its label, as HTML.
+
+    Args:
+        share: Its length over that of half of the track, to the right for positive ones.
+        text: Before it.
+        meaning: What it says when pointed at.
+        faded: Whether it is pale.
+    """
+    side, color = ("left", _GROWS) if share > 0 else ("right", _SHRINKS)
+    length = f"{side}:50%;width:{50 * min(abs(share), 1.0):.2f}%;background:{color}"
+    meaning, looks = html.escape(meaning), f"{_BAR};opacity:{0.4 if faded else 1}"
+    return (
+        f'<div role="img" title="{meaning}" aria-label="{inline(text)}: {meaning}" style="{looks}">'
+        f'<div style="{_BEFORE}">{inline(text)}</div>'
+        f'<div style="{_TRACK}"><div style="{_IN_TRACK};{length}"></div>'
+        f'<div style="{_IN_TRACK};left:50%;width:1px;background:currentColor"></div></div></div>'
+    )
 
 
 def spread(*texts: str) -> str:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from softreach.studio.jobs.calibration import Bench
     from softreach.studio.jobs.search import SearchRun
     from softreach.studio.scene.drag import TipDrag
+    from softreach.studio.slopes import VolumeSlopes
 
 __all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
 
@@ -165,6 +166,8 @@ class Session:
         """Number of changes that widgets have to follow."""
         self.reach: Reach | None = start.reach
         """Reach of the design, or of the design before it until that is known."""
+        self.slopes: VolumeSlopes | None = None
+        """Change of its volume by each slider, or of the design before until that is known."""
         self.refusal = ""
         """Reason why nothing can be computed of the design."""
         self.canceled = False
@@ -419,7 +422,7 @@ class Session:
         # viser may hold on to what belongs to a page for a while; clouds are large.
         self.reach = self.free = self.reference = self.answer = self.atlas = None
         self.panels, self.trail, self.figures, self.bench = [], [], Figures(), None
-        self.check = self.search = None
+        self.check = self.search = self.slopes = None
         self._shown.clear()
 
     def _rested(self) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
+from softreach.support.quantity import shortened
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -87,7 +88,8 @@ def number_of(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _number_text(value: float) -> str:
+def number_text(value: float) -> str:
+    """A number as a person would type it."""
     return f"{value:.12g}"
 
 
@@ -104,17 +106,14 @@ class TextKind(NamedTuple):
     demand: str
     """Demand on a text, as in "must be a number"."""
     value: Callable[[str], Any]
-    """From a text; None if it is no such value."""
+    """From a text; None if it is no such value, or a `ValueError` that says what is wrong."""
     text: Callable[[Any], str]
     """From a value, as a person would type it."""
+    is_worked_out: Callable[[str], bool] = lambda _: False
+    """True for a text in whose place its value is shown once it is applied."""
 
 
-NUMBER = TextKind("a number", number_of, _number_text)
-VECTOR = TextKind(
-    "three numbers, such as 0, 0, -9.81",
-    vector_of,
-    lambda values: ", ".join(map(_number_text, values)),
-)
+NUMBER = TextKind("a number", number_of, number_text)
 
 
 class TypedField:
@@ -124,6 +123,7 @@ class TypedField:
         self, gui: GuiApi, label: str, value: Any, hint: str, kind: TextKind = NUMBER
     ) -> None:
         self._kind, self._value = kind, value
+        self._is_refused = False
         self._lock = threading.RLock()
         self._callbacks: list[Callable[[Any], object]] = []
         self._form = gui.add_form(None)
@@ -154,6 +154,7 @@ class TypedField:
 
     def warn(self, text: str) -> None:
         """Say under the field why its value is refused; "" for nothing."""
+        self._is_refused = bool(text)
         self._message.warn(text)
 
     def remove(self) -> None:
@@ -168,14 +169,20 @@ class TypedField:
             self._message.say(*((_UNAPPLIED,) if unapplied else ()))
 
     def _submitted(self, event: Any) -> None:
-        value = self._kind.value(self._text.value)
+        text = self._text.value
+        try:
+            value, wrong = self._kind.value(text), ""
+        except ValueError as error:
+            value, wrong = None, f"; {error}"
         if value is None:
-            self._message.warn(f"{self._text.value!r}: must be {self._kind.demand}")
+            self._message.warn(f"{shortened(text)!r}: must be {self._kind.demand}{wrong}")
             return
         with self._lock:
             self._value = value
-            self._message.warn("")
+            self.warn("")
         self._apply(event)
+        if not self._is_refused and self._kind.is_worked_out(text):
+            self._text.value = self._kind.text(self._value)
 
     def _apply(self, event: Any) -> None:
         self._follow()
@@ -197,12 +204,13 @@ class SliderField(TypedField):
         step: float,
         value: float,
         hint: str = "",
+        kind: TextKind = NUMBER,
     ) -> None:
         self._ends = ends
         self._slider = gui.add_slider(label, *ends, step, self._within(value), hint=hint or None)
         self._slider.precision = _PRECISION
         self._thumb = self._slider.value
-        super().__init__(gui, "", value, hint)
+        super().__init__(gui, "", value, hint, kind)
         self._slider.on_update(self._dragged)
 
     @property

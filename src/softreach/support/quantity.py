@@ -15,6 +15,7 @@ __all__ = [
     "read_quantity",
     "read_whole_number",
     "shortened",
+    "sizes_in",
     "unit_names",
 ]
 
@@ -112,6 +113,17 @@ def unit_names(unit: str) -> tuple[str, ...]:
     if unit == "rad":
         return _ANGLES
     return () if unit == "1" else tuple(_UNITS.get(unit, (unit,)))
+
+
+def sizes_in(unit: str) -> dict[str, float]:
+    """The units that may be written in place of one, such as "mm", with their sizes in it."""
+    if unit in _ANGLES:
+        sizes = {name: 1.0 if name == "rad" else math.radians(1.0) for name in _ANGLES}
+        return {
+            name: 1.0 if size == sizes[unit] else size / sizes[unit] for name, size in sizes.items()
+        }
+    known = next((units for units in _UNITS.values() if unit in units), {unit: "1"})
+    return {name: float(Decimal(size) / Decimal(known[unit])) for name, size in known.items()}
 
 
 def read_quantity(text: str, unit: str) -> float:

@@ -112,7 +112,7 @@ def gradient_of(
         solid: Reachable set of three free bundles or more.
         names: Names of parameters.
         accuracy: That to which the set was computed.
-        progress: Called with the number of parameters done since its last call.
+        progress: Called with the number of parameters done since its last call, often with 0.
     """
     if not isinstance(solid, ReachableSolid):
         raise InvalidInput("arm", "a set without a volume", "one of three free bundles or more")
@@ -121,7 +121,7 @@ def gradient_of(
     if solid.lost_share > 0.0:
         volume, convex = _by_differences(solid, wanted, accuracy, progress)
     else:
-        volume, convex = _swept(solid, wanted, accuracy)
+        volume, convex = _swept(solid, wanted, accuracy, progress)
         progress(len(names))
     return VolumeGradient(
         solid=solid,
@@ -199,13 +199,13 @@ class _Swept(NamedTuple):
 
 
 def _swept(
-    solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float
+    solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float, progress: Progress
 ) -> tuple[_Swept, _Swept]:
     """Derivatives of volume and convex volume by what boundary and corners of the hull sweep."""
     rod = solid.tip_map
     if solid.route == "flux" or rod.supports_unstable:
         rod = refined(rod, flux_tol(rod))
-    tips = TipDerivatives(rod, parameters, _TOL)
+    tips = TipDerivatives(rod, parameters, _TOL, progress)
     volume = _searched(solid, tips) if solid.route == "search" else _flowing(solid, tips, accuracy)
     return volume, _dragged(solid, tips)
 

@@ -14,6 +14,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.arrays import Array
+from softreach.support.progress import Progress, silent
 from softreach.workspace.shifts import Shifts, shifts_along
 
 __all__ = ["TipDerivatives"]
@@ -32,7 +33,13 @@ class TipDerivatives:
     and does not become noise. At the end of a parameter's range both neighbors are on one side.
     """
 
-    def __init__(self, rod: TipMap, parameters: Sequence[Parameter], tol: float = 0.0) -> None:
+    def __init__(
+        self,
+        rod: TipMap,
+        parameters: Sequence[Parameter],
+        tol: float = 0.0,
+        progress: Progress = silent,
+    ) -> None:
         """Make the neighbors.
 
         Args:
@@ -40,12 +47,14 @@ class TipDerivatives:
                 change of a parameter by itself.
             parameters: The parameters.
             tol: A larger tolerance of a free arm, for which fewer steps are made: theory (27).
+            progress: Called with 0 before each parameter, from any thread; it may raise to stop.
 
         Raises:
             InvalidInput: A parameter counts something, has no value, or its change holds or frees a
                 bundle.
             InvalidDesign: The design has no neighbors with other values of a parameter.
         """
+        self._progress = progress
         relative = _LOADED_STEP if rod.supports_unstable else _STEP
         self._shifts = [shifts_along(rod.arm, each, 1, relative) for each in parameters]
         steps = rod.steps
@@ -81,6 +90,7 @@ class TipDerivatives:
         out = np.zeros((count, 3, len(self._shifts)))
 
         def task(k: int) -> None:
+            self._progress(0)
             for weight, rod in self._rods[k]:
                 out[:, :, k] += weight * stable_tips(rod).tips(activations(rod))
 

@@ -16,6 +16,7 @@ from softreach.studio.scene.camera import Viewpoint, is_behind
 from softreach.studio.scene.clouds import shown_color
 from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.session import Job, Session
+from softreach.studio.slopes import volume_slopes
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck
 from softreach.support.errors import InvalidInput
@@ -38,10 +39,12 @@ class ComputeReach(Job):
         session, state = self.session, self.session.state
         if _is_complete(session.reach, state):
             _draw_cloud(session)
+            session.follow(DifferentiateVolume)
             return
         session.refusal = ""
         try:
             self._compute(state, check)
+            session.follow(DifferentiateVolume)
         except InvalidInput as error:
             _withdraw(session, str(error))
         except OverBudget as error:
@@ -56,6 +59,27 @@ class ComputeReach(Job):
             session.reach = reach
             _count_shown(session, check)
             _draw_cloud(session)
+
+
+class DifferentiateVolume(Job):
+    """How the volume changes with each slider, once it is known; dropped when one moves."""
+
+    depends_on = ("design",)
+
+    def run(self, check: StaleCheck) -> None:
+        """Differentiate the volume, if that is of the design and was not done yet."""
+        check()
+        session, reach = self.session, self.session.reach
+        if reach is None or not reach.fine or reach.arm != session.state.design:
+            return
+        if self._done is not reach.exact or session.slopes is None:
+            slopes = volume_slopes(reach, session.quality, check)
+            check()
+            session.slopes, self._done = slopes, reach.exact
+            session.show()
+
+    _done: object = None
+    """The set whose volume was differentiated last."""
 
 
 class DrawCloud(Job):

@@ -85,6 +85,12 @@ def complete_reach(session: Session) -> Reach | None:
 
 _AXIS_INK, _GRID = "#868e96", "rgba(134,142,150,0.25)"  # legible on white and on black
 _HEIGHT = 210  # pixels
+_MARK = "mark"
+_HERE: Any = {
+    "label": "this design", "scale": _MARK, "stroke": "#d9731a", "width": 1.5, "dash": (5.0, 3.0),
+    "points": {"show": False},
+}  # fmt: skip
+"""A line across the whole chart, whatever the scale of its curves."""
 
 
 class Curve(NamedTuple):
@@ -111,11 +117,19 @@ class Chart:
         """
         self._gui, self._container, self._y = gui, container, y
         across = {"time": False, **({"distr": 3, "log": 10} if logarithmic else {})}
-        self._scales: Any = {"x": across, "y": {"auto": True}}
+        whole = {"auto": False, "range": (0.0, 1.0)}
+        self._scales: Any = {"x": across, "y": {"auto": True}, _MARK: whole}
         self._widget: Any = None
         self._made_of: object = None
 
-    def show(self, label: str, x: Array, curves: Sequence[Curve], values: Sequence[Array]) -> None:
+    def show(
+        self,
+        label: str,
+        x: Array,
+        curves: Sequence[Curve],
+        values: Sequence[Array],
+        here: float | None = None,
+    ) -> None:
         """Draw curves; those of the same names over the same axis are moved, others made anew.
 
         Args:
@@ -123,9 +137,12 @@ class Chart:
             x: Ascending, shape (n,).
             curves: Their names and looks.
             values: Of each, shape (n,).
+            here: Where a vertical line is, on the horizontal axis; None for none.
         """
         data = (np.asarray(x, float), *(np.asarray(each, float) for each in values))
-        made_of = label, *curves
+        if here is not None:
+            data = _marked(data, here)
+        made_of = label, here is None, *curves
         if made_of == self._made_of:
             self._widget.data = data
             return
@@ -135,11 +152,20 @@ class Chart:
         with self._container:
             self._widget = self._gui.add_uplot(
                 data,
-                ({"label": label}, *map(_series, curves)),
+                ({"label": label}, *map(_series, curves), *([] if here is None else [_HERE])),
                 scales=self._scales,
                 axes=(_axis(label), _axis(self._y) | {"size": 56}),
                 height=_HEIGHT,
             )
+
+
+def _marked(data: Sequence[Array], here: float) -> tuple[Array, ...]:
+    """The data with a vertical line: two points at one place, which belong to no curve."""
+    at = int(np.searchsorted(data[0], here, side="right"))
+    x, *values = (np.insert(each, at, 2 * [here if each is data[0] else np.nan]) for each in data)
+    line = np.full(len(x), np.nan)
+    line[at : at + 2] = 0.0, 1.0
+    return x, *values, line
 
 
 def _axis(label: str) -> Any:

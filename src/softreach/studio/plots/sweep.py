@@ -16,7 +16,7 @@ from softreach.studio.reach import Quality, exact_set
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck, all_cores
-from softreach.support.errors import SoftreachError
+from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -40,18 +40,29 @@ class Sweep(NamedTuple):
     """In the unit that is shown, ascending."""
     volume: Array
     """[L³]."""
-    refused: int = 0
+    refused: tuple[float, ...] = ()
     """Values that make no design, or one that takes too long."""
     complete: bool = False
 
     def having(self, value: float, volume: float | None) -> Sweep:
         """With one more value; None for no volume there."""
         if volume is None:
-            return self._replace(refused=self.refused + 1)
+            return self._replace(refused=(*self.refused, value))
         at = int(np.searchsorted(self.value, value))
         return self._replace(
             value=np.insert(self.value, at, value), volume=np.insert(self.volume, at, volume)
         )
+
+    def moved(self, arm: Manipulator, parameter: ShownParameter) -> Sweep | None:
+        """As of another design on the same curve; None if it differs in anything else."""
+        if parameter.name != self.parameter.name:
+            return None
+        here = {parameter.name: parameter.shown * parameter.scale}
+        try:
+            same = changed(self.arm, here) == changed(arm, here)
+        except InvalidDesign:
+            return None
+        return self._replace(arm=arm, parameter=parameter, complete=False) if same else None
 
 
 def swept_parameter(state: StudioState) -> ShownParameter | None:
@@ -61,7 +72,11 @@ def swept_parameter(state: StudioState) -> ShownParameter | None:
 
 
 def sweep(
-    arm: Manipulator, parameter: ShownParameter, quality: Quality, check: StaleCheck
+    arm: Manipulator,
+    parameter: ShownParameter,
+    quality: Quality,
+    check: StaleCheck,
+    known: Sweep | None = None,
 ) -> Iterator[Sweep]:
     """Volumes over the range of a slider, from the design's own value outwards, one by one.
 
@@ -70,9 +85,14 @@ def sweep(
         parameter: What the slider changes.
         quality: How coarse, and how far off the tips may be.
         check: Called all the time; raises to stop.
+        known: Volumes of another design, which are kept where the slider alone tells them apart.
     """
-    volumes = Sweep(arm, parameter, np.empty(0), np.empty(0))
-    for value in _values(parameter):
+    moved = known.moved(arm, parameter) if known is not None else None
+    volumes = moved or Sweep(arm, parameter, np.empty(0), np.empty(0))
+    if moved is not None:
+        yield moved
+    done = {*volumes.value.tolist(), *volumes.refused}
+    for value in (value for value in _values(parameter) if value not in done):
         check()
         with all_cores:
             volume = _volume(arm, parameter, value, quality, check)
@@ -142,16 +162,17 @@ class SweepPlot(Plot):
             return
         subject = state.design, parameter
         if latest is None or not latest.complete or (latest.arm, latest.parameter) != subject:
-            yield from sweep(state.design, parameter, session.quality, check)
+            yield from sweep(state.design, parameter, session.quality, check, latest)
 
     def show(self, result: Sweep) -> str:
         """Draw the volumes that are known so far."""
         volumes = result.volume[result.value == result.parameter.shown]
         if len(result.value) > 1:
-            self._chart.show(result.parameter.label, result.value, (_VOLUME,), (result.volume,))
+            label, here = result.parameter.label, result.parameter.shown
+            self._chart.show(label, result.value, (_VOLUME,), (result.volume,), here)
         parts = [f"here V = {v:.4f} L³ at {result.parameter.shown:g}" for v in volumes]
         if result.refused:
-            parts.append(f"{result.refused} values make no design or take too long")
+            parts.append(f"{len(result.refused)} values make no design or take too long")
         return " · ".join([*parts, *([] if result.complete else ["computing ..."])])
 
 

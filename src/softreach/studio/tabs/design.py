@@ -17,9 +17,10 @@ from softreach.studio.shown_parameters import (
     slider_ends,
     slider_parameters,
 )
-from softreach.studio.state import StudioState
+from softreach.studio.slopes import NO_BAR, slope_bars
+from softreach.studio.state import StudioState, rod_of
 from softreach.studio.tabs.parts import typed_number
-from softreach.studio.widgets import SliderField
+from softreach.studio.widgets import Line, SliderField
 from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
+_ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _OWN = "this design"
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
 
@@ -35,8 +37,10 @@ class DesignPanel:
     """All sliders of a design together; a change may be valid only together with others."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._session, self._lock = session, threading.RLock()
+        self._gui, self._session, self._lock = gui, session, threading.RLock()
         self._rows: list[tuple[ShownParameter, SliderField]] = []
+        self._bars: dict[str, Line] = {}
+        """Under each slider, by the name of its parameter."""
         self._base: Manipulator | None = None
         """The design that the sliders were made for."""
         self._made: Manipulator | None = None
@@ -50,6 +54,8 @@ class DesignPanel:
         self._others = Fields(session, dragged=False)
         with tab:
             self._folder = gui.add_folder("design")
+            with self._folder:
+                self._about_bars = Line(gui)
             self._body = gui.add_folder("body")
             names = {"": _OWN} | {name: name for name in designs.__all__}
             self._others.dropdown("start from", names, Attribute(_name, _named), _ABOUT_START)
@@ -65,6 +71,19 @@ class DesignPanel:
                     self._build(session.state.design)
             if not session.busy and session.state.design != self._ended:
                 self._end(session.state.design)
+            self._show_slopes(session)
+
+    def _show_slopes(self, session: Session) -> None:
+        """Bars of the same scale under the sliders; until they are known, room for them."""
+        slopes, design = session.slopes, session.state.design
+        if slopes is None:
+            bars = dict.fromkeys(self._bars, NO_BAR) if rod_of(design).box.dimension > 2 else {}
+        else:
+            sliders = {row.name: (row, field.ends[1] - field.ends[0]) for row, field in self._rows}
+            bars = slope_bars(slopes, sliders, old=slopes.arm != design)
+        self._about_bars.say(*([_ABOUT_BARS] if bars else []))
+        for name, line in self._bars.items():
+            line.show(bars.get(name, ""))
 
     def _end(self, arm: Manipulator) -> None:
         """End the sliders where the design does, once nobody drags."""
@@ -76,6 +95,9 @@ class DesignPanel:
 
     def _build(self, arm: Manipulator) -> None:
         self._sliders.remove()
+        for line in self._bars.values():
+            line.remove()
+        self._bars = {}
         self._base = self._made = arm
         self._ended, self._refused = None, False
         self._sliders = Fields(self._session, words=self._words)
@@ -99,9 +121,11 @@ class DesignPanel:
 
     def _slider(self, parameter: ShownParameter) -> SliderField:
         at = Attribute(lambda _: parameter.shown, lambda state, _: self._changed(state))
-        return self._sliders.slider(
+        field = self._sliders.slider(
             parameter.label, parameter.limits, parameter.step, at, parameter.hint
         )
+        self._bars[parameter.name] = Line(self._gui)
+        return field
 
     def _changed(self, state: StudioState) -> StudioState:
         """The design of all sliders; a slider may show rounded what stays as it is."""

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
+from softreach.studio.expressions import vector_kind
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.state import MOUSE, StudioState, rod_of
-from softreach.studio.widgets import VECTOR, Line, TypedField, show_where
+from softreach.studio.widgets import Line, TypedField, show_where
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -68,9 +69,9 @@ class InversePanel:
         self._buttons: list[tuple[Any, Any]] = []
         with tab, gui.add_folder("reach a place"):
             self._text = Line(gui, _HINT)
-            self._target = TypedField(
-                gui, "target / L", _straight_tip(session), "Where the tip should go [L]", VECTOR
-            )
+            kind = vector_kind("L", lambda: session.state.design.length)
+            hint = "Where the tip should go [L]"
+            self._target = TypedField(gui, "target / L", _straight_tip(session), hint, kind)
             self._folder = gui.add_folder("activations that reach it", visible=False)
             self._clear = self._fields.button(
                 "Clear the target",

@@ -1,0 +1,144 @@
+"""The bars under the sliders: how the volume changes with each, exactly and on one scale."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.parameters import changed, parameters
+from softreach.studio.markup import bar
+from softreach.studio.reach import Quality, Reach, stages
+from softreach.studio.shown_parameters import slider_parameters
+from softreach.studio.slopes import Slope, VolumeSlopes, slope_bars, volume_slopes
+from softreach.studio.work import Dropped
+from softreach.workspace import volume_gradient
+
+QUALITY = Quality(coarse_level=10, fine_level=10, coarse_accuracy=0.02, fine_accuracy=0.01)
+
+
+def nothing() -> None:
+    pass
+
+
+def reach_of(arm) -> Reach:
+    return list(stages(arm, 10, QUALITY, nothing))[-1]
+
+
+@pytest.fixture(scope="module")
+def small_arm():
+    """In other units than L = 1 m."""
+    return changed(designs.minimal_trunk(), {"length": 0.3, "outer_radius": 0.02})
+
+
+@pytest.fixture(scope="module")
+def slopes(small_arm) -> VolumeSlopes:
+    return volume_slopes(reach_of(small_arm), QUALITY, nothing)
+
+
+def test_a_slope_is_that_of_the_library_in_units_of_the_slider(small_arm, slopes):
+    theirs = volume_gradient(small_arm, list(slopes.slopes), accuracy=QUALITY.fine_accuracy)
+    sliders = {each.name: each for each in slider_parameters(small_arm)}
+    for name, value, error in zip(
+        theirs.parameters, theirs.volume, theirs.volume_error, strict=True
+    ):
+        scale = sliders[name].scale / small_arm.length**3
+        ours = slopes.slopes[name]
+        assert abs(ours.value - value * scale) <= ours.error + error * scale
+        assert ours.error < 10 * error * scale
+
+
+def test_every_slider_that_moves_continuously_has_a_slope(small_arm, slopes):
+    known = parameters(small_arm)
+    sliders = {each.name for each in slider_parameters(small_arm)}
+    assert {name for name in sliders if known[name].whole} == sliders - set(slopes.slopes) != set()
+
+
+def test_where_there_is_no_volume_there_is_no_slope(trunk):
+    flat = trunk.replace(actuators=trunk.actuators[1:])
+    assert volume_slopes(reach_of(flat), QUALITY, nothing).slopes == {}
+
+
+def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
+    from softreach.studio import slopes as module
+    from softreach.support.errors import InvalidInput
+
+    plain = module.gradient_of
+
+    def without_taper(solid, names, *rest):
+        if "taper" in names:
+            raise InvalidInput("taper", 0.0, "one that holds no bundle")
+        return plain(solid, names, *rest)
+
+    monkeypatch.setattr(module, "gradient_of", without_taper)
+    slopes = volume_slopes(reach_of(trunk), QUALITY, nothing).slopes
+    assert "taper" not in slopes
+    assert len(slopes) > 5
+
+
+def test_a_set_that_loads_tear_has_no_slopes(trunk):
+    reach = reach_of(trunk)
+
+    class Torn(type(reach.exact)):
+        lost_share = 0.1
+
+    torn = object.__new__(Torn)
+    vars(torn).update({k: v for k, v in vars(reach.exact).items() if k != "lost_share"})
+    assert volume_slopes(replace(reach, exact=torn), QUALITY, nothing).slopes == {}
+
+
+def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
+    reach, calls = reach_of(trunk), []
+
+    def check() -> None:
+        calls.append(None)
+        if len(calls) == 5:
+            raise Dropped
+
+    with pytest.raises(Dropped):
+        volume_slopes(reach, QUALITY, check)
+    assert len(calls) == 5
+
+
+def test_what_takes_too_long_is_left_out(trunk):
+    hasty = replace(QUALITY, most_seconds=0.0)
+    assert volume_slopes(reach_of(trunk), hasty, nothing).slopes == {}
+
+
+def share_of(html: str) -> float:
+    """Signed length of a bar over that of half of its track."""
+    side, width = re.search(r"(left|right):50%;width:([\d.]+)%", html).groups()
+    return float(width) / 50 * (1 if side == "left" else -1)
+
+
+def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
+    sliders = {each.name: (each, each.high - each.low) for each in slider_parameters(trunk)}
+    found = VolumeSlopes(
+        trunk, 0.7, {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
+    )
+    bars = slope_bars(found, sliders, old=False)
+    assert list(bars) == [name for name in sliders if name in found.slopes]
+    changes = {name: found.slopes[name].value * sliders[name][1] for name in bars}
+    shares = {name: share_of(html) for name, html in bars.items()}
+    most = max(map(abs, changes.values()))
+    assert max(map(abs, shares.values())) == 1
+    np.testing.assert_allclose(
+        list(shares.values()), [change / most for change in changes.values()], atol=1e-3
+    )
+    assert "-1.00 ± 0.01 %" in bars["taper"]  # of V for 0.07 of its 7 degrees
+    assert "∂V/∂(taper) = -0.100 ± 0.001 L³ per deg" in bars["taper"]
+    assert "0.07 deg" in bars["taper"]
+    assert "+1.686 ± 0.001 %" in bars["extent"]
+    old = slope_bars(found, sliders, old=True)["taper"]
+    assert "of the design before" in old
+    assert "opacity:0.4" in old
+
+
+def test_a_bar_never_leaves_its_track_and_its_text_is_no_markup():
+    html = bar(-3.0, "<b>", '"><script>')
+    assert share_of(html) == -1
+    assert "<b>" not in html
+    assert "<script>" not in html
