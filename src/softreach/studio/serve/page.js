@@ -108,3 +108,19 @@ document.documentElement.addEventListener("keydown", function (event) {
     this.uniform1f(place, document.documentElement.dataset.mantineColorScheme === "dark" ? 1 : 0);
   };
 })();
+
+// Presentation: F hides the panel and leaves the scene, its key and its numbers; F or Escape ends it.
+(function () {
+  var root = document.documentElement;
+  addEventListener("keydown", function (event) {
+    var at = event.target, presenting = "presenting" in root.dataset;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+    if (at.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(at.tagName)) return;
+    if (event.key === "Escape" || event.key.toLowerCase() === "f" && presenting) {
+      delete root.dataset.presenting;
+    } else if (event.key.toLowerCase() === "f") {
+      if (at.blur) at.blur();  // what is hidden hears no more keys
+      root.dataset.presenting = "";
+    }
+  });
+})();
