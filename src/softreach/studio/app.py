@@ -17,6 +17,7 @@ from softreach.studio.fields import attempt
 from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
 from softreach.studio.jobs.calibration import DrawSample, FitArm
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
+from softreach.studio.jobs.morph import WriteMorph
 from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
 from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
 from softreach.studio.jobs.plots import PLOT_JOBS
@@ -26,6 +27,7 @@ from softreach.studio.jobs.reach import (
     DrawCloud,
     DrawSurfaces,
     FollowCamera,
+    SweepReach,
 )
 from softreach.studio.jobs.search import CheckNeeds, ConfirmNeeds, DrawSearch, SearchDesigns
 from softreach.studio.scene.camera import framing
@@ -48,10 +50,10 @@ if TYPE_CHECKING:
 __all__ = ["JOBS", "Studio"]
 
 JOBS: tuple[type[Job], ...] = (
-    ComputeReach, DrawArm, DrawCloud, DrawSurfaces, FollowCamera,
+    ComputeReach, DrawArm, DrawCloud, DrawSurfaces, FollowCamera, SweepReach,
     DrawFree, DrawReference, DrawReferenceArm,
     SolveInverse, DragTip,
-    FollowPath, PlayPath, WriteMovie,
+    FollowPath, PlayPath, WriteMovie, WriteMorph,
     DrawSample, FitArm,
     CheckNeeds, ConfirmNeeds, SearchDesigns, DrawSearch,
     *PLOT_JOBS,
@@ -76,6 +78,7 @@ class Studio:
         token: str = "",
         *,
         work: KeptWork | None = None,
+        sweeps: bool = False,
     ) -> None:
         """Start serving.
 
@@ -85,12 +88,14 @@ class Studio:
             port: None for a free one.
             token: What every page has to know; "" for nothing.
             work: Where the work is kept when tabs and server end; nowhere by default.
+            sweeps: Whether the arm of a fresh tab sweeps its reach once.
 
         Raises:
             InvalidInput: The address cannot be used.
             MissingExtra: viser is not installed.
         """
         self.start, self._token, self.work = start, token, work
+        self._sweeps = sweeps and start.state.camera is None
         self.snapshots = Snapshots(work)
         # On a thread of its own: two tabs that show each other's changes would wait for each other.
         self._retold = Latest(_ignored)
@@ -173,6 +178,7 @@ class Studio:
             session.take_up(*left)
         _furnish(session, page_url(self.server))
         session.camera.on_move(lambda: session.follow(FollowCamera))
+        session.job(SweepReach).is_due = self._sweeps and left is None
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)
@@ -192,6 +198,7 @@ class Studio:
         """Bring a tab that was opened by a link into its state."""
         state = state_in_request(request_path(self.server, session.client.client_id))
         if state is not None:
+            session.job(SweepReach).is_due = False
             session.restore(state)
 
     def _disconnected(self, client: ClientHandle) -> None:

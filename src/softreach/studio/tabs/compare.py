@@ -14,6 +14,7 @@ from softreach.studio.comparison import (
     comparison_html,
 )
 from softreach.studio.fields import bind_button
+from softreach.studio.jobs.morph import WriteMorph
 from softreach.studio.snapshots import Snapshot, numbers_of
 from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
@@ -27,6 +28,11 @@ _HINT = "Keep designs as snapshots to see them side by side here."
 _NONE = "none yet"
 _NOW = "now"
 """Name of the row of the design in the fields."""
+_ABOUT_GOAL = "The snapshot in which the movie ends, or the design in the fields"
+_ABOUT_MOVIE = (
+    "From the chosen snapshot, as seen from here: reach, arm and volume of each design on the way. "
+    "Browsers that cannot record MP4 make WebM"
+)
 
 
 class ComparePanel:
@@ -50,6 +56,10 @@ class ComparePanel:
                 color="gray",
                 hint="with errors and differences, for a spreadsheet",
             )
+            self._goal: Any = gui.add_dropdown("movie to", (_NOW,), hint=_ABOUT_GOAL)
+            movie = gui.add_button_group("movie", ("GIF", "MP4"), hint=_ABOUT_MOVIE)
+            self._frames = Line(gui)
+        bind_button(movie, session, lambda: self._write_movie(movie.value))
         bind_button(take, session, self._take)
         bind_button(restore, session, self._restore)
         bind_button(delete, session, lambda: session.snapshots.remove(self._chosen().name))
@@ -82,6 +92,7 @@ class ComparePanel:
     def _follow_menu(self, names: tuple[str, ...]) -> None:
         if tuple(self._choice.options) != (names or (_NONE,)):
             self._choice.options = names or (_NONE,)
+            self._goal.options = (_NOW, *names)
 
     def _take(self) -> None:
         session = self._session
@@ -107,6 +118,13 @@ class ComparePanel:
         if snapshot is None:
             raise InvalidInput("snapshot", "none", "chosen", "take one first")
         return snapshot
+
+    def _write_movie(self, kind: str) -> None:
+        session, goal = self._session, self._session.snapshots.named(self._goal.value)
+        job = session.job(WriteMorph)
+        job.between = self._chosen().state, session.state if goal is None else goal.state
+        job.format, job.frames = kind, self._frames
+        job.ask()
 
     def _save(self) -> None:
         if self._comparison is None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio import markup
+from softreach.studio.captions import scale_bar
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.files import (
     CLOUD_FORMATS,
@@ -41,10 +42,17 @@ _ABOUT = {
     "Save cloud": "All samples of the cloud: tips [m] and activations",
     "surface": "File type of the boundary of the reachable set",
     "Save surface": "The exact boundary of the reachable set [m]",
-    "Save picture (PNG)": "The scene as it is seen, with legend, scale and design",
+    "size": "Pixels of the picture for each of the page, along each side, drawn anew",
+    "Save picture (PNG)": (
+        "The scene as it is seen, with legend, design and a scale bar, which is right at the depth "
+        "of the point that the camera turns about; everywhere in the orthographic view"
+    ),
     "Save figure (PNG)": "Three views and an oblique one of the points that are shown",
     "Save web page (HTML)": "The scene in one file, to be turned without a studio",
 }
+
+
+_SIZES = {f"{scale}\N{MULTIPLICATION SIGN}": scale for scale in (1, 2, 3, 4)}
 
 
 class ExportPanel:
@@ -65,6 +73,7 @@ class ExportPanel:
             )
             self._button("Save surface", self._save_surface)
             self._button("Save figure (PNG)", self._save_figure)
+            self._size = gui.add_dropdown("picture size", tuple(_SIZES), hint=_ABOUT["size"])
             self._button("Save picture (PNG)", self._save_picture)
             self._button("Save web page (HTML)", self._save_page)
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
@@ -92,8 +101,12 @@ class ExportPanel:
 
     def _save_picture(self) -> None:
         session, reach = self._session, self._reach()
-        picture, state = session.camera.picture(), session.state
-        self._write("studio.png", lambda: picture_file(picture, state, reach, session.key))
+        camera, state, scale = session.camera, session.state, _SIZES[self._size.value]
+        focal, picture = camera.pixels_per_length, session.picture(scale)
+        bar = scale_bar(focal, picture.shape[1] / scale / 5, state.design.length)
+        self._write(
+            "studio.png", lambda: picture_file(picture, state, reach, session.key, bar, scale)
+        )
 
     def _save_page(self) -> None:
         self._write("reachability.html", self._page)
