@@ -69,17 +69,17 @@ browser:
 		|| { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq chromium >/dev/null; } \
 		|| true
 
-# For every edit: types and fast tests side by side.
+# For every edit: types and fast tests side by side, a process each.
 quick: lint
 	$(MAKE) --no-print-directory -j2 --output-sync=target types fast
 
 fast: setup
-	$(TESTS) --quick tests
+	$(BIN)/python -m pytest -q --quick tests
 
 # Renews the list of slow tests, which `make quick` leaves out; on an idle machine.
 record: setup browser
 	$(TESTS) --record
-	$(TESTS) --record --quick tests
+	$(BIN)/python -m pytest -q --record --quick tests
 
 check: lint types
 	$(BIN)/python -m zensical build --strict --clean

@@ -188,6 +188,71 @@ def print_memory(side: int, n: int) -> None:
         print(f"| {rows * side} | {found['peak']:.0f} |")
 
 
+def study(designs_in_all: int = 10_000, share: int = 240) -> None:
+    """Print what a study of exact metrics takes on a Dask cluster of this machine, by processes."""
+    print(f"## {designs_in_all:,} designs, exact metrics, on Dask processes of one thread\n")
+    print(
+        "| Processes | Designs | Wall [s] | CPU [s/design] | Designs/min | Of one process |", end=""
+    )
+    print(" Store [kB/design] | This process [MB] |\n|---|---|---|---|---|---|---|---|")
+    alone = None
+    for processes, count in ((1, share), (2, share), (4, share), (4, designs_in_all)):
+        found = json.loads(
+            subprocess.run(
+                [
+                    sys.executable,
+                    "-m",
+                    "benchmarks.bench_atlas",
+                    "dask",
+                    str(processes),
+                    str(count),
+                ],
+                stdout=subprocess.PIPE,
+                text=True,
+                check=True,
+            ).stdout
+        )
+        rate = 60 * count / found["wall"]
+        alone = alone or rate
+        print(
+            f"| {processes} | {count:,} | {found['wall']:.0f} | {found['cpu'] / count:.3f} |",
+            end="",
+        )
+        print(f" {rate:.0f} | {rate / alone:.2f} | {found['size']:.1f} |", end="")
+        print(f" {found['peak']:.0f} |", flush=True)
+
+
+def on_dask(processes: int, count: int) -> dict[str, float]:
+    """Seconds of a study spread by a Latin hypercube, the workers' with them, and its store."""
+    from distributed import Client, LocalCluster
+
+    family = DesignSpace.sampled(
+        designs.minimal_trunk(),
+        count,
+        revolution=np.radians([0.0, 108.0]),
+        taper=np.radians([0.0, 3.0]),
+        method="latin",
+    )
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        LocalCluster(n_workers=processes, threads_per_worker=1, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        client.run(one_small_design)  # loads and compiles
+        before, begin = sum(client.run(time.process_time).values()), time.perf_counter()
+        store = Path(folder) / "study.zarr"
+        build_atlas(family, store, 1_000, metrics=("exact",), keep_clouds=False, executor=client)
+        wall = time.perf_counter() - begin
+        cpu = sum(client.run(time.process_time).values()) - before
+        size = sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
+    return {"wall": wall, "cpu": cpu, "peak": peak_bytes() / 2**20, "size": size / 1e3 / count}
+
+
+def one_small_design() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        build_atlas(space(1, 1), Path(folder) / "a.zarr", 1_000, metrics=("exact",))
+
+
 def test_an_atlas(benchmark, tmp_path):
     stores = (tmp_path / f"{k}.zarr" for k in range(1_000_000))
     options = {"n": 500, "alpha_over_length": 1.0, "metrics": ("extent", "concave")}
@@ -197,5 +262,9 @@ def test_an_atlas(benchmark, tmp_path):
 if __name__ == "__main__":
     if sys.argv[1:2] in (["parts"], ["atlas"]):
         run(*sys.argv[1:])
+    elif sys.argv[1:2] == ["dask"]:
+        print(json.dumps(on_dask(*map(int, sys.argv[2:]))))
+    elif sys.argv[1:2] == ["study"]:
+        study(*map(int, sys.argv[2:]))
     else:
         main(*map(int, sys.argv[1:]))
