@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import csv
+from functools import partial
 
 import numpy as np
 import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
+from softreach.plot.morph_movie import morph_frames
+from softreach.studio.jobs import morph
+
+images = pytest.importorskip("PIL.Image")
 
 TRUNK = designs.minimal_trunk()
 
@@ -126,3 +131,27 @@ def test_what_an_older_state_draws_without_a_snapshot_has_a_row_and_can_be_taken
     tab.choose("draw", "not drawn")
     tab.wait(lambda: not tab.drawn("/reference"), "it is drawn no more")
     tab.wait(lambda: "reference" not in [row[0] for row in cells(tab)], "its row is gone")
+
+
+@pytest.mark.parametrize("kind", ["GIF", pytest.param("MP4", marks=pytest.mark.large)])
+def test_a_movie_leads_from_a_snapshot_to_the_design(tab, tmp_path, monkeypatch, kind):
+    frames = partial(morph_frames, frames=3)
+    monkeypatch.setattr(morph, "morph_frames", lambda *a, **more: frames(*a, **more))
+    monkeypatch.setattr(morph, "_PIXELS", {"GIF": 120, "MP4": 120})
+    tab.open("Compare")
+    take(tab, "begun")
+    tab.choose("snapshot", "begun")
+    become(tab, taper=0.05)
+    begun, ended = tab.session.snapshots.named("begun").state, tab.session.state
+    movie = tab.save(kind, tmp_path)
+    assert tab.session.job(morph.WriteMorph).between == (begun, ended)
+    assert movie.suffix == f".{kind.lower()}"
+    content = movie.read_bytes()
+    if kind == "GIF":
+        with images.open(movie) as made:
+            assert made.n_frames == 3
+    else:
+        assert content[4:8] == b"ftyp"
+    tab.session.snapshots.remove("begun")
+    tab.settle()
+    assert tab.page.locator("[data-frames]").count() == 0

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from softreach.studio.jobs.inverse import SolveInverse
-from softreach.studio.jobs.reach import FollowCamera
+from softreach.studio.jobs.reach import FollowCamera, SweepReach
 from softreach.studio.scene.camera import FOV, VIEWS, framing
+from softreach.studio.serve.viser_fixes import headed
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
+from tests.studio.tab import SIZE, unit
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
 BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
@@ -208,6 +211,106 @@ def test_a_saved_picture_has_key_numbers_and_design_under_the_scene(tab, tmp_pat
     assert like(below, yellow) > 20
     assert (below.max(axis=-1) < 0.5).sum() > 500  # text
     assert like(image[: camera.image_height], BLUE) > 100
+
+
+def test_a_picture_of_twice_the_size_is_drawn_anew_not_blown_up(tab, tmp_path):
+    from matplotlib.image import imread
+
+    show(tab, cloud=False, surface=True)
+    camera = tab.session.client.camera
+    tab.open("Export")
+    tab.choose("size", "2\N{MULTIPLICATION SIGN}")
+    image = imread(tab.save("Save picture", tmp_path))[..., :3]
+    tab.choose("size", "1\N{MULTIPLICATION SIGN}")
+    assert image.shape[1] == 2 * camera.image_width
+    scene = image[: 2 * camera.image_height]
+    quarters = [scene[i::2, j::2] for i in range(2) for j in range(2)]
+    differ = np.abs(np.subtract(quarters[0], quarters[3])).max(axis=-1) > 0.02
+    assert differ.mean() > 0.02  # copies of a pixel would be equal
+    assert tab.drawn("/thick-lines") is None
+
+
+def test_a_scale_bar_is_as_long_as_that_length_at_the_depth_of_the_target(tab):
+    def length(depth: float) -> float:
+        """Pixels of 1 L across the sight, so much [L] behind the target."""
+        camera = tab.session.client.camera
+        forward = unit(camera.look_at - camera.position)
+        right = 0.05 * unit(np.cross(forward, camera.up_direction))
+        middle = camera.look_at + depth * forward
+        ends = [tab.projected(middle + side * right)[0] for side in (-1, 1)]
+        return (ends[1] - ends[0]) * camera.image_width / 0.1
+
+    assert tab.session.camera.pixels_per_length == pytest.approx(length(0.0), rel=1e-9)
+    assert length(0.3) < 0.95 * length(0.0)
+    show(tab, orthographic=True)
+    tab.wait(lambda: tab.session.client.camera.fov < FOV / 10, "the lens is long")
+    assert tab.session.camera.pixels_per_length == pytest.approx(length(0.3), rel=0.01)
+    show(tab, orthographic=False)
+    tab.wait(lambda: tab.session.client.camera.fov == pytest.approx(FOV, rel=1e-3), "it is reset")
+
+
+def test_a_picture_that_browsers_would_blow_up_is_refused(tab):
+    with pytest.raises(InvalidInput, match="at most 8192"):
+        tab.session.picture(40)
+
+
+def test_f_leaves_the_scene_with_large_numbers_and_escape_brings_the_panel_back(tab):
+    page, numbers = tab.page, tab.page.locator("[data-history] b").first
+    canvas, small = page.locator("canvas").first, numbers.bounding_box()["height"]
+    field = page.get_by_role("textbox", name="taper φ [deg]")
+    field.focus()
+    page.keyboard.press("f")
+    assert page.get_by_role("tab", name="Design").is_visible()  # who types an f wants one
+    page.keyboard.press("Escape")
+    page.get_by_role("tab", name="Design").focus()
+    for leave in ("Escape", "f"):
+        page.keyboard.press("f")
+        tab.wait(lambda: canvas.bounding_box()["width"] == SIZE[0], "the scene is as wide")
+        assert not page.get_by_role("tab", name="Design").is_visible()
+        assert numbers.bounding_box()["height"] > 1.3 * small
+        page.keyboard.press(leave)
+        tab.wait(lambda: canvas.bounding_box()["width"] < SIZE[0], "the panel is back")
+        assert page.get_by_role("tab", name="Design").is_visible()
+
+
+def sweep(tab, motion: str) -> None:
+    tab.page.evaluate(f"localStorage.setItem('viser-user:softreach-motion', '{motion}')")
+    tab.session.job(SweepReach).ask()
+
+
+def test_the_arm_sweeps_until_a_key_and_leaves_nothing_behind(tab, monkeypatch):
+    show(tab)
+    session, moved = tab.session, []
+    monkeypatch.setattr(session, "is_touched", False)
+    draw = session.scene.draw_arm
+    monkeypatch.setattr(
+        session.scene, "draw_arm", lambda arm, at, *more: moved.append(at) or draw(arm, at, *more)
+    )
+    before, tip = (session.state, session.history), session.tip
+    sweep(tab, "welcome")
+    tab.wait(lambda: len(moved) > 3, "the arm moves")
+    tab.page.keyboard.press("x")
+    tab.settle()
+    assert moved[-1] == before[0].activation
+    assert (session.state, session.history) == before
+    np.testing.assert_array_equal(session.tip, tip)
+    assert not session.is_touched
+
+
+def test_no_arm_sweeps_where_less_motion_is_wanted(tab, browser, studio, monkeypatch):
+    context = browser.new_context(reduced_motion="reduce")
+    page = context.new_page()
+    page.route("**/*", lambda route: route.fulfill(body=headed("<title>Viser</title>")))
+    page.goto(studio.url)
+    assert page.evaluate("localStorage.getItem('viser-user:softreach-motion')") == ""
+    context.close()
+    monkeypatch.setattr(tab.session, "is_touched", False)
+    tips = []
+    monkeypatch.setattr(tab.session.scene, "draw_arm", lambda *_: tips.append(_))
+    monkeypatch.setattr(tab.session, "follow", lambda *_: None)
+    tab.page.evaluate("localStorage.setItem('viser-user:softreach-motion', '')")
+    tab.session.job(SweepReach).do(lambda: None)
+    assert tips == []
 
 
 def test_the_window_is_called_softreach(tab):

@@ -28,7 +28,7 @@ from softreach.support.palette import BODY, bundle_color
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["frames_along", "path_movie"]
+__all__ = ["Pose", "frames_along", "gif", "over_paper", "path_movie", "posed", "square_around"]
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -77,35 +77,38 @@ def path_movie(
     path = track.position.values / arm.length
     points = np.empty((0, 3)) if cloud is None else np.asarray(cloud, float) / arm.length
     shown = frames_along(len(activations))
-    shapes = [_shape(rod, activations[k]) for k in shown]
-    extent = _extent([points, path, *(body.vertices / arm.length for body, _ in shapes)], view)
+    shapes = [posed(rod, activations[k]) for k in shown]
+    extent = square_around(
+        [points, path, *(body.vertices / arm.length for body, _ in shapes)], view
+    )
     behind, line = (ZBuffer(extent, _PIXELS, oversample=2) for _ in range(2))
     behind.draw_points(points, _CLOUD, 1.5, view=view)
     line.draw_points(_dense(path, extent), _PATH, 2.0, view=view)
-    paper = _over(behind.rgba(), np.full((*behind.shape, 3), 255, np.uint8))
+    paper = over_paper(behind.rgba(), np.full((*behind.shape, 3), 255, np.uint8))
     frames = []
     for number, (k, shape) in enumerate(zip(shown, shapes, strict=True)):
         progress(number / len(shown))
         buffer = deepcopy(line)
         buffer.draw_points(_dense(path[: k + 1], extent), _TRACE, 4.0, view=view)
         within = ZBuffer(extent, _PIXELS, oversample=2)
-        frames.append(_over(_drawn(buffer, within, arm, shape, view), paper))
-    return _gif(frames)
+        frames.append(over_paper(_drawn(buffer, within, arm, shape, view), paper))
+    return gif(frames)
 
 
-class _Shape(NamedTuple):
+class Pose(NamedTuple):
     """An arm in one activation."""
 
     body: Surface
     bundles: Sequence[Surface]
 
 
-def _shape(rod: TipMap, activation: Array) -> _Shape:
+def posed(rod: TipMap, activation: Array) -> Pose:
+    """The arm in an activation [m]."""
     shape = configuration(rod, activation, _STATIONS)
-    return _Shape(arm_surface(rod.arm, shape, _SIDES), bundle_skins(rod.arm, shape, lift=0.02))
+    return Pose(arm_surface(rod.arm, shape, _SIDES), bundle_skins(rod.arm, shape, lift=0.02))
 
 
-def _drawn(buffer: ZBuffer, within: ZBuffer, arm: Manipulator, shape: _Shape, view: View) -> Image:
+def _drawn(buffer: ZBuffer, within: ZBuffer, arm: Manipulator, shape: Pose, view: View) -> Image:
     body, skins = shape
     draw_mesh(buffer, body.vertices / arm.length, body.faces, BODY, view)
     clear = any(inside(arm))
@@ -119,13 +122,13 @@ def _drawn(buffer: ZBuffer, within: ZBuffer, arm: Manipulator, shape: _Shape, vi
     return seen_through(image, within.rgba()) if clear else image
 
 
-def _over(image: Image, paper: Image) -> Image:
+def over_paper(image: Image, paper: Image) -> Image:
     """RGBA over RGB."""
     cover = image[..., 3:] / 255
     return np.rint(image[..., :3] * cover + paper * (1 - cover)).astype(np.uint8)
 
 
-def _extent(parts: Sequence[Array], view: View) -> Extent:
+def square_around(parts: Sequence[Array], view: View) -> Extent:
     """A square around everything, with a margin."""
     points = project(np.concatenate([part[:: max(1, len(part) // 5000)] for part in parts]), view)
     flat = points[np.isfinite(points).all(axis=1), :2]
@@ -144,13 +147,19 @@ def _dense(path: Array, extent: Extent) -> Array:
     return np.stack([np.interp(even, way, axis) for axis in path.T], axis=1)
 
 
-def _gif(frames: Sequence[Image]) -> bytes:
+def gif(frames: Sequence[Image]) -> bytes:
+    """Frames, RGB, as an animation that rests on the last.
+
+    Raises:
+        MissingExtra: Pillow is not installed.
+    """
     try:
         from PIL import Image as images
     except ModuleNotFoundError as error:
         raise MissingExtra(("Pillow", "plot")) from error
     # One palette for all frames: colors that change from frame to frame flicker.
-    first = images.fromarray(frames[len(frames) // 2]).quantize(256, dither=images.Dither.NONE)
+    some = np.concatenate([frames[0], frames[len(frames) // 2], frames[-1]])
+    first = images.fromarray(some).quantize(256, dither=images.Dither.NONE)
     made = [
         images.fromarray(frame).quantize(palette=first, dither=images.Dither.NONE)
         for frame in frames

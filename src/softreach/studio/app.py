@@ -17,6 +17,7 @@ from softreach.studio.fields import attempt
 from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
 from softreach.studio.jobs.calibration import DrawSample, FitArm
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
+from softreach.studio.jobs.morph import WriteMorph
 from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
 from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
 from softreach.studio.jobs.plots import PLOT_JOBS
@@ -27,6 +28,7 @@ from softreach.studio.jobs.reach import (
     DrawCloud,
     DrawSurfaces,
     FollowCamera,
+    SweepReach,
 )
 from softreach.studio.jobs.search import CheckNeeds, ConfirmNeeds, DrawSearch, SearchDesigns
 from softreach.studio.scene.camera import framing
@@ -49,10 +51,10 @@ if TYPE_CHECKING:
 __all__ = ["JOBS", "Studio"]
 
 JOBS: tuple[type[Job], ...] = (
-    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurfaces, FollowCamera,
+    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurfaces, FollowCamera, SweepReach,
     DrawFree, DrawReference, DrawReferenceArm,
     SolveInverse, DragTip,
-    FollowPath, PlayPath, WriteMovie,
+    FollowPath, PlayPath, WriteMovie, WriteMorph,
     DrawSample, FitArm,
     CheckNeeds, ConfirmNeeds, SearchDesigns, DrawSearch,
     *PLOT_JOBS,
@@ -79,6 +81,7 @@ class Studio:
         *,
         work: KeptWork | None = None,
         compile_ahead: bool = False,
+        sweeps: bool = False,
     ) -> None:
         """Start serving.
 
@@ -90,12 +93,14 @@ class Studio:
             work: Where the work is kept when tabs and server end; nowhere by default.
             compile_ahead: Whether to compile what may be needed, such as for loads, once the first
                 picture is complete.
+            sweeps: Whether the arm of a fresh tab sweeps its reach once.
 
         Raises:
             InvalidInput: The address cannot be used.
             MissingExtra: viser is not installed.
         """
         self.start, self._token, self.work = start, token, work
+        self._sweeps = sweeps and start.state.camera is None
         self.snapshots = Snapshots(work)
         # On a thread of its own: two tabs that show each other's changes would wait for each other.
         self._retold = Latest(_ignored)
@@ -183,6 +188,7 @@ class Studio:
             session.take_up(*left)
         _furnish(session, page_url(self.server))
         session.camera.on_move(lambda: session.follow(FollowCamera))
+        session.job(SweepReach).is_due = self._sweeps and left is None
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)
@@ -210,6 +216,7 @@ class Studio:
         """Bring a tab that was opened by a link into its state."""
         state = state_in_request(request_path(self.server, session.client.client_id))
         if state is not None:
+            session.job(SweepReach).is_due = False
             session.restore(state)
 
     def _disconnected(self, client: ClientHandle) -> None:

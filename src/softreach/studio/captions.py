@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
@@ -101,6 +101,35 @@ def tip_text(session: Session) -> list[Part]:
     if session.posture is not None:
         parts.append(f"{' · ' if parts else ''}{_POSTURES[session.posture]}")
     return parts
+
+
+class ScaleBar(NamedTuple):
+    """Line of a round length, and how long that is in words."""
+
+    pixels: float
+    text: str
+
+
+def scale_bar(pixels_per_length: float, room: float, length: float) -> ScaleBar:
+    """The longest bar of 1, 2 or 5 times a power of ten of L that there is room for.
+
+    Args:
+        pixels_per_length: Pixels of 1 L.
+        room: Pixels that the bar may take.
+        length: L [m].
+    """
+    longest = room / pixels_per_length
+    power = 10.0 ** math.floor(math.log10(longest))
+    bar = max(step * power for step in (1, 2, 5) if step * power <= longest * (1 + 1e-9))
+    return ScaleBar(bar * pixels_per_length, f"{bar:.12g} L = {_meters(bar * length)}")
+
+
+def _meters(length: float) -> str:
+    """Length [m] in the unit of a ruler that it is laid on."""
+    for unit, size in (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)):
+        if length >= size * (1 - 1e-9):
+            return f"{length / size:.3g} {unit}"
+    return f"{length / 1e-6:.3g} µm"
 
 
 def _percent(share: float) -> str:

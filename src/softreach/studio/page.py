@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
-from softreach.studio.captions import legend_text, reach_text
+from softreach.studio.captions import ScaleBar, legend_text, reach_text
 from softreach.studio.reach import Reach
 from softreach.studio.scene.camera import lens
 from softreach.studio.scene.clouds import key_html
@@ -115,7 +115,12 @@ _CHARACTER = 6.4  # pixels
 
 
 def picture_file(
-    scene: NDArray[np.uint8], state: StudioState, reach: Reach, key: BundleKey | ScalarKey | None
+    scene: NDArray[np.uint8],
+    state: StudioState,
+    reach: Reach,
+    key: BundleKey | ScalarKey | None,
+    bar: ScaleBar,
+    scale: int = 1,
 ) -> bytes:
     """The picture as PNG.
 
@@ -124,24 +129,45 @@ def picture_file(
         state: What it shows.
         reach: Of its design.
         key: To its colors.
+        bar: In the lower left of the scene, in pixels of the page.
+        scale: Pixels of the scene for each of the page, along each side.
     """
     from matplotlib.figure import Figure
 
-    height, width = scene.shape[:2]
-    lines = _wrapped(_caption(state, reach), width)
+    height, width = (size / scale for size in scene.shape[:2])
+    lines = _wrapped(_caption(state, reach), int(width))
     below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
-    total = height + below
+    total, dpi = height + below, _DPI * scale
     paper, ink = _INK[state.appearance.dark]
-    figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=_DPI, facecolor=paper)
-    figure.figimage(scene, 0, below)
+    figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=dpi, facecolor=paper)
+    figure.figimage(scene, 0, below * scale)
+    _draw_bar(figure, bar, (_EDGE / width, (below + _EDGE) / total), (width, total), ink)
     if key is not None:
         _draw_key(figure, key, (1 - (height + 0.35 * _KEY) / total, _KEY / total), ink)
     for k, line in enumerate(reversed(lines)):
         at = (_EDGE + k * _LINE) / total
         figure.text(_EDGE / width, at, line, fontsize=8.5, color=ink, va="bottom")
     file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=_DPI, facecolor=paper)
+    figure.savefig(file, format="png", dpi=dpi, facecolor=paper)
     return file.getvalue()
+
+
+def _draw_bar(
+    figure: Figure, bar: ScaleBar, at: tuple[float, float], size: tuple[float, float], ink: str
+) -> None:
+    """A bar whose left end is at a place of the figure, 0 to 1, and its length above it."""
+    from matplotlib.lines import Line2D
+
+    (left, low), (width, height) = at, size
+    right, tick = left + bar.pixels / width, 4 / height
+    for x, y in (
+        ((left, right), (low, low)),
+        ((left, left), (low - tick, low + tick)),
+        ((right, right), (low - tick, low + tick)),
+    ):
+        figure.add_artist(Line2D(x, y, color=ink, linewidth=1.2, solid_capstyle="butt"))
+    middle, above = (left + right) / 2, low + 6 / height
+    figure.text(middle, above, bar.text, fontsize=8.5, color=ink, ha="center", va="bottom")
 
 
 def design_text(state: StudioState) -> str:

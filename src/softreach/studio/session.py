@@ -44,6 +44,7 @@ Array = NDArray[np.float64]
 _Kind = TypeVar("_Kind", bound="Job")
 
 _CLICK = 0.01  # [rad] between the ray of a click and a point that it hits, with the usual lens
+_LINE = 1.0  # pixels of the page that edges are thick in a larger picture
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
 
@@ -290,6 +291,22 @@ class Session:
             toward = np.subtract(camera.position, camera.look_at)
             camera = framing(*self.scene.axes.corners, toward, self.camera.aspect)
         self.camera.look_from(camera)
+
+    def picture(self, scale: int = 1) -> NDArray[np.uint8]:
+        """What the tab shows, `scale` pixels for each of the page along each side, RGBA.
+
+        Raises:
+            InvalidInput: As `TabCamera.picture`.
+        """
+        if scale == 1 or self.reach is None:
+            return self.camera.picture(scale)
+        thickness = _LINE / self.camera.pixels_per_length
+        with self.drawing:
+            self.scene.draw_thick_lines(self.reach, self.state.appearance, thickness)
+            try:
+                return self.camera.picture(scale)
+            finally:
+                self.scene.remove("/thick-lines")
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""

@@ -90,7 +90,7 @@ class WriteMovie(AskedJob):
         movie = path_movie(
             track,
             reach.arm.length * cloud_points(reach, _LEVEL),
-            view=_view_from(session.camera.usual()),
+            view=view_from(session.camera.usual()),
             progress=progress,
         )
         check()
@@ -115,7 +115,7 @@ def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioS
     return state.replace(path=path, activation=tuple(there.tolist()))
 
 
-def _view_from(camera: Camera) -> tuple[float, float]:
+def view_from(camera: Camera) -> tuple[float, float]:
     """Azimuth and elevation of the camera [rad]."""
     x, y, z = np.subtract(camera.position, camera.look_at)
     return float(np.arctan2(y, x)), float(np.arctan2(z, np.hypot(x, y)))

@@ -30,6 +30,7 @@ VIEWS: dict[str, Array] = {
 _STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
 _PATIENCE = 30.0  # [s] for a picture
+_LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
@@ -175,14 +176,28 @@ class TabCamera:
             self.look_from(Camera(position=position, look_at=camera.look_at))
         return False
 
-    def picture(self) -> NDArray[np.uint8]:
+    @property
+    def pixels_per_length(self) -> float:
+        """Pixels of what is 1 L long across the sight, at the depth of what it looks at."""
+        camera = self._client.camera
+        return self.focal / float(np.linalg.norm(camera.look_at - camera.position))
+
+    def picture(self, scale: int = 1) -> NDArray[np.uint8]:
         """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
 
+        Args:
+            scale: Pixels of the picture for each of the page, along each side.
+
         Raises:
-            InvalidInput: The tab does not answer: browsers stop drawing tabs in the background.
+            InvalidInput: The tab does not answer: browsers stop drawing tabs in the background. Or
+                they would draw fewer pixels than that, and blow them up.
         """
         camera, client = self._client.camera, self._client
-        size = {"height": camera.image_height, "width": camera.image_width}
+        size = {"height": scale * camera.image_height, "width": scale * camera.image_width}
+        if max(size.values()) > _LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
+            value = f"{size['width']} by {size['height']} pixels"
+            allowed = f"at most {_LONGEST} along a side and {_MOST_PIXELS / 1e6:.0f} million"
+            raise InvalidInput("picture", value, allowed, "choose a smaller size")
         try:
             return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
         except TimeoutError:

@@ -229,14 +229,25 @@ class Scene:
         if look.lit:
             colors = shaded(colors, vertex_normals(vertices, sheets.faces))
         skin = sliced(Skin(vertices, sheets.faces, colors.astype(float)), look.slice)
-        lines = vertices[sheets.lines]
-        lines = lines[in_slice(lines.reshape(-1, 3), look.slice).reshape(-1, 2).all(axis=1)]
+        lines = _lines_of(reach, look)
         self.remove("/surface")
         if len(skin.faces):
             opened = look.slice.axis != "none" or not isinstance(reach.exact, ReachableSolid)
             data = glb(skin, _CLEAR_SURFACE, lines, _INK[look.dark], both_sides=opened)
             self._api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
         return coloring.key
+
+    def draw_thick_lines(self, reach: Reach, look: Appearance, thickness: float) -> None:
+        """Edges and folds of the boundary this thick [L]: those that `glb` draws have one pixel.
+
+        A page draws them slowly, so that they are for pictures, whose pixels are small.
+        """
+        if not (look.surface and reach.has_surface) or shows_cloud(reach, look):
+            return
+        lines = _lines_of(reach, look).astype(np.float32)
+        if len(lines):
+            ink = _INK[look.dark]
+            self._api.add_line_segments("/thick-lines", lines, ink, thickness=thickness)
 
     def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
@@ -409,6 +420,12 @@ class Scene:
             corners[list(side), other] = high[other]
         faces = np.array([[0, 1, 2], [0, 2, 3]])
         self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
+
+
+def _lines_of(reach: Reach, look: Appearance) -> Array:
+    """Ends [L] of the edges, folds and crossings that a slice leaves, shape (n, 2, 3)."""
+    lines = (reach.sheets.vertices / reach.arm.length)[reach.sheets.lines]
+    return lines[in_slice(lines.reshape(-1, 3), look.slice).reshape(-1, 2).all(axis=1)]
 
 
 def shows_cloud(reach: Reach, look: Appearance) -> bool:

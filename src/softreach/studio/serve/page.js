@@ -162,3 +162,77 @@ document.documentElement.addEventListener("keydown", function (event) {
     this.uniform1f(place, document.documentElement.dataset.mantineColorScheme === "dark" ? 1 : 0);
   };
 })();
+
+// Presentation: F hides the panel and leaves the scene, its key and its numbers; F or Escape ends it.
+(function () {
+  var root = document.documentElement;
+  addEventListener("keydown", function (event) {
+    var at = event.target, presenting = "presenting" in root.dataset;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+    if (at.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(at.tagName)) return;
+    if (event.key === "Escape" || event.key.toLowerCase() === "f" && presenting) {
+      delete root.dataset.presenting;
+    } else if (event.key.toLowerCase() === "f") {
+      if (at.blur) at.blur();  // what is hidden hears no more keys
+      root.dataset.presenting = "";
+    }
+  }, true);
+})();
+
+// The arm of a fresh page sweeps its reach, unless less motion is wanted; whatever a person does ends it.
+(function () {
+  function say(motion) {
+    try { localStorage.setItem("viser-user:softreach-motion", motion); } catch (_) {}
+  }
+  say(matchMedia("(prefers-reduced-motion: reduce)").matches ? "" : "welcome");
+  ["keydown", "pointerdown", "wheel"].forEach(function (kind) {
+    addEventListener(kind, function () { say(""); }, { capture: true, passive: true });
+  });
+})();
+
+// Frames that the server has drawn become a video here: browsers have the encoder.
+(function () {
+  var kinds = ["video/mp4;codecs=avc1.42E01F", "video/mp4", "video/webm"], pause = 60, rest = 1200;
+  function record(name, frames) {
+    var kind = window.MediaRecorder && kinds.find(MediaRecorder.isTypeSupported);
+    if (!kind) return;
+    var canvas = document.createElement("canvas");
+    canvas.width = frames[0].width;
+    canvas.height = frames[0].height;
+    var paper = canvas.getContext("2d"), parts = [];
+    paper.drawImage(frames[0], 0, 0);
+    var options = { mimeType: kind, videoBitsPerSecond: 8e6 };
+    var recorder = new MediaRecorder(canvas.captureStream(), options);
+    recorder.ondataavailable = function (event) { parts.push(event.data); };
+    recorder.onstop = function () {
+      var link = document.createElement("a");
+      link.href = URL.createObjectURL(new Blob(parts, { type: kind }));
+      link.download = name + (kind.startsWith("video/mp4") ? ".mp4" : ".webm");
+      link.click();
+      setTimeout(function () { URL.revokeObjectURL(link.href); }, 60000);
+    };
+    recorder.start();
+    var begun = performance.now(), end = pause * frames.length + rest;
+    var timer = setInterval(function () {
+      var at = performance.now() - begun;
+      paper.drawImage(frames[Math.min(Math.floor(at / pause), frames.length - 1)], 0, 0);
+      if (at < end) return;
+      clearInterval(timer);
+      recorder.stop();
+    }, pause / 2);
+  }
+  new MutationObserver(function () {
+    var movie = document.querySelector("[data-movie]");
+    if (!movie) return;
+    var name = movie.dataset.movie, addresses = movie.dataset.frames.split(" ");
+    movie.removeAttribute("data-movie");
+    movie.hidden = Boolean(window.MediaRecorder);
+    if (!movie.hidden) movie.textContent = "This browser cannot record a video.";
+    movie.removeAttribute("data-frames");
+    Promise.all(addresses.map(function (address) {
+      var frame = new Image();
+      frame.src = address;
+      return frame.decode().then(function () { return frame; });
+    })).then(function (frames) { record(name, frames); });
+  }).observe(document.documentElement, { childList: true, subtree: true });
+})();

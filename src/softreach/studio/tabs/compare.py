@@ -14,6 +14,7 @@ from softreach.studio.comparison import (
     comparison_html,
 )
 from softreach.studio.fields import attempt, bind_button
+from softreach.studio.jobs.morph import WriteMorph
 from softreach.studio.reach import beside
 from softreach.studio.snapshots import REFERENCE, Snapshot, numbers_of
 from softreach.studio.state import StudioState
@@ -30,6 +31,11 @@ _NONE = "none yet"
 _NOW = "now"
 """Name of the row of the design in the fields."""
 _UNDRAWN, _AROUND, _BESIDE = "not drawn", "in gray around this design", "beside this design"
+_ABOUT_GOAL = "The snapshot in which the movie ends, or the design in the fields"
+_ABOUT_MOVIE = (
+    "From the chosen snapshot, as seen from here: reach, arm and volume of each design on the way. "
+    "Browsers that cannot record MP4 make WebM"
+)
 
 
 class ComparePanel:
@@ -60,8 +66,12 @@ class ComparePanel:
                     color="gray",
                     hint="with errors and differences, for a spreadsheet",
                 )
+                self._goal: Any = gui.add_dropdown("movie to", (_NOW,), hint=_ABOUT_GOAL)
+                movie = gui.add_button_group("movie", ("GIF", "MP4"), hint=_ABOUT_MOVIE)
+                self._frames = Line(gui)
         self._choice.on_update(lambda _: self._follow_drawn(session.state))
         self._drawn.on_update(self._draw)
+        bind_button(movie, session, lambda: self._write_movie(movie.value))
         bind_button(take, session, self._take)
         bind_button(restore, session, self._restore)
         bind_button(delete, session, self._delete)
@@ -106,6 +116,7 @@ class ComparePanel:
     def _follow_menu(self, names: tuple[str, ...]) -> None:
         if tuple(self._choice.options) != (names or (_NONE,)):
             self._choice.options = names or (_NONE,)
+            self._goal.options = (_NOW, *names)
 
     def _follow_drawn(self, state: StudioState) -> None:
         """Show how the chosen snapshot is drawn."""
@@ -176,6 +187,13 @@ class ComparePanel:
 
     def _named(self) -> Snapshot | None:
         return next((each for each in self._kept() if each.name == self._choice.value), None)
+
+    def _write_movie(self, kind: str) -> None:
+        session, goal = self._session, self._session.snapshots.named(self._goal.value)
+        job = session.job(WriteMorph)
+        job.between = self._chosen().state, session.state if goal is None else goal.state
+        job.format, job.frames = kind, self._frames
+        job.ask()
 
     def _save(self) -> None:
         if self._comparison is None:

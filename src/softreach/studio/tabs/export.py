@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio import markup
+from softreach.studio.captions import scale_bar
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.files import (
     CLOUD_FORMATS,
@@ -40,8 +41,10 @@ _ABOUT = {
     "data": "The design alone, which the command line reads too; all samples of the cloud, tips "
     "[m] and activations; or the exact boundary of the reachable set [m]",
     "Save data": "As a file of this type",
-    "picture": "The scene as it is seen, with legend, scale and design; three views and an oblique "
-    "one of the points that are shown; or the scene in one file, to be turned without a studio",
+    "picture": "The scene as it is seen, with legend, design and a scale bar, which is right at "
+    "the depth of the point that the camera turns about; three views and an oblique one of the points "
+    "that are shown; or the scene in one file, to be turned without a studio",
+    "size": "Pixels of the picture for each of the page, along each side, drawn anew",
     "Save picture": "As a file of this type",
 }
 _SECOND: Any = {"color": "gray"}
@@ -49,6 +52,9 @@ _SECOND: Any = {"color": "gray"}
 _DESIGN = "design (.toml)"
 _CLOUD, _SURFACE = "cloud ({})", "exact surface ({})"
 _SEEN, _VIEWS, _PAGE = "as it is seen (.png)", "four views (.png)", "web page (.html)"
+
+
+_SIZES = {f"{scale}\N{MULTIPLICATION SIGN}": scale for scale in (1, 2, 3, 4)}
 
 
 class ExportPanel:
@@ -73,6 +79,7 @@ class ExportPanel:
                 self._kind = gui.add_dropdown(
                     "picture", tuple(self._painters), hint=_ABOUT["picture"]
                 )
+                self._size = gui.add_dropdown("size", tuple(_SIZES), hint=_ABOUT["size"])
                 self._button("Save picture", lambda: self._painters[self._kind.value]())
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
 
@@ -105,8 +112,12 @@ class ExportPanel:
 
     def _save_picture(self) -> None:
         session, reach = self._session, self._reach()
-        picture, state = session.camera.picture(), session.state
-        self._write("studio.png", lambda: picture_file(picture, state, reach, session.key))
+        camera, state, scale = session.camera, session.state, _SIZES[self._size.value]
+        focal, picture = camera.pixels_per_length, session.picture(scale)
+        bar = scale_bar(focal, picture.shape[1] / scale / 5, state.design.length)
+        self._write(
+            "studio.png", lambda: picture_file(picture, state, reach, session.key, bar, scale)
+        )
 
     def _save_page(self) -> None:
         self._write("reachability.html", self._page)
