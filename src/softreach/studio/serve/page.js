@@ -49,6 +49,7 @@ document.documentElement.addEventListener("keydown", function (event) {
   var keys = [
     ["1 \u2026 8", "choose a tab", /^[1-8]$/, chooseTab],
     ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"],
+    ["F", "the scene alone, with its key and numbers; F or Esc ends that"],
     ["Enter, Esc in a field", "apply what is typed, restore what was there"],
     ["W A S D, Q E, arrows", "move the camera"],
     ["?", "show this table, or hide it", /^\?$/, toggleTable],

@@ -42,8 +42,8 @@ _ABOUT = {
     "[m] and activations; or the exact boundary of the reachable set [m]",
     "Save data": "As a file of this type",
     "picture": "The scene as it is seen, with legend, design and a scale bar, which is right at "
-    "the depth of the point that the camera turns about; three views and an oblique one of the points "
-    "that are shown; or the scene in one file, to be turned without a studio",
+    "the depth of the point that the camera turns about; three views and an oblique one of the "
+    "points that are shown; or the scene in one file, to be turned without a studio",
     "size": "Pixels of the picture for each of the page, along each side, drawn anew",
     "Save picture": "As a file of this type",
 }
