@@ -95,7 +95,7 @@ def measured(tab: Tab, repeat: int, *, cloud: bool) -> tuple[list[float], list[D
     tab.session.update(lambda state: state.showing(cloud=cloud))
     tab.open("Design")
     slider = [moved_slider(tab) for _ in range(repeat)]
-    tab.open("Inverse")
+    tab.open("Move")
     return slider, [dragged_tip(tab) for _ in range(repeat)]
 
 

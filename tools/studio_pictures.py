@@ -44,7 +44,7 @@ def studio(tab: Tab) -> None:
 
 def studio_handle(tab: Tab) -> None:
     """The handle on the tip of a design that folds, and a ghost of the other solution."""
-    tab.open("Inverse")
+    tab.open("Move")
     tab.session.update(lambda state: state.replace(design=FOLDED))
     tab.settle()
     place = tuple(round(float(x), 5) for x in pose(tab, TWICE))
@@ -89,7 +89,7 @@ def studio_search(tab: Tab) -> None:
     needs = Requirements(targets=[Target([place], name=name) for name, place in PLACES.items()])  # pyright: ignore[reportArgumentType]
     tab.session.update(lambda state: state.replace(needs=needs.to_toml()))
     tab.settle()
-    tab.open("Search")
+    tab.open("Goals")
     search = tab.session.job(SearchDesigns)
     search.free = {"taper": (0.0, 0.05), "revolution": (1.0, 3.0), "left.offset": (0.0, 3.0)}
     search.maximize, search.minimize, search.designs = ("exact_volume",), ("mean_effort",), 400

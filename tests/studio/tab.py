@@ -13,6 +13,7 @@ from softreach.studio.session import Session
 
 PATIENCE = 300.0  # [s] a loaded machine compiles shaders slowly
 SIZE = 900, 560
+FOLDED = 40  # pixels: what a folder whose head alone is seen is lower than
 HARMLESS = (
     "Tried to update non-existent component",  # it was removed before the page heard of it
     "Unable to preventDefault inside passive event listener",
@@ -110,6 +111,13 @@ class Tab:
     def open(self, name: str) -> None:
         self.page.get_by_role("tab", name=name).click()
 
+    def unfold(self, name: str) -> None:
+        """Show what is in a folder of the tab."""
+        head = self.page.get_by_text(name, exact=True).locator("visible=true")
+        head.wait_for()
+        if head.locator("xpath=..").bounding_box()["height"] < FOLDED:
+            head.click()
+
     def slider(self, label: str):
         return self.page.locator(
             f"xpath=//label[normalize-space()='{label}']/following::*[@role='slider'][1]"
@@ -141,12 +149,12 @@ class Tab:
     def press(self, button: str) -> None:
         self.page.get_by_role("button", name=button, exact=True).click()
 
-    def choose(self, label: str, option: str) -> None:
-        """Pick an option of a menu."""
+    def choose(self, label: str, option: str, of: int = 0) -> None:
+        """Pick an option of a menu; of several of this label, the first."""
         menu = self.page.locator(
             f"xpath=//label[normalize-space()='{label}']/following::input[1] >> visible=true"
         )
-        menu.click()
+        menu.nth(of).click()
         self.page.get_by_role("option", name=option, exact=True).click()
 
     def drawn(self, path: str):

@@ -110,7 +110,7 @@ def test_a_hundred_bundles_show_a_cloud_and_say_what_is_left_out(tab):
     changes = {"longitudinal.bundles": 98, "extent": 0.02}
     tab.session.update(lambda s: s.replace(design=changed(designs.minimal_trunk(), changes)))
     tab.wait(lambda: tab.session.reach.arm == tab.session.state.design, "a cloud is there")
-    tab.open("Activation")
+    tab.open("Move")
     tab.page.get_by_text("60 more bundles have no slider here").wait_for()
     tab.session.cancel()
     tab.settle()
@@ -127,5 +127,6 @@ def test_an_upload_of_5_mb_is_refused_in_one_line(tab, tmp_path):
 @pytest.mark.large
 def test_an_export_says_that_it_works_and_what_it_wrote(tab, tmp_path):
     tab.open("Export")
-    tab.save("Save cloud", tmp_path)
+    tab.choose("data", "cloud (.parquet)")
+    tab.save("Save data", tmp_path)
     tab.page.get_by_text("cloud.parquet is written").wait_for()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 
+import numpy as np
 import pytest
 
 from softreach.arm import designs
@@ -88,3 +89,40 @@ def test_snapshots_are_taken_compared_saved_restored_and_deleted(tab, tmp_path):
     tab.press("Delete")
     tab.wait(lambda: tab.session.snapshots.named("design 1") is None, "the snapshot is gone")
     tab.wait(lambda: "design 1" not in [row[0] for row in cells(tab)], "its row is gone")
+
+
+def far(tab, eye) -> bool:
+    return np.linalg.norm(np.array(tab.session.camera.usual().position) - eye) > 0.2
+
+
+def test_a_snapshot_is_drawn_around_the_design_beside_it_or_not_at_all(tab):
+    tab.open("Compare")
+    become(tab, taper=0.017)
+    known = tab.session.reach
+    take(tab, "kept")
+    tab.choose("draw", "in gray around this design")
+    tab.wait(lambda: tab.drawn("/reference"), "the snapshot is drawn")
+    assert tab.session.reference is known
+    become(tab, taper=0.015)
+    eye = np.array(tab.session.camera.usual().position)
+    tab.choose("draw", "beside this design")
+    tab.wait(lambda: tab.drawn("/reference/arm"), "it stands beside")
+    assert tab.session.reference is known
+    assert tab.drawn("/reference/name").text == "kept"
+    tab.wait(lambda: far(tab, eye), "the eye steps back")
+    tab.press("Delete")
+    tab.wait(lambda: not tab.drawn("/reference"), "what is deleted is not drawn")
+    tab.wait(lambda: not far(tab, eye), "the eye is back")
+    assert tab.session.state.reference is None
+
+
+def test_what_an_older_state_draws_without_a_snapshot_has_a_row_and_can_be_taken_away(tab):
+    older = tab.session.state.replace(reference=changed(TRUNK, {"taper": 0.013}))
+    tab.session.restore(older)
+    tab.settle()
+    tab.open("Compare")
+    tab.wait(lambda: "reference" in [row[0] for row in cells(tab)], "it has a row")
+    tab.choose("snapshot", "reference")
+    tab.choose("draw", "not drawn")
+    tab.wait(lambda: not tab.drawn("/reference"), "it is drawn no more")
+    tab.wait(lambda: "reference" not in [row[0] for row in cells(tab)], "its row is gone")

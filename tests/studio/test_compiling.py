@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
+import pytest
 from numba import njit
 
-from softreach.studio.work import CompilationWatch
+from softreach.studio.work import CompilationWatch, IdleCompiler
 
 
 def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
@@ -20,3 +24,19 @@ def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
     watch.close()
     outer(1.5)
     assert told == [True, False]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="priorities are others")
+def test_what_is_compiled_ahead_waits_for_all_others_and_ends_with_the_studio():
+    compiler = IdleCompiler()
+    compiler.close()
+    compiler.start()
+    assert compiler._process is None
+    compiler = IdleCompiler()
+    compiler.start()
+    process = compiler._process
+    compiler.start()
+    assert compiler._process is process
+    assert os.getpriority(os.PRIO_PROCESS, process.pid) == 19
+    compiler.close()
+    assert process.returncode is not None

@@ -14,7 +14,7 @@ from softreach.studio import StudioState
 @pytest.fixture
 def inverse_tab(tab):
     tab.page.set_viewport_size({"width": 1366, "height": 768})  # else notices cover the tip
-    tab.open("Inverse")
+    tab.open("Move")
     return tab
 
 
@@ -206,23 +206,23 @@ def test_a_click_on_the_cloud_sets_a_target_only_where_the_tab_says_so(inverse_t
     tab.click_at(point)
     tab.page.wait_for_timeout(300)
     assert tab.session.state.target is None
-    tab.page.get_by_label("clicks set the target").check()
+    tab.choose("mouse", "sets the target")
+    tab.wait(lambda: not tab.drawn("/grip").visible, "the ball is out of the way")
     tab.click_at(point)
     tab.wait(lambda: tab.session.state.target is not None, "the click is taken")
-    tab.page.get_by_label("clicks set the target").uncheck()
 
 
 @pytest.mark.large
 def test_the_handle_can_be_taken_away(inverse_tab):
     tab = inverse_tab
-    tab.page.get_by_label("handle on the tip").uncheck()
+    tab.choose("mouse", "turns the view alone")
     tab.wait(lambda: not tab.drawn("/grip").visible, "the ball is gone")
     assert not tab.session.state.appearance.handle
-    tab.page.get_by_label("handle on the tip").check()
+    tab.choose("mouse", "drags the tip")
     tab.wait(lambda: tab.drawn("/grip").visible, "the ball is back")
 
 
 @pytest.mark.large
 def test_a_state_without_a_handle_is_saved_as_such():
-    state = StudioState(design=sr.designs.minimal_trunk()).showing(handle=False)
+    state = StudioState(design=sr.designs.minimal_trunk()).showing(mouse="none")
     assert StudioState.from_json(state.to_json()) == state

@@ -10,6 +10,7 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.studio import Start, Studio, StudioState
 from softreach.studio.captions import size_text
 from softreach.studio.start import KeptWork
+from softreach.studio.tabs.status import StatusPanel
 from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
 
@@ -86,6 +87,18 @@ def test_where_there_is_nothing_to_redo_the_page_says_so_and_no_tab_jumps(tab):
     tab.page.get_by_text("There is nothing to redo.").wait_for(state="detached")
     tab.settle()
     assert tab.page.get_by_role("tablist").first.bounding_box() == bar
+
+
+def test_no_tab_jumps_when_the_button_that_cancels_comes_and_goes(tab):
+    panel = next(one for one in tab.session.panels if isinstance(one, StatusPanel))
+    cancel = tab.page.get_by_role("button", name="Cancel", exact=True)
+    places = []
+    for shown, state in ((False, "hidden"), (True, "visible")):
+        panel._cancel.visible = shown
+        cancel.wait_for(state=state)
+        places.append(tab.page.get_by_role("tablist").first.bounding_box())
+    panel._cancel.visible = False
+    assert places[0] == places[1]
 
 
 def reloaded(tab, studio):

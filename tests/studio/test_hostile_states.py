@@ -38,7 +38,7 @@ HOSTILE = {
     "nested objects.json": '{"a":' * 100_000,
     "50 MB.json": " " * 50_000_000,
     "50 MB.toml": "#" * 50_000_000,
-    "huge point.json": look_with(point_size=10**300),
+    "mouse.json": look_with(mouse=["tip"]),
     "huge level.json": look_with(level=10**4000),
     "digits.json": '{"softreach_studio": 1, "activation": ' + "9" * 5000 + "}",
     "huge activation.json": state_with(activation=[10**400] * 3),

@@ -9,6 +9,7 @@ import softreach as sr
 from softreach.arm import designs
 from softreach.rod.tip_map import TipStatus
 from softreach.studio import StudioState
+from softreach.studio.captions import size_text
 
 
 @pytest.fixture
@@ -17,7 +18,8 @@ def loads_tab(tab):
     state = StudioState(design=designs.lce_arm()).showing(level=12, cut="none")
     tab.session.update(lambda _: state)
     tab.settle()
-    tab.open("Loads")
+    tab.open("Parts")
+    tab.unfold("base and loads")
     return tab
 
 
@@ -75,14 +77,16 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     share = loaded.volume / free.volume
     assert 0.7 < share < 0.85
     tab.page.get_by_text(
-        f"loaded {loaded.volume:.4f} L³ · free {free.volume:.4f} L³, {100 * share:.0f} %"
+        f"{size_text(loaded.size)} under loads, {100 * share:.0f} % of {free.volume:.4f} L³ without"
     ).wait_for()
     assert tab.drawn("/free")
     tab.page.get_by_text("every sample rests in a stable equilibrium").wait_for()
-    tab.page.get_by_label("show the cloud without loads").uncheck()
+    tab.open("View")
+    tab.page.get_by_label("reach without loads").uncheck()
     tab.wait(lambda: not tab.drawn("/free"), "the free cloud is gone")
-    tab.page.get_by_label("show the cloud without loads").check()
+    tab.page.get_by_label("reach without loads").check()
     tab.wait(lambda: tab.drawn("/free"), "the free cloud is back")
+    tab.open("Parts")
 
     before = loads(tab)
     for text in ("-5", "1000000000"):
@@ -100,9 +104,10 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     alert.wait_for(state="hidden")
 
     tab.open("Export")
-    design = sr.Manipulator.load(tab.save("Save design (TOML)", tmp_path))
+    tab.choose("data", "design (.toml)")
+    design = sr.Manipulator.load(tab.save("Save data", tmp_path))
     assert design.loads == loads(tab)
-    tab.open("Loads")
+    tab.open("Parts")
 
     tab.press("Take all loads off")
     tab.wait(lambda: loads(tab) is None, "nothing acts")
@@ -137,7 +142,7 @@ def test_postures_under_loads_are_told(loads_tab):
     share = f"{100 * reach.share(TipStatus.NO_EQUILIBRIUM):.2g}"
     tab.page.get_by_text(f"no equilibrium, not shown: {share} %").wait_for()
 
-    tab.open("Activation")  # it tells the posture
+    tab.open("Move")  # it tells the posture
     tab.page.get_by_text("a stable equilibrium").locator("visible=true").wait_for()
     arm, cloud = tab.session.state.design, tab.session.reach.cloud
     pulled = cloud.activation.values[5]

@@ -32,6 +32,7 @@ def typed(tab, label, text):
 def test_parts_are_taken_added_renamed_changed_and_removed(tab):
     tab.open("Parts")
     before = design(tab)
+    tab.unfold("add a part")
     tab.choose("kind", "tendon")
     tab.press("Add")
     tab.page.get_by_role("alert").filter(has_text="choose what it is made of").wait_for()
@@ -42,18 +43,18 @@ def test_parts_are_taken_added_renamed_changed_and_removed(tab):
     assert {ring.material.name for ring in design(tab).section.rings} == {"dragon_skin_30"}
     assert design(tab).actuators[:-1] == before.actuators
 
-    tab.choose("named design", "three_chamber_arm")
-    tab.press("Take this design")
+    tab.open("Design")
+    tab.choose("start from", "three_chamber_arm")
     become(tab, lambda arm: arm == designs.three_chamber_arm(), "the design is taken")
     assert tab.session.reach.arm == designs.three_chamber_arm()
 
     start = design(tab)
+    tab.open("Parts")
     tab.choose("kind", "fiber")
     tab.press("Add")
     become(tab, lambda arm: len(arm.actuators) == len(start.actuators) + 1, "one more")
-    typed(tab, "name", "<b>rib</b>")
     old = field_of(tab, "σ [deg]").element_handle()
-    tab.press("Rename")
+    typed(tab, "name", "<b>rib</b>")
     become(tab, lambda arm: arm.actuators[-1].name == "<b>rib</b>", "it is renamed")
     old.wait_for_element_state("hidden")  # its fields are made anew
     assert tab.page.locator("b", has_text="rib").count() == 0  # a name is no markup

@@ -8,7 +8,6 @@ import pytest
 import softreach as sr
 from softreach.cli.app import run
 from softreach.studio.jobs.path import WriteMovie
-from softreach.studio.tabs.path import PathPanel
 
 ACTIVATION = (-1.0, -0.2, -0.5)
 
@@ -17,7 +16,7 @@ ACTIVATION = (-1.0, -0.2, -0.5)
 def _begin(tab):
     tab.session.update(lambda s: s.replace(path=None, activation=ACTIVATION, target=None))
     tab.settle()
-    tab.open("Path")
+    tab.open("Move")
 
 
 def drawn(tab):
@@ -30,6 +29,7 @@ def drawn(tab):
 def test_a_drawn_path_is_followed_from_the_present_activation(tab):
     found, state = drawn(tab), tab.session.state
     tab.page.get_by_text("All 97 points are followed").wait_for()
+    tab.wait(lambda: tab.drawn("/grip/ball").opacity, "where the path begins is seen in the ball")
     np.testing.assert_allclose(found.activation.values[0], ACTIVATION, atol=1e-6)
     tips = sr.tip_positions(state.design, found.activation.values)
     np.testing.assert_allclose(tips, found.position, atol=2e-5 * state.design.length)
@@ -89,9 +89,8 @@ def test_a_file_that_is_no_path_is_refused_in_one_line(tab, tmp_path):
 
 @pytest.mark.large
 def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
-    tab.page.get_by_label("clicks add points").check()
-    panel = next(panel for panel in tab.session.panels if isinstance(panel, PathPanel))
-    tab.wait(lambda: panel._clicks.value, "clicks are for the path")
+    tab.choose("mouse", "adds points to the path")
+    tab.wait(lambda: tab.session.state.appearance.mouse == "path", "the mouse is for the path")
     points = tab.session.reach.cloud.tip.values / tab.session.state.design.length
     one, other = lowest(tab, points)  # notes of uploads cover the upper part of the canvas
     tab.click_at(one)
@@ -102,7 +101,6 @@ def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
     tab.click_at(other)
     tab.wait(lambda: tab.session.state.path != first, "the path goes on")
     assert tab.session.state.path.points[: len(first.points)] == first.points
-    tab.page.get_by_label("clicks add points").uncheck()
     tab.press("Remove the path")
     tab.wait(lambda: tab.session.state.path is None, "the path is gone")
     tab.settle()

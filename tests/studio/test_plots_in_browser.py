@@ -25,7 +25,7 @@ def test_curvature_along_the_arm_follows_a_slider(tab):
     tab.page.get_by_label("along the arm", exact=True).check()
     tab.page.get_by_text("largest κL").wait_for()
     tab.wait(lambda: tab.page.locator(".uplot canvas").count() == 2, "two charts are drawn")
-    tab.open("Activation")
+    tab.open("Move")
     before = ink(tab)
     tab.drag("γ left", -60)
     tab.settle()

@@ -40,7 +40,7 @@ RING = design_with(
 STATES = {
     "level": state_with(look__level=STRIKE),
     "color": state_with(look__color=STRIKE),
-    "size": state_with(look__point_size=STRIKE),
+    "mouse": state_with(look__mouse=STRIKE),
     "switch": state_with(look__cloud=STRIKE),
     "axis": state_with(slice__axis=STRIKE),
     "metric": state_with(map__metric=STRIKE),
@@ -87,7 +87,7 @@ def read(tab, name, text):
 
 FEW = ["level.json", "color.json", "reference.json", "kind.toml", NAMELESS]
 """One of each kind of place: a value, a choice, the names of parts, a key, the name of the file."""
-PANELS = ("Design", "Parts", "Loads", "Activation", "View", "Inverse", "Export")
+PANELS = ("Design", "Parts", "Move", "View", "Compare", "Export")
 
 
 @pytest.mark.parametrize(

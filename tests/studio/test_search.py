@@ -116,7 +116,7 @@ def test_the_gap_follows_the_design(session, monkeypatch):
 
 def test_a_place_can_be_the_target(session, monkeypatch):
     monkeypatch.setattr(SolveInverse, "run", lambda *_: None)
-    with pytest.raises(sr.InvalidInput, match="tab Inverse"):
+    with pytest.raises(sr.InvalidInput, match="tab Move"):
         added(session, "place at the target")
     session.update(lambda state: state.replace(target=(0.05, 0.0, 0.3)))
     added(session, "place at the target")
@@ -260,6 +260,21 @@ def test_a_search_fills_its_picture_and_its_best_is_loaded_and_undone(session):
     assert session.client.scene.get_handle_by_name("/search") is None
     assert not panel.click(origin, at - origin)
     assert not panel._take.visible
+
+
+def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session):
+    session.update(lambda state: state.showing(cut="none", cloud=True))
+    assert session.settle()
+    tip = session.reach.cloud.tip.values[3]
+    point = tip / ARM.length
+    origin = 3.0 * point
+    assert not panel_of(session).click(origin, point - origin)
+    session.update(lambda state: state.showing(mouse="place"))
+    assert panel_of(session).click(origin, point - origin)
+    session.settle()
+    (place,) = requirements_of(session.state.needs).places
+    assert np.linalg.norm(np.cross(place, point) / np.linalg.norm(point)) < 0.02 * ARM.length
+    assert session.check.met
 
 
 def test_two_objectives_have_a_front_whose_designs_are_loaded_one_by_one(session):

@@ -13,7 +13,7 @@ def field(tab, label):
 
 def test_needs_are_seen_met_and_missed_and_a_search_finds_a_design_that_meets_them(tab):
     session = tab.session
-    tab.open("Search")
+    tab.open("Goals")
     tab.press("Add to the needs")  # where the tip is
     tab.page.get_by_text("place 1: reached").wait_for()
     field(tab, "numbers").fill("0.37, 0.15, 0.85")
@@ -30,14 +30,13 @@ def test_needs_are_seen_met_and_missed_and_a_search_finds_a_design_that_meets_th
     tab.page.get_by_text("needs: 2 of 2 met").wait_for()
     tab.settle()
     assert len(tab.drawn("/needs/reached").points) == 2
-    tab.open("Search")
+    tab.open("Goals")
     tab.page.get_by_text("place 2: reached").wait_for()
     tab.press("Undo")
     tab.page.get_by_text("place 2: missed by").wait_for()
     before = session.state.design
 
-    tab.choose("number", "taper")
-    tab.press("Add to the free numbers")
+    tab.choose("free also", "taper")
     tab.wait(lambda: field(tab, "free").input_value() == "taper = -2:5", "it has its range")
     field(tab, "designs").fill("12")
     tab.settle()

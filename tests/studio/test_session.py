@@ -22,7 +22,7 @@ def session(studio) -> Iterator[Session]:
 def clicked_path(session: Session, origin, direction) -> np.ndarray | None:
     """The path [L] after a click that may lead it on."""
     (panel,) = (one for one in session.panels if type(one).__name__ == "PathPanel")
-    panel._clicks.value = True
+    session.update(lambda state: state.showing(mouse="path"))
     panel.click(origin, direction)
     assert session.settle()
     path, length = session.state.path, session.state.design.length

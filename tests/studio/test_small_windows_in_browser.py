@@ -49,19 +49,19 @@ def labels(tab) -> list:
 
 
 @pytest.mark.parametrize("kind", [pytest.param("laptop", marks=pytest.mark.large), "phone"])
-def test_all_thirteen_tabs_stand_in_two_lines_within_the_window(opened, kind):
+def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
     tab = opened(kind)
-    tab.page.get_by_role("tab", name="Atlas").wait_for()
+    tab.page.get_by_role("tab", name="Export").wait_for()
 
     def fit() -> bool:
         places = [one.bounding_box() for one in tab.page.get_by_role("tab").all()]
         right = max(place["x"] + place["width"] for place in places)
         lines = len({round(place["y"]) for place in places})
-        return len(places) >= 13 and lines <= 2 and right <= SIZES[kind][0] + 0.5
+        return len(places) == 8 and lines == 1 and right <= SIZES[kind][0] + 0.5
 
-    tab.wait(fit, "the page is laid out, all tabs in two lines")
+    tab.wait(fit, "the page is laid out, all tabs in one line")
     letters = "e => [parseFloat(getComputedStyle(e).fontSize), getComputedStyle(e).letterSpacing]"
-    size, spacing = tab.page.get_by_role("tab", name="Atlas").evaluate(letters)
+    size, spacing = tab.page.get_by_role("tab", name="Export").evaluate(letters)
     assert size >= 11
     assert spacing == "normal"
 
@@ -139,7 +139,7 @@ def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
     for dark in (False, True):
         tab.session.update(lambda s, dark=dark: s.showing(dark=dark))
         tab.settle()
-        for name in ("Design", "View", "Compare", "Search"):
+        for name in ("Design", "View", "Compare", "Goals"):
             tab.open(name)
             tab.wait(lambda: not tab.page.evaluate(FAINT), f"letters of {name} are seen")
     tab.session.update(lambda s: s.showing(dark=False))

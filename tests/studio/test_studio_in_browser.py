@@ -48,7 +48,7 @@ def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(ta
 
 
 def test_the_tip_is_where_the_library_says_and_its_trail_that_of_this_design_alone(tab):
-    tab.open("Activation")
+    tab.open("Move")
     start = tab.session.tip.copy()
     tab.drag("γ left", -60)
     tab.drag("γ longitudinal", -30)
@@ -65,9 +65,11 @@ def test_the_tip_is_where_the_library_says_and_its_trail_that_of_this_design_alo
 
     tab.wait(shown, "the page says where the tip is")
 
-    tab.open("Activation")
+    tab.open("Move")
     assert not tab.drawn("/trail")
-    tab.page.get_by_label("show trail").check()
+    tab.open("View")
+    tab.page.get_by_label("trail of the tip").check()
+    tab.open("Move")
     tab.drag("γ right", -40)
     tab.wait(lambda: len(tab.session.trail) > 1, "the tip has moved")
     tab.settle()
@@ -76,13 +78,13 @@ def test_the_tip_is_where_the_library_says_and_its_trail_that_of_this_design_alo
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
     assert len(tab.session.trail) <= 2  # this arm's tip was nowhere else
-    tab.page.get_by_label("show trail").uncheck()
     tab.wait(lambda: not tab.drawn("/trail"), "the trail is gone")
 
 
 def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
-    tab.open("Inverse")
-    tab.page.get_by_label("clicks set the target").check()
+    tab.open("Move")
+    tab.choose("mouse", "sets the target")
+    tab.wait(lambda: tab.session.state.appearance.mouse == "target", "the mouse is for the target")
     tab.click_at(tab.session.reach.cloud.tip.values[100] / tab.session.state.design.length)
     tab.wait(lambda: tab.session.answer is not None, "a target is solved for")
     tab.settle()
@@ -95,7 +97,7 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     assert np.linalg.norm(tip - target) < 1e-6 * state.design.length
     tab.page.get_by_text("activation").filter(has_text="to ").first.wait_for()
 
-    tab.open("Inverse")
+    tab.open("Move")
     answer = tab.session.answer
     panel = next(p for p in tab.session.panels if isinstance(p, InversePanel))
     colors = [button.color for _, button in panel._buttons]
@@ -103,9 +105,6 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     assert colors.count("green") == 1
     ghosts = [tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer))]
     assert all(ghosts)
-    tab.page.get_by_label("clicks set the target").uncheck()
-
-    tab.open("Inverse")
     tab.session.job(SolveInverse).aim(np.array([0.0, 0.0, 1.5]))
     tab.settle()
     assert len(tab.session.answer) == 0
@@ -115,8 +114,9 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
 
 def test_the_caption_of_a_saved_page_stands_below_its_scene(tab, tmp_path):
     tab.open("Export")
+    tab.choose("picture", "web page (.html)")
     saved = tab.context.browser.new_page()
-    saved.goto(tab.save("Save web page (HTML)", tmp_path).as_uri())
+    saved.goto(tab.save("Save picture", tmp_path).as_uri())
     scene = saved.locator("canvas[data-engine]")
     scene.wait_for()
     canvas = scene.bounding_box()
@@ -126,35 +126,10 @@ def test_the_caption_of_a_saved_page_stands_below_its_scene(tab, tmp_path):
     assert canvas["y"] + canvas["height"] <= numbers["y"]
 
 
-@pytest.mark.large
-def test_a_reference_stays_while_the_design_changes(tab):
-    tab.open("Design")
-    kept, known = tab.session.state.design, tab.session.reach
-    tab.press("Keep this design as reference")
-    tab.wait(lambda: tab.drawn("/reference"), "the reference is drawn")
-    assert tab.session.reference is known
-    tab.drag("revolution Ω [deg]", 15)
-    tab.wait(lambda: tab.session.state.design != kept, "the design changes")
-    tab.settle()
-    tab.page.get_by_text(f"reference (gray): {size_text(known.size)}").wait_for()
-    eye = np.array(tab.session.camera.usual().position)
-    tab.page.get_by_label("side by side").check()
-    tab.wait(lambda: tab.drawn("/reference/arm"), "the reference stands beside")
-    assert tab.session.reference is known
-    tab.wait(lambda: far(tab, eye), "the eye steps back")
-    tab.press("Forget the reference")
-    tab.wait(lambda: not tab.drawn("/reference"), "the reference is gone")
-    tab.wait(lambda: not far(tab, eye), "the eye is back")
-
-
 def parameter(tab, name: str) -> float:
     """What the design of a tab has of a parameter."""
     design = tab.session.state.design
     return find_parameter(design, name).value(design)
-
-
-def far(tab, eye) -> bool:
-    return np.linalg.norm(np.array(tab.session.camera.usual().position) - eye) > 0.2
 
 
 def test_surfaces_are_drawn_and_cut(tab):
@@ -204,9 +179,10 @@ def test_designs_that_cannot_exist_show_the_librarys_message(tab):
 def test_a_state_is_saved_loaded_and_linked_and_tabs_stay_apart(tab, tmp_path, studio):
     tab.open("Export")
     kept = tab.session.state
-    file = tab.save("Save state", tmp_path)
+    file = tab.save("Save this work", tmp_path)
     assert json.loads(file.read_text())["softreach_studio"] == 1
-    design = tab.save("Save design (TOML)", tmp_path)
+    tab.choose("data", "design (.toml)")
+    design = tab.save("Save data", tmp_path)
     assert tomllib.loads(design.read_text())["profile"]["length_m"] == 1.0
     tab.session.update(
         lambda s: StudioState(design=sr.designs.minimal_trunk(1.0)).showing(level=12)
@@ -222,7 +198,7 @@ def test_a_state_is_saved_loaded_and_linked_and_tabs_stay_apart(tab, tmp_path, s
     tab.session.update(lambda s: s.showing(color="manipulability"))
     tab.settle()
     kept, known = tab.session.state_now(), set(studio.sessions)
-    tab.press("Link to this state")
+    tab.press("Link to this work")
     link = tab.page.get_by_text("state in a new tab")
     tab.wait(link.count, "the link is there")
     page = tab.context.new_page()
@@ -281,7 +257,7 @@ def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
         tab.wait(lambda: parameter(tab, "taper") == 0.01, "the design is loaded")
         assert tab.session.state.design == changed(trunk, at)
         assert board.map.names == ("revolution", "taper")
-        tab.open("Atlas")
+        tab.open("Plots")
         tab.choose("to the right", "taper")
         tab.wait(lambda: board.map.names == ("taper", "revolution"), "the axes change places")
         tab.settle()

@@ -105,7 +105,7 @@ def test_refused_numbers_say_why_under_their_field_in_its_own_unit(tab):
 
 @pytest.mark.large
 def test_an_activation_below_zero_is_typed(tab):
-    tab.open("Activation")
+    tab.open("Move")
     typed(tab, "γ left", "-0.05")
     tab.wait(lambda: tab.session.state.activation[0] == -0.05, "the bundle pulls")
 
@@ -127,6 +127,31 @@ def test_every_control_has_a_tooltip_with_its_meaning(tab):
     assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")
 
 
+def test_keys_choose_tabs_and_show_their_table_but_not_while_one_types(tab):
+    def chosen() -> str:
+        return tab.page.locator("[role=tab][aria-selected=true]").first.inner_text()
+
+    names = [one.inner_text() for one in tab.page.get_by_role("tab").all()]
+    tab.page.locator("canvas").first.focus()
+    for number in (3, 1):
+        tab.page.keyboard.press(str(number))
+        tab.wait(lambda number=number: chosen() == names[number - 1], "the key chooses a tab")
+    table = tab.page.locator("dialog.keys")
+    for closing in ("?", "Escape"):
+        tab.page.keyboard.press("?")
+        table.get_by_text("choose a tab").wait_for()
+        tab.page.keyboard.press(closing)
+        table.wait_for(state="hidden")
+    fields = tab.slider("taper φ [deg]"), tab.page.locator("form input:visible").first
+    for typed in fields:
+        typed.focus()
+        tab.page.keyboard.press("2")
+        tab.page.keyboard.press("?")
+        assert chosen() == names[0]
+        assert not table.is_visible()
+    tab.page.keyboard.press("Escape")  # restores what was in the field
+
+
 def test_an_expression_with_a_unit_is_worked_out_and_a_wrong_one_says_why(tab):
     place = typed(tab, "taper φ [deg]", "pi/120 rad")
     tab.wait(lambda: value(tab, "taper") == pytest.approx(np.radians(1.5)), "it is applied")
@@ -142,7 +167,7 @@ def test_an_expression_with_a_unit_is_worked_out_and_a_wrong_one_says_why(tab):
 
 
 def test_components_of_a_typed_target_are_expressions(tab):
-    tab.open("Inverse")
+    tab.open("Move")
     place = tab.page.locator("xpath=//label[normalize-space()='target / L']/following::input[1]")
     place.fill("(0.1*2 m, 0, 30 cm + 0.4 m)")
     place.press("Enter")

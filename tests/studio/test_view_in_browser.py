@@ -50,7 +50,7 @@ def like(image: np.ndarray, color) -> int:
 
 
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
-    show(tab, point_size=0.02)
+    show(tab)
     seen = like(pixels(tab), BLUE)
     show(tab, cut="none")
     hidden = like(pixels(tab), BLUE)
@@ -66,8 +66,8 @@ def test_the_arm_is_seen_through_the_exact_surface(tab):
         with_arm, without = (pixels_of(tab, arm=shown, **look) for shown in (True, False))
         return int((np.abs(with_arm - without).max(axis=-1) > 0.03).sum())
 
-    behind = arm(cloud=False, surface=True, handle=False)
-    assert behind > 0.8 * arm(cloud=False, surface=False, handle=False)
+    behind = arm(cloud=False, surface=True, mouse="none")
+    assert behind > 0.8 * arm(cloud=False, surface=False, mouse="none")
 
 
 def pixels_of(tab, **look) -> np.ndarray:
@@ -87,7 +87,7 @@ def test_no_point_is_drawn_before_the_arm_from_any_side(tab):
 
     for view in VIEWS:
         tab.session.look_from(view)
-        there, seen = arm(cloud=False), arm(cloud=True, point_size=0.02)
+        there, seen = arm(cloud=False), arm(cloud=True)
         assert there > 50
         assert seen > 0.9 * there
 
@@ -106,7 +106,7 @@ def test_a_page_that_nobody_touches_sends_no_clouds(tab, monkeypatch):
 @pytest.mark.large
 def test_the_target_is_seen_through_the_cloud(tab):
     target = np.array([0.0, 0.1, 0.5])
-    show(tab, arm=False, ghosts=False, point_size=0.02)
+    show(tab, arm=False, ghosts=False)
     tab.session.job(SolveInverse).aim(target)
     tab.wait(lambda: tab.session.answer is not None, "the target is solved for")
     image = pixels(tab)
@@ -143,9 +143,8 @@ def test_parallels_stay_parallel_for_the_orthographic_camera(tab):
         lambda: like(pixels(tab), BLUE) > 0.5 * arm > 0,
         "the arm is neither cut off nor out of sight",
     )
-    tab.press("Reset the view")
+    tab.page.get_by_label("orthographic").uncheck()
     tab.wait(lambda: tab.session.client.camera.fov == pytest.approx(FOV, rel=1e-3), "it is reset")
-    assert not tab.session.state.appearance.orthographic
 
 
 @pytest.mark.large
@@ -200,7 +199,8 @@ def test_a_saved_picture_has_key_numbers_and_design_under_the_scene(tab, tmp_pat
     tab.settle()
     camera = tab.session.client.camera
     tab.open("Export")
-    image = imread(tab.save("Save picture (PNG)", tmp_path))[..., :3]
+    tab.choose("picture", "as it is seen (.png)")
+    image = imread(tab.save("Save picture", tmp_path))[..., :3]
     assert image.shape[1] == camera.image_width
     below = image[camera.image_height :]
     assert len(below) > 80
@@ -216,7 +216,7 @@ def test_the_window_is_called_softreach(tab):
 
 @pytest.mark.large
 def test_numbers_are_dark_on_light_and_light_on_dark(tab):
-    show(tab, cloud=False, arm=False, handle=False)
+    show(tab, cloud=False, arm=False, mouse="none")
     name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x / L")
 
     def around() -> np.ndarray:

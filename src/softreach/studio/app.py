@@ -38,7 +38,7 @@ from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start, state_in_request
 from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import CompilationWatch, Latest
+from softreach.studio.work import CompilationWatch, IdleCompiler, Latest, StaleCheck
 from softreach.support.errors import InvalidInput, SoftreachError
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ JOBS: tuple[type[Job], ...] = (
 
 _CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
 _CAMERA_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
+_PATIENCE = 0.5  # [s]
 _MOST_LEFT = 20  # closed tabs whose work is remembered
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
@@ -77,6 +78,7 @@ class Studio:
         token: str = "",
         *,
         work: KeptWork | None = None,
+        compile_ahead: bool = False,
     ) -> None:
         """Start serving.
 
@@ -86,6 +88,8 @@ class Studio:
             port: None for a free one.
             token: What every page has to know; "" for nothing.
             work: Where the work is kept when tabs and server end; nowhere by default.
+            compile_ahead: Whether to compile what may be needed, such as for loads, once the first
+                picture is complete.
 
         Raises:
             InvalidInput: The address cannot be used.
@@ -101,6 +105,8 @@ class Studio:
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
+        self._compiler = IdleCompiler() if compile_ahead else None
+        self._rested = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
         self._libraries = threading.Thread(target=_load_libraries, daemon=True)
         self._libraries.start()
@@ -129,6 +135,9 @@ class Studio:
         """Stop serving."""
         self._compilation.close()
         self._retold.close()
+        self._rested.close()
+        if self._compiler is not None:
+            self._compiler.close()
         for session in list(self.sessions.values()):
             session.close()
         self._disconnect_tabs()
@@ -186,8 +195,16 @@ class Studio:
         if session.atlas is not None and session.board is None:
             session.say("There is no map: the atlas is no grid of two parameters or more.")
         attempt(session, lambda: self._follow_link(session))
+        self._rested.submit(partial(self._compile_ahead, session))
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)
+
+    def _compile_ahead(self, session: Session, check: StaleCheck) -> None:
+        """Compile what may be needed once the first picture of a tab is complete."""
+        while self._compiler is not None and not session.settle(_PATIENCE):
+            check()
+        if self._compiler is not None:
+            self._compiler.start()
 
     def _follow_link(self, session: Session) -> None:
         """Bring a tab that was opened by a link into its state."""
@@ -277,23 +294,17 @@ def _furnish(session: Session, url: str) -> None:
     tabs = gui.add_tab_group()
     kinds = {
         "Design": (DesignPanel,),
-        "Parts": (PartsPanel,),
-        "Loads": (LoadsPanel,),
-        "Activation": (ActivationPanel,),
-        "Inverse": (DragPanel, InversePanel),
-        "Path": (PathPanel,),
+        "Parts": (LoadsPanel, PartsPanel),
+        "Move": (DragPanel, ActivationPanel, InversePanel, PathPanel),
         "View": (ViewPanel,),
-        "Plots": (PlotsPanel,),
+        "Plots": (PlotsPanel,) if session.board is None else (PlotsPanel, AtlasPanel),
         "Compare": (ComparePanel,),
-        "Calibrate": (CalibratePanel,),
-        "Search": (SearchPanel,),
+        "Goals": (SearchPanel, CalibratePanel),
     }
     for name, together in kinds.items():
         tab = tabs.add_tab(name)
         made += [kind(gui, tab, session) for kind in together]
     ExportPanel(gui, tabs.add_tab("Export"), session, url)
-    if session.board is not None:
-        made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.board))
     session.panels = made
     clickable = AtlasPanel | SearchPanel | PathPanel | InversePanel
     waiting = [panel for panel in reversed(made) if isinstance(panel, clickable)]

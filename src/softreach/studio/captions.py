@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.markup import Part, Strong, Swatch, Term
+from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.clouds import FAINT
 from softreach.support.quantity import quantity
 
@@ -40,11 +40,16 @@ def size_text(size: Size) -> str:
     return f"{size.name} {quantity(size.value, size.unit, max(size.error, _FINEST))}"
 
 
-def reach_text(reach: Reach) -> list[Part]:
-    """The numbers of a reach in one line."""
+def reach_text(reach: Reach, share: str = "") -> list[Part]:
+    """The numbers of a reach in one line.
+
+    Args:
+        reach: What is shown.
+        share: How the size compares, such as with that without loads.
+    """
     parts: list[Part] = []
     if reach.size is not None:
-        parts += [Term(size_text(reach.size), _SIZES[reach.size.name]), " · "]
+        parts += [Term(size_text(reach.size), _SIZES[reach.size.name]), f"{share} · "]
     if not math.isnan(reach.unreachability):
         parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
     if reach.lost_share:
@@ -76,25 +81,15 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 
 
-def loads_text(session: Session) -> list[Part]:
-    """Reach under loads beside that without; nothing for an arm without loads."""
-    if session.state.design.loads is None:
-        return []
-    loaded, free = _present_size(session), session.free
-    bare = free.size if free is not None else None
-    if bare is None:
-        return []
-    free_text = f"free {bare.value:.4f} {bare.unit}"
-    if loaded is None:
-        return [free_text]
-    share = f", {100 * loaded.value / bare.value:.0f} %" if bare.value > 0 else ""
-    return [Strong(f"loaded {loaded.value:.4f} {loaded.unit}"), f" · {free_text}{share}"]
-
-
-def _present_size(session: Session) -> Size | None:
-    """The size of what the design itself can reach, not the one before it."""
-    reach = session.reach
-    return reach.size if reach is not None and reach.arm == session.state.design else None
+def loaded_share(session: Session) -> str:
+    """Share of the reach without loads that is left; nothing for an arm without loads."""
+    reach, free = session.reach, session.free
+    if reach is None or reach.arm.loads is None or reach.arm != session.state.design:
+        return ""
+    if reach.size is None or free is None or free.size is None or free.size.value <= 0:
+        return ""
+    share = f"{100 * reach.size.value / free.size.value:.0f} %"
+    return f" under loads, {share} of {free.size.value:.4f} {free.size.unit} without"
 
 
 def tip_text(session: Session) -> list[Part]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.atlas_map import MapBoard, board_of
 from softreach.studio.plots.plot import Figures
@@ -254,12 +255,17 @@ class Session:
         if state.camera is not None:
             self.look_as(state.camera)
 
-    def picked_sample(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
-        """Number of the sample under the cursor, of those that can be seen; None beside all.
+    def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
+        """Place of the tip [m] in the sample under the cursor, of those that can be seen.
+
+        It is computed anew: a point is rounded, at the rim perhaps to out of reach.
 
         Args:
             origin: Of the ray through the pixel: where the camera is [L].
             direction: Of the ray, any length.
+
+        Returns:
+            Shape (3,); None beside all samples.
         """
         reach, look = self.reach, self.state.appearance
         shown = look.cloud or look.surface
@@ -269,7 +275,10 @@ class Session:
         hidden = self.scene.clouds.hidden(points) & shows_cloud(reach, look)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
         hit = picked_point(points[seen], origin, direction, _CLICK * self.camera.narrowness)
-        return None if hit is None else int(shown_rows(reach, look.level)[seen[hit]])
+        if hit is None:
+            return None
+        sample = int(shown_rows(reach, look.level)[seen[hit]])
+        return tip_positions(reach.arm, [reach.cloud.activation.values[sample]])[0]
 
     def look_from(self, view: str) -> None:
         """See everything from one of `camera.VIEWS`."""

@@ -246,9 +246,28 @@ class Part(NamedTuple):
     """The ring that an actuator is in."""
 
 
+_BODY = Part("body", ("", "profile"), "")
+_BODY_LABELS = {
+    "length": "length [mm]",
+    "radius_ratio": "inner / outer radius",
+    "bore_ratio": "bore / outer radius",
+    "poisson_ratio": "Poisson's ratio \N{GREEK SMALL LETTER NU}",
+}
+
+
+def body_numbers(arm: Manipulator) -> list[ShownParameter]:
+    """The parameters of the body that have no slider, in the words of those that have one."""
+    slid = {slider.name for slider in slider_parameters(arm)}
+    return [
+        number._replace(label=_BODY_LABELS.get(number.name, number.label))
+        for number in part_parameters(arm, _BODY)
+        if number.name not in slid
+    ]
+
+
 def parts(arm: Manipulator) -> dict[str, Part]:
     """Body, core, rings and actuators of an arm by their labels."""
-    listed = [Part("body", ("", "profile"), "")]
+    listed = [_BODY]
     if arm.section.core is not None:
         listed.append(Part("core", ("core",), ""))
     for k, ring in enumerate(arm.section.rings):

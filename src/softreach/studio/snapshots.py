@@ -9,13 +9,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, Self
 
+from softreach.arm.manipulator import Manipulator
 from softreach.studio.reach import Reach, Size
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 
-__all__ = ["Numbers", "Snapshot", "SnapshotStore", "Snapshots", "numbers_of"]
+__all__ = ["REFERENCE", "Numbers", "Snapshot", "SnapshotStore", "Snapshots", "numbers_of"]
 
 VERSION = 1
+REFERENCE = "reference"
+"""Name of a design that an older state keeps without a snapshot."""
 _LONGEST_NAME = 60
 _MOST = 100
 
@@ -133,6 +136,11 @@ class Snapshots:
     def named(self, name: str) -> Snapshot | None:
         """The snapshot of this name."""
         return next((snapshot for snapshot in self.all if snapshot.name == name), None)
+
+    def name_of(self, design: Manipulator) -> str:
+        """Name of the first snapshot of a design; "reference" for that of none."""
+        names = (snapshot.name for snapshot in self.all if snapshot.state.design == design)
+        return next(names, REFERENCE)
 
     def free_name(self) -> str:
         """A name that is not taken."""

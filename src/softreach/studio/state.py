@@ -87,6 +87,15 @@ CUTS = {
 }
 """Parts of a cloud that are cut away in front of the arm: name -> what the menu says."""
 
+MOUSE = {
+    "tip": "drags the tip",
+    "target": "sets the target",
+    "path": "adds points to the path",
+    "place": "adds places to reach",
+    "none": "turns the view alone",
+}
+"""Uses of the mouse in the scene: name -> what the menu says."""
+
 Vector = tuple[float, float, float]
 
 _AXES = ("none", "x", "y", "z")
@@ -132,8 +141,6 @@ class Appearance:
     level: int = 17
     color: str = "effort"
     """One of `colors.color_names`."""
-    point_size: float = 0.007
-    """[L]."""
     slice: Slice = field(default_factory=Slice)
     cut: str = "window"
     """Part of the cloud that is cut away in front of the arm: one of `CUTS`."""
@@ -155,10 +162,15 @@ class Appearance:
     """The cloud without loads, faint, around that of a loaded arm."""
     ghosts: bool = True
     """The shapes of all solutions of the inverse problem at once."""
-    handle: bool = True
-    """The ball on the tip that is dragged."""
+    mouse: str = "tip"
+    """Use of the mouse in the scene, one of `MOUSE`; it turns the view besides."""
     map: MapView = field(default_factory=MapView)
     plots: PlotSettings = field(default_factory=PlotSettings)
+
+    @property
+    def handle(self) -> bool:
+        """True if there is a ball on the tip, to be dragged."""
+        return self.mouse == "tip"
 
     @property
     def surfaces(self) -> bool:
@@ -170,7 +182,8 @@ class Appearance:
             raise InvalidInput("level", self.level, f"{LEVELS[0]} to {LEVELS[-1]}")
         if self.cut not in CUTS:
             raise InvalidInput("cut", self.cut, f"one of {', '.join(CUTS)}")
-        _check_number("point_size", self.point_size, 0.0, 1.0)
+        if self.mouse not in MOUSE:
+            raise InvalidInput("mouse", self.mouse, f"one of {', '.join(MOUSE)}")
         _check_plain("appearance", self)
 
 
@@ -206,8 +219,9 @@ class StudioState:
     target: Vector | None = None
     """Place where the tip should go [m]."""
     reference: Manipulator | None = None
-    """A design kept for comparison."""
+    """The design of a snapshot that is drawn around this one."""
     side_by_side: bool = False
+    """It is drawn beside this one instead."""
     camera: Camera | None = None
     path: TipPath | None = None
     """Path that the tip follows."""
@@ -277,7 +291,7 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
 
 
 def _fields(values: dict[str, Any]) -> dict[str, Any]:
-    look = dict(values["appearance"])
+    look = _looks(dict(values["appearance"]))
     look["slice"], look["map"] = Slice(**look["slice"]), MapView(**look["map"])
     look["plots"] = PlotSettings.from_fields(look.get("plots", {}))
     camera, reference, path = values["camera"], values["reference"], values.get("path")
@@ -292,6 +306,14 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "path": path and TipPath.from_fields(path),
         "needs": str(values.get("needs", "")),
     }
+
+
+def _looks(look: dict[str, Any]) -> dict[str, Any]:
+    """Looks that a state holds; an older one has a size of points and a switch of the ball."""
+    look.pop("point_size", None)
+    if "handle" in look:
+        look["mouse"] = "tip" if look.pop("handle") else "none"
+    return look
 
 
 def _camera(position: Any, look_at: Any, aspect: float | None = None) -> Camera:

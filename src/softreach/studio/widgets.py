@@ -52,6 +52,13 @@ class Line:
         self._widget.remove()
 
 
+def show_where(wanted: bool, *widgets: Any) -> None:
+    """Show widgets that mean something now, and hide them else."""
+    for widget in widgets:
+        if widget.visible != wanted:
+            widget.visible = wanted
+
+
 class PictureFrame:
     """Place for a picture that changes, empty until there is one."""
 

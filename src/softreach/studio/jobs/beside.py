@@ -1,4 +1,4 @@
-"""Jobs of other designs in the scene: the arm without its loads, and the reference."""
+"""Jobs of other designs in the scene: the arm without its loads, and that of a snapshot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEVEL = 16
 class DrawFree(Job):
     """The reach of a loaded arm without its loads, faint behind the loaded one."""
 
-    depends_on = "unloaded", "appearance.free", "appearance.point_size", "appearance.slice"
+    depends_on = "unloaded", "appearance.free", "appearance.slice"
     only_with = "design.loads"
 
     def run(self, check: StaleCheck) -> None:
@@ -51,11 +51,11 @@ class DrawFree(Job):
 
 
 class DrawReference(Job):
-    """The reach of the design kept for comparison, around this one's or beside it."""
+    """The reach of the design of a snapshot, around this one's or beside it."""
 
     depends_on = (
         "reference", "side_by_side",
-        "appearance.level", "appearance.color", "appearance.point_size", "appearance.slice",
+        "appearance.level", "appearance.color", "appearance.slice",
     )  # fmt: skip
     only_with = "reference"
 
@@ -71,8 +71,9 @@ class DrawReference(Job):
             session.reference = self._reach_of(reference, check)
         if session.reference is not None:
             shift = beside(session.reference) if session.state.side_by_side else np.zeros(3)
+            name = session.snapshots.name_of(session.reference.arm)
             with session.drawing, session.client.atomic():
-                session.scene.draw_reference(session.reference, state.appearance, shift)
+                session.scene.draw_reference(session.reference, state.appearance, shift, name)
             session.follow(DrawReferenceArm)
         session.show()
 
@@ -86,7 +87,7 @@ class DrawReference(Job):
 
 
 class DrawReferenceArm(Job):
-    """The arm of the reference beside this one, in the same activation."""
+    """The arm of that design beside this one, in the same activation."""
 
     depends_on = "reference", "activation", "appearance.arm"
     only_with = "side_by_side"

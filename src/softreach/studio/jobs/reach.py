@@ -86,7 +86,7 @@ class DrawCloud(Job):
     """Points, their colors, and the axes around them."""
 
     depends_on = (
-        "appearance.level", "appearance.color", "appearance.point_size", "appearance.slice",
+        "appearance.level", "appearance.color", "appearance.slice",
         "appearance.cloud", "appearance.surface", "appearance.axes", "appearance.lit",
     )  # fmt: skip
 

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_USUAL, _SIZE = 1 << 17, 0.007  # points of the usual cloud, and the edge of each [L]
+_SIZES = 0.003, 0.02
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dots:
@@ -114,6 +117,11 @@ class Clouds:
             point_shape=dots.shape,
             point_shading="gradient",
         )
+
+
+def point_size(count: int) -> float:
+    """Edge of each of so many points of a cloud [L]: the fewer there are, the larger they are."""
+    return float(np.clip(_SIZE * (_USUAL / max(count, 1)) ** (1 / 3), *_SIZES))
 
 
 # Colors of the points, and the key to them.

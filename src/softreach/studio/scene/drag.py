@@ -20,6 +20,7 @@ OnDrag = Callable[[str, Array], None]
 """(phase "start", "update" or "end"; where the ball should be [L])."""
 
 _HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
+_CLEAR = 0.4  # opacity of a ball that is seen through
 _COLOR, _LIGHT, _LAG = (25, 25, 30), (255, 225, 90), (220, 30, 120)
 
 
@@ -47,13 +48,16 @@ class DragBall:
         self._offset = np.zeros(3)
         self._dark = False
 
-    def move(self, tip: Array | None, radius: float = 0.0, *, dark: bool = False) -> None:
+    def move(
+        self, tip: Array | None, radius: float = 0.0, *, dark: bool = False, clear: bool = False
+    ) -> None:
         """Put the ball on the tip [L], around an arm of this radius [L]; None hides it.
 
         Args:
             tip: Where the ball is.
             radius: Of the arm there.
             dark: Whether the page is dark, and the ball light.
+            clear: Whether what is inside is seen, such as where a path begins.
         """
         if tip is None:
             if self._nodes is not None:
@@ -68,6 +72,8 @@ class DragBall:
         if dark != self._dark:
             self._dark = dark
             halo.color = ball.color = _LIGHT if dark else _COLOR
+        if (opacity := _CLEAR if clear else None) != ball.opacity:
+            ball.opacity = opacity
         halo.visible = True
 
     def show_lag(self, wanted: Array | None, tip: Array | None, gap: float = 0.0) -> None:

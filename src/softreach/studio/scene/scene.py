@@ -29,6 +29,7 @@ from softreach.studio.scene.clouds import (
     Dots,
     in_slice,
     lit,
+    point_size,
     sample_colors,
     shaded,
 )
@@ -60,7 +61,7 @@ _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a d
 _MARK: Color = (235, 90, 0)
 _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
-_FREE_LEVEL, _FREE_SIZE = 15, 0.6
+_FREE_LEVEL, _FREE_SIZE = 15, 0.4
 _FAINT = 0.2  # opacity of the reach without loads
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
@@ -94,8 +95,9 @@ class Scene:
         kept, unstable = in_slice(points, look.slice), unstable_samples(reach, look.level)
         stable = kept & ~unstable
         colors = lit(coloring.rgb, points) if look.lit else coloring.rgb
-        self._points("/cloud", points[stable], colors[stable], look.point_size)
-        self._draw_unstable(points[kept & unstable], look.point_size)
+        size = point_size(len(points))
+        self._points("/cloud", points[stable], colors[stable], size)
+        self._draw_unstable(points[kept & unstable], size)
         self._slab(look.slice, points)
         return coloring.key
 
@@ -117,7 +119,7 @@ class Scene:
         points = cloud_points(reach, _FREE_LEVEL)
         kept = in_slice(points, look.slice)
         gray = np.array(FAINT, np.uint8)
-        self._points("/free", points[kept], gray, _FREE_SIZE * look.point_size)
+        self._points("/free", points[kept], gray, _FREE_SIZE * point_size(len(points)))
 
     def draw_arm(
         self,
@@ -310,24 +312,33 @@ class Scene:
         """A small ball."""
         self._api.add_icosphere(path, 0.02, _MARK, position=center)
 
-    def draw_reference(self, reach: Reach, look: Appearance, shift: Array) -> None:
-        """Another design: its boundary in gray around this one's cloud, or its cloud beside it."""
+    def draw_reference(self, reach: Reach, look: Appearance, shift: Array, name: str) -> None:
+        """Another design: its boundary in gray around this one's cloud, or its cloud beside it.
+
+        Args:
+            reach: Its reach.
+            look: How this design is drawn.
+            shift: How far beside it stands [L]; zero for around.
+            name: Of the other design.
+        """
         self.remove("/reference")
         if np.any(shift):
-            self._draw_beside(reach, look, shift)
+            self._draw_beside(reach, look, shift, name)
         elif isinstance(reach.exact, ReachableSolid):
             self._surface("/reference", reach.sheets, reach, look.slice, _REFERENCE, 0.3)
         else:
             points = cloud_points(reach, min(look.level, 16))
-            self._points("/reference", points, np.array(_REFERENCE, np.uint8), look.point_size)
+            gray = np.array(_REFERENCE, np.uint8)
+            self._points("/reference", points, gray, point_size(len(points)))
 
-    def _draw_beside(self, reach: Reach, look: Appearance, shift: Array) -> None:
+    def _draw_beside(self, reach: Reach, look: Appearance, shift: Array, name: str) -> None:
         level = min(look.level, 16)
         points, coloring = cloud_points(reach, level), sample_colors(reach, level, look.color)
         kept = in_slice(points, look.slice)
-        self._points("/reference/cloud", points[kept] + shift, coloring.rgb[kept], look.point_size)
+        size = point_size(len(points))
+        self._points("/reference/cloud", points[kept] + shift, coloring.rgb[kept], size)
         above = np.array([0, 0, points[:, 2].max(initial=0.0) + 0.12])
-        add_label(self._api, "/reference/name", "reference", above + shift)
+        add_label(self._api, "/reference/name", name, above + shift)
         add_label(self._api, "/reference/other", "this design", above)
 
     def draw_reference_arm(

@@ -43,6 +43,60 @@ document.documentElement.addEventListener("keydown", function (event) {
   if (own && !event.ctrlKey && !event.metaKey) event.stopPropagation();
 });
 
+// Keys of the page, in one table: how a key is written, what it does, and what is done here, if
+// anything. The rest is viser's, or a command of the studio's.
+(function () {
+  var keys = [
+    ["1 \u2026 8", "choose a tab", /^[1-8]$/, chooseTab],
+    ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"],
+    ["Enter, Esc in a field", "apply what is typed, restore what was there"],
+    ["W A S D, Q E, arrows", "move the camera"],
+    ["?", "show this table, or hide it", /^\?$/, toggleTable],
+  ];
+
+  function chooseTab(key) {
+    var lists = [...document.querySelectorAll("[role=tablist]")].map(function (list) {
+      return list.querySelectorAll("[role=tab]");
+    });
+    lists.sort(function (one, other) { return other.length - one.length; });
+    var enter = new KeyboardEvent("keydown", { key: "Enter", bubbles: true }); // to a click it is deaf
+    if (lists[0] && lists[0][key - 1]) lists[0][key - 1].dispatchEvent(enter);
+  }
+
+  function toggleTable() {
+    var shown = document.querySelector("dialog.keys");
+    if (shown) shown.close();
+    else tableOfKeys().showModal();
+  }
+
+  function tableOfKeys() {
+    var dialog = document.createElement("dialog"), table = document.createElement("table");
+    dialog.className = "keys";
+    dialog.setAttribute("aria-label", "keys");
+    keys.forEach(function (key) {
+      var row = table.insertRow();
+      row.insertCell().textContent = key[0];
+      row.insertCell().textContent = key[1];
+    });
+    dialog.append(table);
+    dialog.addEventListener("click", function () { dialog.close(); });
+    dialog.addEventListener("close", function () { dialog.remove(); });
+    return document.body.appendChild(dialog);
+  }
+
+  addEventListener("keydown", function (event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!document.querySelector("[data-history]")) return; // a page that was saved has no tabs
+    if (event.target.closest && event.target.closest("input, textarea, select, [role=slider]")) return;
+    keys.forEach(function (key) {
+      if (!key[2] || !key[2].test(event.key)) return;
+      event.preventDefault();
+      event.stopPropagation();
+      key[3](event.key);
+    });
+  }, true);
+})();
+
 // What changes with the page: names of controls, which steps can be undone, how wide the panel is.
 (function () {
   // Readers of screens hear the label in front of a control; buttons that are pictures get words.

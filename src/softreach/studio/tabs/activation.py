@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
 from softreach.studio.captions import tip_text
-from softreach.studio.fields import Attribute, Fields, attribute
+from softreach.studio.fields import Attribute, Fields
 from softreach.studio.scene.scene import MOST_BUNDLES
 from softreach.studio.state import StudioState, rod_of
 from softreach.studio.widgets import Line
@@ -33,13 +33,11 @@ class ActivationPanel:
             self._tip = Line(gui)
             self._folder = gui.add_folder("activation")
             self._hidden = Line(gui)
-            self._others.checkbox(
-                "show trail", attribute("appearance.trail"), "Draws where the tip has been"
-            )
             self._others.button(
                 "Rest",
                 lambda state: state.replace(activation=()),
                 "Sets every activation to 0, or the nearest to it",
+                color="gray",
             )
 
     def show(self, session: Session) -> None:

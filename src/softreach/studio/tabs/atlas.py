@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.atlas_map import MapBoard, map_choices, metric_names, nearest_numbers
+from softreach.studio.atlas_map import map_choices, metric_names, nearest_numbers
 from softreach.studio.fields import Attribute, Fields, attempt, attribute
 from softreach.studio.state import MapView, StudioState
 from softreach.studio.widgets import Line, PictureFrame
@@ -27,12 +27,14 @@ _HINT = (
 class AtlasPanel:
     """Metric and parameters of the map."""
 
-    def __init__(self, gui: GuiApi, tab: Any, session: Session, board: MapBoard) -> None:
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        board = session.board
+        assert board is not None
         self._session, self._board, self._atlas = session, board, board.atlas
         self._explained: tuple[Manipulator, str] | None = None
         self._fields = fields = Fields(session, dragged=False)
         names = {name: name for name in map(str, self._atlas["status"].dims)}
-        with tab:
+        with tab, gui.add_folder("map of the atlas"):
             Line(gui, _HINT)
             fields.dropdown(
                 "metric",
@@ -46,7 +48,7 @@ class AtlasPanel:
             fields.dropdown("upward", names, self._choice("up"), "The parameter from bottom to top")
             fields.checkbox("show the map", attribute("appearance.map.shown"), "Beside the arm")
             self._numbers = Line(gui)
-            self._picture = PictureFrame(gui, gui.add_folder("the map"))
+            self._picture = PictureFrame(gui, gui.add_folder("the map", expand_by_default=False))
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the state."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 _HINT = "Measured poses of the real arm tell the numbers of its design."
 _FILE_SIZE = 20_000_000  # bytes of a table that is loaded
 _POSE: tuple[str, ...] = ("pose", "pose.position", "pose.rotation")
+_ADD = "choose a number"
 _SHOWN = ("as designed", "as calibrated")
 _ABOUT = {
     "load": "A table with a column for each input and three for each marker, each with its unit: "
@@ -36,7 +37,7 @@ _ABOUT = {
     "markers": "Predictions of the design, or of the calibrated arm, which is drawn over it",
     "free": "Numbers that the fit may change, separated by commas: pose is where the base stands; "
     "* is any text; a = b ties two",
-    "number": "A number of this design",
+    "number": "A number of this design that the fit may change too",
     "hold out": "Share of the samples, by chance, that the fit does not see and is tested on",
     "fit": "Finds the numbers with which predicted markers come nearest to measured ones",
     "apply": "Makes the calibrated arm the design; can be undone",
@@ -66,7 +67,7 @@ class CalibratePanel:
         """The design whose numbers are offered."""
         self._bench: Bench | None = None
         self._file: UploadedFile | None = None
-        with tab:
+        with tab, gui.add_folder("measured poses", expand_by_default=False):
             Line(gui, _HINT)
             self._load = gui.add_upload_button("Load measured poses (CSV)", hint=_ABOUT["load"])
             self._columns = TypedField(gui, "columns", {}, _ABOUT["columns"], _COLUMNS)
@@ -87,8 +88,7 @@ class CalibratePanel:
 
     def _fit_widgets(self, gui: GuiApi) -> None:
         self._free = gui.add_text("free", "pose", hint=_ABOUT["free"])
-        self._number = gui.add_dropdown("number", _POSE, hint=_ABOUT["number"])
-        self._add = gui.add_button("Add to the free numbers", hint="This number may change too")
+        self._number: Any = gui.add_dropdown("free also", (_ADD, *_POSE), hint=_ABOUT["number"])
         self._held = gui.add_number(
             "hold out", 0.0, min=0.0, max=0.9, step=0.05, hint=_ABOUT["hold out"]
         )
@@ -103,7 +103,7 @@ class CalibratePanel:
         self._at.on_update(self._moved)
         self._shown.on_update(self._chosen)
         bind_button(self._clear, session, self._remove)
-        bind_button(self._add, session, self._added)
+        self._number.on_update(lambda _: attempt(session, self._added))
         bind_button(self._fit, session, self._ask)
         bind_button(self._apply, session, self._applied)
 
@@ -118,7 +118,7 @@ class CalibratePanel:
         if design is not self._design:
             self._design = design
             known = parameters(design).items()
-            self._number.options = (*_POSE, *(name for name, p in known if not p.whole))
+            self._number.options = _ADD, *_POSE, *(name for name, p in known if not p.whole)
         self._residuals.say(_residuals_text(bench, session))
         result = bench.result
         self._summary.show(bench.summary)
@@ -192,8 +192,9 @@ class CalibratePanel:
         self._session.show()
 
     def _added(self) -> None:
-        names = [*self._names(), self._number.value]
-        self._free.value = ", ".join(dict.fromkeys(names))
+        name, self._number.value = self._number.value, _ADD
+        if name != _ADD:
+            self._free.value = ", ".join(dict.fromkeys([*self._names(), name]))
 
     def _names(self) -> tuple[str, ...]:
         return tuple(name.strip() for name in self._free.value.split(",") if name.strip())

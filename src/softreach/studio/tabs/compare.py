@@ -1,4 +1,4 @@
-"""Comparison of snapshots of the work, their designs side by side in a table."""
+"""Comparison of snapshots of the work: in a table, and drawn around or beside the design."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from softreach.studio.comparison import (
     comparison_csv,
     comparison_html,
 )
-from softreach.studio.fields import bind_button
-from softreach.studio.snapshots import Snapshot, numbers_of
+from softreach.studio.fields import attempt, bind_button
+from softreach.studio.reach import beside
+from softreach.studio.snapshots import REFERENCE, Snapshot, numbers_of
+from softreach.studio.state import StudioState
 from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 
@@ -27,6 +29,7 @@ _HINT = "Keep designs as snapshots to see them side by side here."
 _NONE = "none yet"
 _NOW = "now"
 """Name of the row of the design in the fields."""
+_UNDRAWN, _AROUND, _BESIDE = "not drawn", "in gray around this design", "beside this design"
 
 
 class ComparePanel:
@@ -40,38 +43,59 @@ class ComparePanel:
             self._table = Line(gui, _HINT)
             self._name = gui.add_text("name", "", hint="of the snapshot; empty for the next number")
             take = gui.add_button("Take snapshot", hint="keep design, activation and target")
-            self._choice: Any = gui.add_dropdown(
-                "snapshot", (_NONE,), hint="the one to restore or delete"
-            )
-            restore = gui.add_button("Restore", hint="go back to it; the view stays")
-            delete = gui.add_button("Delete", color="gray", hint="forget it, for good")
-            save = gui.add_button(
-                "Save table (CSV)",
-                color="gray",
-                hint="with errors and differences, for a spreadsheet",
-            )
+            self._of_chosen = gui.add_folder("snapshots", visible=False)
+            with self._of_chosen:
+                self._choice: Any = gui.add_dropdown(
+                    "snapshot", (_NONE,), hint="the one to draw, restore or delete"
+                )
+                self._drawn: Any = gui.add_dropdown(
+                    "draw",
+                    (_UNDRAWN, _AROUND, _BESIDE),
+                    hint="what it reaches, and beside this design its arm too, pulled as this is",
+                )
+                restore = gui.add_button("Restore", hint="go back to it; the view stays")
+                delete = gui.add_button("Delete", color="gray", hint="forget it, for good")
+                save = gui.add_button(
+                    "Save table (CSV)",
+                    color="gray",
+                    hint="with errors and differences, for a spreadsheet",
+                )
+        self._choice.on_update(lambda _: self._follow_drawn(session.state))
+        self._drawn.on_update(self._draw)
         bind_button(take, session, self._take)
         bind_button(restore, session, self._restore)
-        bind_button(delete, session, lambda: session.snapshots.remove(self._chosen().name))
+        bind_button(delete, session, self._delete)
         bind_button(save, session, self._save)
 
     def show(self, session: Session) -> None:
         """Bring menu and table in line with the snapshots and the design."""
         with self._lock:
             self._measure(session)
-            snapshots, design = session.snapshots.all, session.state.design
+            self._follow_drawn(session.state)
+            kept, design = self._kept(), session.state.design
             numbers = numbers_of(session.reach, session.state)
-            if self._known == (snapshots, design, numbers):
+            if self._known == (kept, design, numbers):
                 return
-            self._known = (snapshots, design, numbers)
-            self._follow_menu(tuple(each.name for each in snapshots))
-            if not snapshots:
+            self._known = (kept, design, numbers)
+            self._follow_menu(tuple(each.name for each in kept))
+            self._of_chosen.visible = bool(kept)
+            if not kept:
                 self._comparison = None
                 self._table.say(_HINT)
                 return
-            kept = [Candidate(each.name, each.state.design, each.numbers) for each in snapshots]
-            self._comparison = compared([*kept, Candidate(_NOW, design, numbers)])
+            rows = [Candidate(each.name, each.state.design, each.numbers) for each in kept]
+            self._comparison = compared([*rows, Candidate(_NOW, design, numbers)])
             self._table.show(comparison_html(self._comparison))
+
+    def _kept(self) -> tuple[Snapshot, ...]:
+        """The snapshots, and what an older state draws without one."""
+        session, kept = self._session, self._session.snapshots.all
+        drawn = session.state.reference
+        if drawn is None or session.snapshots.name_of(drawn) != REFERENCE:
+            return kept
+        state = session.state.replace(design=drawn, reference=None, side_by_side=False)
+        numbers = numbers_of(session.reference, state)
+        return *kept, Snapshot(name=REFERENCE, state=state, taken=0.0, numbers=numbers)
 
     def _measure(self, session: Session) -> None:
         """Note the numbers of snapshots whose design has only now been measured."""
@@ -83,12 +107,49 @@ class ComparePanel:
         if tuple(self._choice.options) != (names or (_NONE,)):
             self._choice.options = names or (_NONE,)
 
+    def _follow_drawn(self, state: StudioState) -> None:
+        """Show how the chosen snapshot is drawn."""
+        chosen, drawn = self._named(), _UNDRAWN
+        if chosen is not None and chosen.state.design == state.reference:
+            drawn = _BESIDE if state.side_by_side else _AROUND
+        if self._drawn.value != drawn:
+            self._drawn.value = drawn
+
+    def _draw(self, event: Any) -> None:
+        if event.client_id is not None:
+            attempt(self._session, lambda: self._become_drawn(self._drawn.value))
+
+    def _become_drawn(self, how: str) -> None:
+        """Draw the chosen snapshot so, instead of any other."""
+        design, beside_now = self._chosen().state.design, how == _BESIDE
+        reference = None if how == _UNDRAWN else design
+        if beside_now != self._session.state.side_by_side:
+            self._step(beside_now)
+        self._session.update(
+            lambda state: state.replace(reference=reference, side_by_side=beside_now)
+        )
+
+    def _step(self, back: bool) -> None:
+        """Move the camera so that two clouds side by side fit; or to where it was."""
+        session = self._session
+        if session.reach is not None:
+            shift = beside(session.reach)
+            (session.camera.step_back if back else session.camera.step_forth)(shift)
+
+    def _delete(self) -> None:
+        snapshot = self._chosen()
+        if snapshot.state.design == self._session.state.reference:
+            self._become_drawn(_UNDRAWN)
+        self._session.snapshots.remove(snapshot.name)
+
     def _take(self) -> None:
         session = self._session
         state = session.state_now()
         name = self._name.value.strip() or session.snapshots.free_name()
-        if name == _NOW:
-            raise InvalidInput("snapshot name", name, "another, as the table calls this design so")
+        if name in (_NOW, REFERENCE):
+            raise InvalidInput(
+                "snapshot name", name, "another, as the table has a row of its own so"
+            )
         numbers = numbers_of(session.reach, state)
         snapshot = Snapshot(name=name, state=state, taken=time.time(), numbers=numbers)
         session.snapshots.add(snapshot)
@@ -99,14 +160,22 @@ class ComparePanel:
     def _restore(self) -> None:
         state = self._chosen().state
         self._session.update(
-            lambda now: state.replace(appearance=now.appearance, camera=now.camera)
+            lambda now: state.replace(
+                appearance=now.appearance,
+                camera=now.camera,
+                reference=now.reference,
+                side_by_side=now.side_by_side,
+            )
         )
 
     def _chosen(self) -> Snapshot:
-        snapshot = self._session.snapshots.named(self._choice.value)
+        snapshot = self._named()
         if snapshot is None:
             raise InvalidInput("snapshot", "none", "chosen", "take one first")
         return snapshot
+
+    def _named(self) -> Snapshot | None:
+        return next((each for each in self._kept() if each.name == self._choice.value), None)
 
     def _save(self) -> None:
         if self._comparison is None:

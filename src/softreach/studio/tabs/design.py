@@ -1,24 +1,25 @@
-"""Sliders of the design, and a reference to compare it with."""
+"""The body of the design: sliders, numbers that have none, and named designs to start from."""
 
 from __future__ import annotations
 
 import threading
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
-from softreach.studio.captions import reach_text
-from softreach.studio.fields import Attribute, Fields, attribute, bind_button
-from softreach.studio.markup import Part
-from softreach.studio.reach import beside
+from softreach.studio.fields import Attribute, Fields
 from softreach.studio.shown_parameters import (
     ShownParameter,
+    body_numbers,
     refusal,
     slider_ends,
     slider_parameters,
 )
 from softreach.studio.slopes import NO_BAR, slope_bars
 from softreach.studio.state import StudioState, rod_of
+from softreach.studio.tabs.parts import typed_number
 from softreach.studio.widgets import Line, SliderField
 from softreach.support.errors import InvalidDesign, SoftreachError
 
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from softreach.studio.session import Session
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
-_ABOUT_KEEP = "Keeps what the design reaches now, in gray, to compare others with"
-_ABOUT_BESIDE = "Stands the reference beside the design, pulled as the design is"
+_OWN = "this design"
+_ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
 
 
 class DesignPanel:
@@ -46,36 +47,24 @@ class DesignPanel:
         """The design that they made of it last."""
         self._ended: Manipulator | None = None
         """The design at whose limits they end."""
+        self._typed: list[str] = []
+        """Names of the numbers of the body that have fields."""
         self._revision, self._refused = -1, False
-        self._sliders, self._others = Fields(session), Fields(session)
+        self._sliders, self._numbers = Fields(session), Fields(session)
+        self._others = Fields(session, dragged=False)
         with tab:
             self._folder = gui.add_folder("design")
             with self._folder:
                 self._about_bars = Line(gui)
-            with gui.add_folder("compare"):
-                self._reference = Line(gui)
-                self._others.button(
-                    "Keep this design as reference",
-                    lambda state: state.replace(reference=state.design),
-                    _ABOUT_KEEP,
-                )
-                beside_box = self._others.checkbox(
-                    "side by side", attribute("side_by_side"), _ABOUT_BESIDE
-                )
-                clear = gui.add_button("Forget the reference", hint="Takes the reference away")
-        bind_button(clear, session, self._forget)
-
-        def stepped(event: Any) -> None:
-            if event.client_id is not None and session.state.reference is not None:
-                self._step(beside_box.value)
-
-        beside_box.on_update(stepped)
+            self._body = gui.add_folder("body")
+            names = {"": _OWN} | {name: name for name in designs.__all__}
+            self._others.dropdown("start from", names, Attribute(_name, _named), _ABOUT_START)
 
     def show(self, session: Session) -> None:
-        """Show the reference; make the sliders anew for a design that they did not make."""
-        self._reference.say(*_reference_text(session))
+        """Make the sliders anew for a design that they did not make."""
         self._others.show(session)
         with self._lock:
+            self._follow_body(session.state.design)
             if session.revision != self._revision:
                 self._revision = session.revision
                 if session.state.design != self._made or self._refused:
@@ -95,18 +84,6 @@ class DesignPanel:
         self._about_bars.say(*([_ABOUT_BARS] if bars else []))
         for name, line in self._bars.items():
             line.show(bars.get(name, ""))
-
-    def _forget(self) -> None:
-        if self._session.state.side_by_side and self._session.state.reference is not None:
-            self._step(False)
-        self._session.update(lambda s: s.replace(reference=None, side_by_side=False))
-
-    def _step(self, back: bool) -> None:
-        """Move the camera so that two clouds side by side fit; or to where it was."""
-        session = self._session
-        if session.reach is not None:
-            shift = beside(session.reach)
-            (session.camera.step_back if back else session.camera.step_forth)(shift)
 
     def _end(self, arm: Manipulator) -> None:
         """End the sliders where the design does, once nobody drags."""
@@ -128,6 +105,19 @@ class DesignPanel:
             self._rows = [
                 (parameter, self._slider(parameter)) for parameter in slider_parameters(arm)
             ]
+
+    def _follow_body(self, arm: Manipulator) -> None:
+        """Show the numbers of the body; others have other fields."""
+        numbers = body_numbers(arm)
+        if [number.name for number in numbers] == self._typed:
+            self._numbers.show(self._session)
+            return
+        self._typed = [number.name for number in numbers]
+        self._numbers.remove()
+        self._numbers = Fields(self._session, words=self._words, dragged=False)
+        with self._body:
+            for number in numbers:
+                self._numbers.number(number.label, typed_number(number), number.hint)
 
     def _slider(self, parameter: ShownParameter) -> SliderField:
         at = Attribute(lambda _: parameter.shown, lambda state, _: self._changed(state))
@@ -158,8 +148,15 @@ class DesignPanel:
         return refusal(error, rows, self._session.state.design)
 
 
-def _reference_text(session: Session) -> tuple[Part, ...]:
-    if session.reference is None:
-        return ("No reference is kept.",)
-    where = "reference" if session.state.side_by_side else "reference (gray)"
-    return (f"{where}: ", *reach_text(session.reference))
+@cache
+def _designs() -> dict[str, Manipulator]:
+    return {name: getattr(designs, name)() for name in designs.__all__}
+
+
+def _name(state: StudioState) -> str:
+    """Name of a design; "" for one that has none."""
+    return next((name for name, arm in _designs().items() if arm == state.design), "")
+
+
+def _named(state: StudioState, name: str) -> StudioState:
+    return state.replace(design=_designs()[name]) if name else state

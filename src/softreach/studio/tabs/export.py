@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio import markup
@@ -33,18 +34,21 @@ _ABOUT_LINK = (
 )
 
 _ABOUT = {
-    "Save state": "Everything that this tab shows, to be loaded again (JSON)",
-    "Link to this state": "An address that opens a tab in this state",
-    "Save design (TOML)": "The design alone, which the command line reads too",
+    "Save this work": "Everything that this tab shows, to be loaded again (JSON)",
+    "Link to this work": "An address that opens a tab in this state",
     "Load": "A state (.json) or a design (.toml) that was saved",
-    "cloud": "File type of all samples: tips [m] and activations",
-    "Save cloud": "All samples of the cloud: tips [m] and activations",
-    "surface": "File type of the boundary of the reachable set",
-    "Save surface": "The exact boundary of the reachable set [m]",
-    "Save picture (PNG)": "The scene as it is seen, with legend, scale and design",
-    "Save figure (PNG)": "Three views and an oblique one of the points that are shown",
-    "Save web page (HTML)": "The scene in one file, to be turned without a studio",
+    "data": "The design alone, which the command line reads too; all samples of the cloud, tips "
+    "[m] and activations; or the exact boundary of the reachable set [m]",
+    "Save data": "As a file of this type",
+    "picture": "The scene as it is seen, with legend, scale and design; three views and an oblique "
+    "one of the points that are shown; or the scene in one file, to be turned without a studio",
+    "Save picture": "As a file of this type",
 }
+_SECOND: Any = {"color": "gray"}
+"""Looks of the buttons that are not the first of their group."""
+_DESIGN = "design (.toml)"
+_CLOUD, _SURFACE = "cloud ({})", "exact surface ({})"
+_SEEN, _VIEWS, _PAGE = "as it is seen (.png)", "four views (.png)", "web page (.html)"
 
 
 class ExportPanel:
@@ -52,22 +56,33 @@ class ExportPanel:
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session, url: str) -> None:
         self._session, self._url = session, url
+        self._writers = self._data_writers()
+        self._painters = {
+            _SEEN: self._save_picture, _VIEWS: self._save_figure, _PAGE: self._save_page
+        }  # fmt: skip
         with tab:
-            self._button("Save state", self._save_state)
-            self._button("Link to this state", self._link)
-            self._address = Line(gui)
-            self._button("Save design (TOML)", self._save_design)
-            load = gui.add_upload_button("Load state or design", hint=_ABOUT["Load"])
-            self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS, hint=_ABOUT["cloud"])
-            self._button("Save cloud", self._save_cloud)
-            self._surface = gui.add_dropdown(
-                "surface format", SURFACE_FORMATS, hint=_ABOUT["surface"]
-            )
-            self._button("Save surface", self._save_surface)
-            self._button("Save figure (PNG)", self._save_figure)
-            self._button("Save picture (PNG)", self._save_picture)
-            self._button("Save web page (HTML)", self._save_page)
+            with gui.add_folder("this work"):
+                self._button("Save this work", self._save_state)
+                self._button("Link to this work", self._link, **_SECOND)
+                self._address = Line(gui)
+                load = gui.add_upload_button("Load state or design", hint=_ABOUT["Load"], **_SECOND)
+            with gui.add_folder("design and data"):
+                self._data = gui.add_dropdown("data", tuple(self._writers), hint=_ABOUT["data"])
+                self._button("Save data", lambda: self._writers[self._data.value]())
+            with gui.add_folder("pictures"):
+                self._kind = gui.add_dropdown(
+                    "picture", tuple(self._painters), hint=_ABOUT["picture"]
+                )
+                self._button("Save picture", lambda: self._painters[self._kind.value]())
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
+
+    def _data_writers(self) -> dict[str, Callable[[], None]]:
+        """Files of the design, its cloud and its surface -> what writes them."""
+        clouds = {_CLOUD.format(each): partial(self._save_cloud, each) for each in CLOUD_FORMATS}
+        surfaces = {
+            _SURFACE.format(each): partial(self._save_surface, each) for each in SURFACE_FORMATS
+        }
+        return {_DESIGN: self._save_design, **clouds, **surfaces}
 
     def _save_state(self) -> None:
         self._send("softreach-studio.json", self._session.state_now().to_json().encode())
@@ -79,12 +94,10 @@ class ExportPanel:
     def _save_design(self) -> None:
         self._send("design.toml", self._session.state.design.to_toml().encode())
 
-    def _save_cloud(self) -> None:
-        suffix = self._cloud.value
+    def _save_cloud(self, suffix: str) -> None:
         self._write(f"cloud{suffix}", lambda: cloud_file(self._reach(), suffix))
 
-    def _save_surface(self) -> None:
-        suffix = self._surface.value
+    def _save_surface(self, suffix: str) -> None:
         self._write(f"surface{suffix}", lambda: surface_file(self._reach(), suffix))
 
     def _save_figure(self) -> None:
@@ -103,12 +116,9 @@ class ExportPanel:
         picture = None if board is None or board.map is None else board.map.image
         return static_page(self._session.state_now(), self._reach(), picture).encode()
 
-    def _button(self, label: str, action: Callable[[], None]) -> None:
-        bind_button(
-            self._session.client.gui.add_button(label, hint=_ABOUT.get(label)),
-            self._session,
-            action,
-        )
+    def _button(self, label: str, action: Callable[[], None], **looks: Any) -> None:
+        button = self._session.client.gui.add_button(label, hint=_ABOUT[label], **looks)
+        bind_button(button, self._session, action)
 
     def _restore(self, file: UploadedFile) -> None:
         self._session.restore(state_from(file.name, file.content, self._session.state))

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.kinematics import tip_positions
 from softreach.studio.expressions import vector_kind
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.scene.drag import DragBall
-from softreach.studio.state import StudioState, rod_of
-from softreach.studio.widgets import Line, TypedField
+from softreach.studio.state import MOUSE, StudioState, rod_of
+from softreach.studio.widgets import Line, TypedField, show_where
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -23,21 +22,23 @@ if TYPE_CHECKING:
     from softreach.studio.session import Session
 
 _DRAG_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
-_HINT = "Drag the tip, type a target, or let a click on the cloud set it."
-_ABOUT_CLICKS = "off: a click in the scene changes nothing"
+_HINT = "Every activation that reaches a place: drag the tip there, type it, or click."
+_ABOUT_MOUSE = (
+    "Use of the mouse in the scene, which it turns besides; a click is on a reached place"
+)
 _NEAR = 1e-4
 """Change of activation, in ranges, below which the arm is in a solution."""
 
 
 class DragPanel:
-    """The ball on the tip, and the choice to show it."""
+    """Use of the mouse in the scene, and the ball on the tip that it may drag."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         self._ball = DragBall(session.client.scene, session.job(DragTip).order)
-        self._fields = Fields(session)
+        self._fields = Fields(session, dragged=False)
         with tab:
+            self._fields.dropdown("mouse", MOUSE, attribute("appearance.mouse"), _ABOUT_MOUSE)
             self._text = Line(gui, _DRAG_HINT)
-            self._fields.checkbox("handle on the tip", attribute("appearance.handle"), _DRAG_HINT)
 
     def show(self, session: Session) -> None:
         """Keep the ball on the tip."""
@@ -47,9 +48,10 @@ class DragPanel:
         grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
         grasped = grasped and not session.shows_sample  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
-        self._ball.move(session.tip if grasped else None, radius, dark=look.dark)
+        tip, clear = session.tip if grasped else None, state.path is not None
+        self._ball.move(tip, radius, dark=look.dark, clear=clear)
         if drag is None:
-            self._text.say(_DRAG_HINT)
+            self._text.say(*([_DRAG_HINT] if look.handle else []))
             self._ball.show_lag(None, None)
             return
         gap = drag.dragged.gap / arm.length
@@ -65,30 +67,25 @@ class InversePanel:
         self._gui, self._session, self._fields = gui, session, Fields(session)
         self._answer: Solution | None = None
         self._buttons: list[tuple[Any, Any]] = []
-        with tab:
+        with tab, gui.add_folder("reach a place"):
             self._text = Line(gui, _HINT)
             kind = vector_kind("L", lambda: session.state.design.length)
             hint = "Where the tip should go [L]"
             self._target = TypedField(gui, "target / L", _straight_tip(session), hint, kind)
-            self._clicks = gui.add_checkbox("clicks set the target", False, hint=_ABOUT_CLICKS)
-            solve = gui.add_button("Solve", hint="Finds every activation that reaches the target")
-            self._fields.checkbox(
-                "show all shapes",
-                attribute("appearance.ghosts"),
-                "Draws the arm in every solution at once",
-            )
             self._folder = gui.add_folder("activations that reach it", visible=False)
-            self._fields.button(
-                "Clear",
+            self._clear = self._fields.button(
+                "Clear the target",
                 lambda state: state.replace(target=None),
                 "Takes target and solutions away",
+                color="gray",
+                visible=False,
             )
-        bind_button(solve, session, self._solve_typed)
         self._target.on_update(lambda _: attempt(session, self._solve_typed))
 
     def show(self, session: Session) -> None:
         """List the solutions, and mark the one that the arm is in."""
         self._fields.show(session)
+        show_where(session.state.target is not None, self._clear)
         if session.answer is not self._answer:
             self._answer = session.answer
             self._list(session.answer)
@@ -110,18 +107,13 @@ class InversePanel:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Aim at the point of the cloud under the cursor, if clicks are to do that.
-
-        Returns:
-            True if they are, and there is one.
-        """
+        """Aim at the place under the cursor, if the mouse sets the target; return if it does."""
         session = self._session
-        sample = session.picked_sample(origin, direction) if self._clicks.value else None
-        if sample is None or session.reach is None:
+        if session.state.appearance.mouse != "target":
             return False
-        aim, arm = session.job(SolveInverse).aim, session.reach.arm
-        activation = session.reach.cloud.activation.values[sample]
-        attempt(session, lambda: aim(_tip(arm, activation)))
+        place = session.picked_place(origin, direction)
+        if place is not None:
+            attempt(session, lambda: session.job(SolveInverse).aim(place))
         return True
 
     def _solve_typed(self) -> None:
@@ -149,11 +141,6 @@ def _straight_tip(session: Session) -> tuple[float, ...]:
 def _is_near(activation: Any, state: StudioState) -> bool:
     scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
     return bool((np.abs(activation - state.activation) <= _NEAR * scales).all())
-
-
-def _tip(arm: Manipulator, activation: Any) -> Any:
-    """Exact place of a sample [m]: its point is rounded, at the rim perhaps to out of reach."""
-    return tip_positions(arm, [activation])[0]
 
 
 def _answer_text(answer: Solution, arm: Manipulator) -> str:

@@ -13,9 +13,9 @@ from softreach.arm.design_file import in_file_terms
 from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.captions import tip_text
-from softreach.studio.fields import Attribute, Fields, attribute
+from softreach.studio.fields import Attribute, Fields
 from softreach.studio.state import StudioState, Vector, vector
-from softreach.studio.widgets import Line
+from softreach.studio.widgets import Line, show_where
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
@@ -103,7 +103,8 @@ class LoadsPanel:
         self._design: Manipulator | None = None
         self._fields = fields = Fields(session, dragged=False)
         gravity = _typed("gravity")
-        with tab:
+        loaded = session.state.design.loads is not None
+        with tab, gui.add_folder("base and loads", expand_by_default=loaded):
             fields.dropdown(
                 "base",
                 _WAYS,
@@ -131,15 +132,12 @@ class LoadsPanel:
                 add = fields.number if name == "payload" else fields.vector
                 add(f"{kind.symbol} [{kind.unit}]", _typed(name), kind.hint)
             fields.message = Line(gui)
-            fields.button(
+            self._off = fields.button(
                 "Take all loads off",
                 lambda state: state.replace(design=state.design.replace(loads=None)),
                 "Gravity, payload and all forces",
-            )
-            fields.checkbox(
-                "show the cloud without loads",
-                attribute("appearance.free"),
-                "Faint, around that of the loaded arm",
+                color="gray",
+                visible=False,
             )
             self._posture, self._others = Line(gui), Line(gui)
 
@@ -147,6 +145,7 @@ class LoadsPanel:
         """Show the loads of the design, and whether the arm rests under them."""
         self._fields.show(session)
         design = session.state.design
+        show_where(design.loads is not None, self._off)
         if design is not self._design:
             self._design = design
             others = ", ".join(other_loads(design))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from softreach.arm import designs, edits
+from softreach.arm import edits
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
-from softreach.arm.parameters import changed
+from softreach.arm.parameters import Parameter, changed, parameters
 from softreach.studio.fields import Attribute, Fields
 from softreach.studio.shown_parameters import (
     Part,
@@ -20,7 +21,7 @@ from softreach.studio.shown_parameters import (
     refusal,
 )
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import Line
+from softreach.studio.widgets import Line, TextKind, TypedField
 from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ _OFFER = (
     "A {kind} needs Young's modulus E, which this arm leaves open: choose what it is made of, and "
     "press Add again."
 )
+_ABOUT_NAME = "What tables and files call it"
+_NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
 
 
@@ -52,16 +55,7 @@ class PartsPanel:
         self._numbers: tuple[ShownParameter, ...] = ()
         self._widgets: list[Any] = []
         with tab:
-            with gui.add_folder("start from"):
-                named = gui.add_dropdown(
-                    "named design",
-                    tuple(designs.__all__),
-                    hint="Arms of the literature and examples",
-                )
-                take = gui.add_button(
-                    "Take this design", hint="Replaces the whole design by this one"
-                )
-            with gui.add_folder("add"):
+            with gui.add_folder("add a part", expand_by_default=False):
                 kinds = (*edits.ACTUATOR_KINDS, _NEW_RING)
                 kind = gui.add_dropdown(
                     "kind", kinds, hint="An actuator, or a ring of the cross-section"
@@ -74,7 +68,6 @@ class PartsPanel:
             self._folder = gui.add_folder("part")
             self._message = Line(gui)
         self._fields = self._new_fields()
-        take.on_click(lambda _: self._edit(lambda _: getattr(designs, named.value)()))
         add.on_click(lambda _: self._add(kind.value))
 
     def show(self, session: Session) -> None:
@@ -88,7 +81,7 @@ class PartsPanel:
 
     def _build(self, arm: Manipulator) -> None:
         """Make the fields anew, unless they fit and only values changed."""
-        known = parts(arm)
+        known = {label: part for label, part in parts(arm).items() if label != "body"}
         if self._label not in known:
             self._label = next(iter(known))
         part = known[self._label]
@@ -106,7 +99,7 @@ class PartsPanel:
             self._widgets = [self._menu(tuple(known))]
             self._add_words(arm, part)
             for parameter in self._numbers:
-                self._fields.number(parameter.label, _typed(part, parameter), parameter.hint)
+                self._fields.number(parameter.label, typed_number(parameter), parameter.hint)
             if part.ring is not None or part.actuator:
                 self._button(
                     "Remove", lambda: self._remove(part), "Takes the part out of the design"
@@ -130,11 +123,11 @@ class PartsPanel:
     def _add_words(self, arm: Manipulator, part: Part) -> None:
         """Add fields for its name, its material, and the ring that it is in."""
         if part.ring is not None or part.actuator:
-            name = self._gui.add_text("name", part.name, hint="What tables and files call it")
-            self._widgets.append(name)
-            self._button(
-                "Rename", lambda: self._rename(part, name.value), "Gives the part this name"
+            at = Attribute(
+                lambda _: part.name, lambda state, name: self._renamed(state, part, name)
             )
+            name = TypedField(self._gui, "name", part.name, _ABOUT_NAME, _NAME)
+            self._fields.bind(name, at)
         if part.ring is not None:
             ring = part.ring
             self._material(
@@ -143,7 +136,7 @@ class PartsPanel:
                 lambda arm: arm.section.rings[ring].material.name,
                 lambda arm, name: edits.with_ring_material(arm, ring, name) if name else arm,
             )
-        if self._label == "body":
+        if part.ring == 0:
             self._material(
                 "core",
                 _AS_INNERMOST,
@@ -170,7 +163,7 @@ class PartsPanel:
         self._fields.dropdown(label, names, at, _ABOUT_MATERIAL)
 
     def _button(self, label: str, action: Callable[[], None], hint: str) -> None:
-        button = self._gui.add_button(label, hint=hint)
+        button = self._gui.add_button(label, hint=hint, color="gray")
         button.on_click(lambda _: action())
         self._widgets.append(button)
 
@@ -214,19 +207,20 @@ class PartsPanel:
         else:
             self._edit(lambda arm: edits.without_actuator(arm, part.actuator))
 
-    def _rename(self, part: Part, name: str) -> None:
+    def _renamed(self, state: StudioState, part: Part, name: str) -> StudioState:
+        """The design in which a part has another name; it stays the one that is chosen."""
+        if name == part.name:
+            return state
         ring = part.ring
-        if not name.strip() or name == part.name:
-            return
         if ring is not None:
-            self._edit(
-                lambda arm: edits.with_ring_name(arm, ring, name),
-                lambda arm: edits.ring_label(arm, ring),
-            )
+            arm = edits.with_ring_name(state.design, ring, name)
+            label = edits.ring_label(arm, ring)
         else:
-            self._edit(
-                lambda arm: edits.with_actuator_name(arm, part.actuator, name), lambda _: name
-            )
+            arm = edits.with_actuator_name(state.design, part.actuator, name)
+            label = name
+        new = state.replace(design=arm)
+        self._label = label
+        return new
 
     def _edit(self, change: Change, chosen: Callable[[Manipulator], str] | None = None) -> None:
         """Change the parts of the design, and choose one of the new ones."""
@@ -254,12 +248,12 @@ def _of_design(
     )
 
 
-def _typed(part: Part, parameter: ShownParameter) -> Attribute:
-    """A number of a part; 0 where the design leaves it out."""
+def typed_number(parameter: ShownParameter) -> Attribute:
+    """A number of the design that is typed; 0 where the design leaves it out."""
 
     def read(arm: Manipulator) -> float:
-        shown = {each.name: each.shown for each in part_parameters(arm, part)}[parameter.name]
-        return 0.0 if math.isnan(shown) else shown
+        value = _known(arm)[parameter.name].value(arm) / parameter.scale
+        return 0.0 if math.isnan(value) else float(f"{value:.12g}")
 
     def write(arm: Manipulator, value: float) -> Manipulator:
         """A value that the field only shows rounded is left as it is."""
@@ -268,6 +262,11 @@ def _typed(part: Part, parameter: ShownParameter) -> Attribute:
         )
 
     return _of_design(read, write)
+
+
+@lru_cache(maxsize=4)
+def _known(arm: Manipulator) -> dict[str, Parameter]:
+    return parameters(arm)
 
 
 def _ring_of(arm: Manipulator, actuator: str) -> int:

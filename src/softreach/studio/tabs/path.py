@@ -23,7 +23,7 @@ from softreach.studio.jobs.path import (
 from softreach.studio.plots.plot import Chart, Curve
 from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.state import StudioState, solvable_rod
-from softreach.studio.widgets import Line
+from softreach.studio.widgets import Line, show_where
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
 
@@ -45,11 +45,11 @@ class PathPanel:
         self._session, self._gui = session, gui
         self._shown: xr.Dataset | None = None
         self._revision = -1
-        with tab:
+        with tab, gui.add_folder("follow a path"):
             Line(gui, _HINT)
             self._draw_widgets(gui)
             self._text = Line(gui)
-            self._walk = gui.add_folder("follow it", visible=False)
+            self._walk = gui.add_folder("along it", visible=False)
             with self._walk:
                 self._walk_widgets(gui)
         self._listen()
@@ -64,12 +64,14 @@ class PathPanel:
         )
         self._draw = gui.add_button("Draw the path", hint="the shape of this size, from the tip on")
         self._load = gui.add_upload_button(
-            "Load a path (CSV)", mime_type=".csv,text/csv", hint="columns x, y, z [m]"
+            "Load a path (CSV)",
+            mime_type=".csv,text/csv",
+            hint="columns x, y, z [m]",
+            color="gray",
         )
-        self._clicks = gui.add_checkbox(
-            "clicks add points", False, hint="a click on a point of the cloud leads the path there"
+        self._clear = gui.add_button(
+            "Remove the path", hint="and what was found along it", color="gray", visible=False
         )
-        self._clear = gui.add_button("Remove the path", hint="and what was found along it")
 
     def _walk_widgets(self, gui: GuiApi) -> None:
         self._play = gui.add_button_group(
@@ -94,6 +96,7 @@ class PathPanel:
     def show(self, session: Session) -> None:
         """Say how far the arm follows, and where it is."""
         track, path = session.figures.track, session.state.path
+        show_where(path is not None, self._clear)
         if path is None or track is None or track.sizes["point"] != len(path.points):
             self._shown, self._walk.visible = None, False
             self._text.say(*(("following ...",) if path is not None else ()))
@@ -105,14 +108,13 @@ class PathPanel:
             self._revision, self._at.value = session.revision, min(path.at, int(self._at.max))
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Lead the path to the point of the cloud under the cursor, if clicks are for that."""
+        """Lead the path to the place under the cursor, if the mouse adds points to it."""
         session = self._session
-        if not self._clicks.value:
+        if session.state.appearance.mouse != "path":
             return False
-        sample = session.picked_sample(origin, direction)
-        if sample is not None and session.reach is not None:
-            tip = session.reach.cloud.tip.values[sample]
-            attempt(session, lambda: self._extend(tip))
+        place = session.picked_place(origin, direction)
+        if place is not None:
+            attempt(session, lambda: self._extend(place))
         return True
 
     def _list(self, track: xr.Dataset) -> None:

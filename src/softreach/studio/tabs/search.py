@@ -30,7 +30,7 @@ from softreach.studio.needs import (
 from softreach.studio.scene.needs import MISSED, REACHED
 from softreach.studio.search_ranges import ranges_of, slider_range
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.widgets import Line, PictureFrame, number_of
+from softreach.studio.widgets import Line, PictureFrame, number_of, show_where
 from softreach.support.errors import InvalidInput
 from softreach.support.quantity import quantity
 from softreach.support.units import LengthUnit, readable_unit
@@ -51,7 +51,7 @@ _PLACE, _TARGET, _STAY, _AVOID, _PAYLOAD, _SHORTENING = (
 )
 _EMPTY = {
     _PLACE: "x, y, z in {unit}; empty: where the tip is",
-    _TARGET: "nothing: the target of the tab Inverse",
+    _TARGET: "nothing: the target of the tab Move",
     _STAY: "x, y, z, x, y, z of two corners in {unit}; empty: around what is drawn",
     _AVOID: "x, y, z, x, y, z of two corners in {unit}",
     _PAYLOAD: "mass at the tip in g",
@@ -60,6 +60,7 @@ _EMPTY = {
 """What is added -> what the field holds."""
 _NOTHING = "nothing more"
 _ALL = "everything"
+_ADD = "choose a number"
 _MOST_DESIGNS = 5000
 _ABOUT = {
     "add": "A place for the tip, a box for the arm at these places, or a limit",
@@ -69,7 +70,7 @@ _ABOUT = {
     "save": "The needs as a file for softreach check and softreach search",
     "free": "Numbers that the search may change, with ranges in the units of their sliders, such "
     "as taper = 0:3; without a range that of the slider; a = -b ties two",
-    "number": "A number of this design",
+    "number": "A number of this design that the search may change too",
     "first": "What is best among the designs that meet the needs",
     "second": "With two objectives there is a front: no design of it is better in both",
     "designs": "Designs that are looked at; polishes of the best may take more",
@@ -91,9 +92,10 @@ class SearchPanel:
         self._said: tuple[Check | None, str, bool] | None = None
         self._shown: object = None
         with tab:
-            Line(gui, _HINT)
-            self._need_widgets(gui)
-            with gui.add_folder("search"):
+            with gui.add_folder("requirements"):
+                Line(gui, _HINT)
+                self._need_widgets(gui)
+            with gui.add_folder("search for a design"):
                 self._search_widgets(gui)
         self._listen()
 
@@ -106,13 +108,14 @@ class SearchPanel:
         self._refusal = Line(gui)
         self._part: Any = gui.add_dropdown("remove", (_ALL,), hint=_ABOUT["remove"], visible=False)
         self._remove = gui.add_button("Remove", hint=_ABOUT["remove"], visible=False)
-        self._load = gui.add_upload_button("Load needs (TOML)", hint=_ABOUT["load"])
-        self._save = gui.add_button("Save needs (TOML)", hint=_ABOUT["save"], visible=False)
+        self._load = gui.add_upload_button("Load needs (TOML)", hint=_ABOUT["load"], color="gray")
+        self._save = gui.add_button(
+            "Save needs (TOML)", hint=_ABOUT["save"], color="gray", visible=False
+        )
 
     def _search_widgets(self, gui: GuiApi) -> None:
         self._free = gui.add_text("free", "", hint=_ABOUT["free"])
-        self._number: Any = gui.add_dropdown("number", ("",), hint=_ABOUT["number"])
-        self._also = gui.add_button("Add to the free numbers", hint="The search may change it too")
+        self._number: Any = gui.add_dropdown("free also", (_ADD,), hint=_ABOUT["number"])
         options = [f"{way} {name}" for way in ("maximize", "minimize") for name in OBJECTIVES]
         self._first = gui.add_dropdown("objective", (*options, _NOTHING), hint=_ABOUT["first"])
         self._second = gui.add_dropdown("and", (_NOTHING, *options), hint=_ABOUT["second"])
@@ -135,7 +138,7 @@ class SearchPanel:
         bind_button(self._remove, session, self._removed)
         self._load.on_upload(lambda _: attempt(session, lambda: self._read(self._load.value)))
         bind_button(self._save, session, self._saved)
-        bind_button(self._also, session, self._freed)
+        self._number.on_update(lambda _: attempt(session, self._freed))
         bind_button(self._search, session, self._ask)
         self._at.on_update(lambda _: attempt(session, self._show_values))
         bind_button(self._take, session, self._loaded)
@@ -147,8 +150,8 @@ class SearchPanel:
         if state.design is not self._design:
             self._design = state.design
             names = [slider.name for slider in slider_parameters(state.design)]
-            if tuple(self._number.options) != tuple(names or ("",)):
-                self._number.options = names or ("",)
+            if tuple(self._number.options) != (_ADD, *names):
+                self._number.options = _ADD, *names
             self._explain()
         self._offer_parts(requirements_of(state.needs))
         self._say_verdict(session)
@@ -159,7 +162,12 @@ class SearchPanel:
             self._show_run(run)
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Load the design under the cursor; return whether the picture is there."""
+        """Load the design under the cursor, or add a place to reach; return if there is one."""
+        if self._session.state.appearance.mouse == "place":
+            spot = self._session.picked_place(origin, direction)
+            if spot is not None:
+                attempt(self._session, lambda: self._keep_place(spot.tolist()))
+                return True
         run, board = self._session.search, self._session.job(DrawSearch).board
         place = board.place_under(origin, direction)
         if run is None or run.picture is None or place is None:
@@ -178,9 +186,7 @@ class SearchPanel:
 
     def _offer_parts(self, needs: Requirements) -> None:
         parts = tuple(needs_parts(needs, self._unit))
-        for widget in (self._part, self._remove, self._save):
-            if widget.visible != bool(parts):
-                widget.visible = bool(parts)
+        show_where(bool(parts), self._part, self._remove, self._save)
         if tuple(self._part.options) != (*parts, _ALL):
             self._part.options = (*parts, _ALL)
             self._part.value = (*parts, _ALL)[0]
@@ -208,6 +214,9 @@ class SearchPanel:
         self._keep(add(requirements_of(self._session.state.needs), str(self._field.value)))
         self._field.value = ""
 
+    def _keep_place(self, place: list[float]) -> None:
+        self._keep(with_place(requirements_of(self._session.state.needs), place))
+
     def _place(self, needs: Requirements, text: str) -> Requirements:
         session = self._session
         if text.strip():
@@ -220,7 +229,7 @@ class SearchPanel:
         del text
         target = self._session.state.target
         if target is None:
-            raise InvalidInput("target", "none", "set in the tab Inverse")
+            raise InvalidInput("target", "none", "set in the tab Move")
         return with_place(needs, target)
 
     def _box(self, needs: Requirements, text: str) -> Requirements:
@@ -260,9 +269,9 @@ class SearchPanel:
         self._session.client.send_file_download("needs.toml", content, save_immediately=True)
 
     def _freed(self) -> None:
-        name = self._number.value
+        name, self._number.value = self._number.value, _ADD
         known = [part.split("=")[0].strip() for part in self._free.value.split(",") if part.strip()]
-        if not name or name in known:
+        if name == _ADD or name in known:
             return
         before = [part.strip() for part in self._free.value.split(",") if part.strip()]
         more = f"{name} = {slider_range(self._session.state.design, name)}"

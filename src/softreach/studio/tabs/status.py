@@ -6,12 +6,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio import markup
-from softreach.studio.captions import legend_text, loads_text, reach_text
+from softreach.studio.captions import legend_text, loaded_share, reach_text
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.markup import Part, Strong, fields_style
 from softreach.studio.needs import verdict_text
 from softreach.studio.scene.clouds import key_html
-from softreach.studio.widgets import Line
+from softreach.studio.widgets import Line, show_where
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -34,14 +34,13 @@ class StatusPanel:
         Line(gui).show(fields_style())
         self._known = Line(gui, "computing ...")
         self._note, self._toast = "", None
-        self._cancel = gui.add_button(_CANCEL, disabled=True, hint=_ABOUT_CANCEL)
+        self._cancel = gui.add_button(_CANCEL, visible=False, hint=_ABOUT_CANCEL)
         bind_button(self._cancel, session, lambda: _stop_or_go_on(session))
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
         check, history = session.check, session.history
-        lines = [_numbers_text(session), loads_text(session)]
-        lines.append([verdict_text(check)] if check is not None else [])
+        lines = [_numbers_text(session), [verdict_text(check)] if check is not None else []]
         marks = [markup.paragraph(*line) for line in _marks(session)]
         steps = {"undo": history.past, "redo": history.future}
         self._known.show(
@@ -69,13 +68,12 @@ class StatusPanel:
         )
 
     def _offer(self, session: Session) -> None:
-        """Offer to cancel or to go on; the button keeps its place, so that nothing jumps."""
+        """Offer to cancel while something is computed, and to go on where something is missing."""
         busy, lacking = session.busy, is_behind(session) and not session.refusal
-        label, disabled = _CANCEL if busy or not lacking else _GO_ON, not (busy or lacking)
+        label = _GO_ON if lacking and not busy else _CANCEL
         if self._cancel.label != label:
             self._cancel.label = label
-        if self._cancel.disabled != disabled:
-            self._cancel.disabled = disabled
+        show_where(busy or lacking, self._cancel)
 
 
 def _marks(session: Session) -> list[list[Part]]:
@@ -103,7 +101,11 @@ def _numbers_text(session: Session) -> list[Part]:
     if reach is None:
         return [session.refusal or work]
     hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
-    parts = [*reach_text(reach), *([f" · α-shape {hull:.4f} L³"] if hull is not None else [])]
+    share = loaded_share(session)
+    parts = [
+        *reach_text(reach, share),
+        *([f" · α-shape {hull:.4f} L³"] if hull is not None else []),
+    ]
     if reach.arm != session.state.design:
         parts = [Strong("of the design before: "), *parts]
     return [*parts, *([f" · {work}"] if work else [])]

@@ -8,6 +8,7 @@ from softreach.studio.fields import Attribute, Fields, attribute, bind_button
 from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.clouds import color_names
 from softreach.studio.state import CUTS, LEVELS, StudioState
+from softreach.studio.widgets import show_where
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -17,15 +18,18 @@ if TYPE_CHECKING:
 _COUNTS = {level: f"{1 << level:,}" for level in LEVELS}
 _ACROSS = {axis: axis for axis in ("none", "x", "y", "z")}
 _TOGGLES = {
-    "cloud": ("cloud", "Tips of sampled activations"),
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, from the map itself"),
+    "cloud": ("cloud", "Tips of sampled activations"),
     "alpha_shape": (
         "α-shape (0.05 L)",
         "The surface of a cloud by balls of radius α = 0.05 L, to compare with",
     ),
+    "free": ("reach without loads", "Faint, around that of the loaded arm"),
+    "ghosts": ("other solutions", "The arm in every activation that reaches the target"),
+    "trail": ("trail of the tip", "Where it has been"),
     "axes": ("axes", "x, y and z in the world [L]"),
-    "lit": ("lit points", "Points are shaded as spheres in a light"),
+    "lit": ("shading", "Points and surfaces are shaded as in a light"),
     "dark": ("dark page", "Light on dark"),
 }
 
@@ -48,13 +52,6 @@ class ViewPanel:
                 attribute("appearance.level"),
                 "Samples that are shown, at most as many as time and memory allow",
             )
-            fields.slider(
-                "point size / L",
-                (5e-4, 0.02),
-                5e-4,
-                attribute("appearance.point_size"),
-                "Edge of a point [L]",
-            )
             fields.dropdown(
                 "cut away",
                 CUTS,
@@ -62,8 +59,10 @@ class ViewPanel:
                 "What of the cloud is taken away, so that arm and target are seen",
             )
             with gui.add_folder("show"):
-                for name, (label, hint) in _TOGGLES.items():
-                    fields.checkbox(label, attribute(f"appearance.{name}"), hint)
+                self._toggles = {
+                    name: fields.checkbox(label, attribute(f"appearance.{name}"), hint)
+                    for name, (label, hint) in _TOGGLES.items()
+                }
             with gui.add_folder("camera"):
                 views = gui.add_button_group(
                     "look from", tuple(VIEWS), hint="Along an axis of the world, or between them"
@@ -73,14 +72,14 @@ class ViewPanel:
                     attribute("appearance.orthographic"),
                     "Without perspective: what is parallel stays parallel",
                 )
-                reset = gui.add_button("Reset the view", hint="The view of the first picture")
-            with gui.add_folder("slice"):
-                fields.dropdown(
-                    "across",
-                    _ACROSS,
-                    attribute("appearance.slice.axis"),
-                    "Hides all but a slab across this axis",
-                )
+            fields.dropdown(
+                "slice across",
+                _ACROSS,
+                attribute("appearance.slice.axis"),
+                "Hides all but a slab across this axis",
+            )
+            self._slab = gui.add_folder("slab", visible=False)
+            with self._slab:
                 fields.slider(
                     "center / L",
                     (-1.5, 1.5),
@@ -96,20 +95,17 @@ class ViewPanel:
                     "Of the slab [L]",
                 )
         bind_button(views, session, lambda: session.look_from(views.value))
-        bind_button(reset, session, lambda: _reset(session))
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the state."""
         self._fields.show(session)
+        state = session.state
+        show_where(state.design.loads is not None, self._toggles["free"])
+        show_where(state.target is not None, self._toggles["ghosts"])
+        show_where(state.appearance.slice.axis != "none", self._slab)
 
 
 def _color(state: StudioState) -> str:
     """The color that is shown: a design may have none of the one that is asked for."""
     color = state.appearance.color
     return color if color in color_names(state.design) else "rgb"
-
-
-def _reset(session: Session) -> None:
-    session.update(lambda s: s.showing(orthographic=False))
-    session.camera.project(orthographic=False)
-    session.look_from("oblique")
