@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from softreach.kernels.branches.spread import choose_apart
+from softreach.kernels.branches.spread import choose_apart, choose_in_bins
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.sampling import sample_cube
+from softreach.support import parallel
 from softreach.support.arrays import Array, Index
+from softreach.support.lazy import lazy
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 __all__ = ["Seeds", "face_seeds", "seeds"]
 
@@ -20,24 +29,88 @@ _MOST_ON_FACES = 60_000
 _SEED = 0
 _CANDIDATES = 24
 _STARTS = 3
+_IN_BIN, _BINS = 4, 512  # seeds in a bin, roughly, and the most bins along an axis
+_MOST_IN_BINS = 1024  # seeds that are looked at for one target
+_BLOCK = 1024
+_DAMPING = 1e-5  # of a Gram matrix, part of its trace
+
+_Grid = tuple[Array, float, tuple[int, int, int]]
 _APART = 0.15  # of the ranges: two starts lead to different minima
 
 
 class Seeds:
     """Activations with known tips."""
 
-    def __init__(self, gamma: Array, tip: Array, scales: Array) -> None:
+    def __init__(self, gamma: Array, tip: Array, slope: Array, box: ActivationBox) -> None:
         """Index the tips.
 
         Args:
             gamma: Activations [-], shape (n, m).
             tip: Their tips [m], shape (n, 3).
-            scales: By which distances of activations are measured, shape (m,).
+            slope: Their ∂r/∂γ [m], shape (n, 3, m).
+            box: Their bounds, by whose ranges distances of activations are measured.
         """
+        self.gamma, self.tip, self.slope, self.box = gamma, tip, slope, box
+        self.scales = box.scales
+
+    @lazy
+    def tree(self) -> KDTree:
+        """The tips."""
         from scipy.spatial import KDTree
 
-        self.gamma, self.tip, self.scales = gamma, tip, scales
-        self.tree = KDTree(tip)
+        return KDTree(self.tip)
+
+    @lazy
+    def _bins(self) -> tuple[tuple[Array, ...], Index, _Grid]:
+        """Seeds bin by bin of their tips, the first row of each bin, and the bins."""
+        corner, extent = self.tip.min(axis=0), np.ptp(self.tip, axis=0)
+        extent = np.maximum(extent, 1e-3 * extent.max() + 1e-300)
+        width = float(np.cbrt(extent.prod() * _IN_BIN / len(self.tip)))
+        width = max(width, float(extent.max()) / _BINS)
+        nx, ny, nz = (int(n) for n in extent // width + 1)
+        x, y, z = ((self.tip - corner) // width).astype(np.int64).T
+        bins = (x * ny + y) * nz + z
+        first = np.zeros(nx * ny * nz + 1, np.int64)
+        first[1:] = np.bincount(bins, minlength=nx * ny * nz).cumsum()
+        order = bins.argsort(kind="stable")
+        slope = (self.slope * self.scales)[order].astype(np.float32)
+        gram = np.einsum("nij,nkj->nik", slope, slope, dtype=float)
+        gram += _DAMPING * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+        inverse = np.linalg.inv(gram)
+        sorted_seeds = self.gamma[order], self.tip[order], slope, inverse
+        return sorted_seeds, first, (corner, width, (nx, ny, nz))
+
+    def near(
+        self, targets: Array, near: Array, count: int, most: int, least_distance: float
+    ) -> tuple[Index, Array]:
+        """Seeds with tips near each target, those nearest to an activation, that lie apart.
+
+        Args:
+            targets: Shape (t, 3) [m].
+            near: An activation for each target, shape (t, m).
+            count: Seeds to look at, at least.
+            most: Largest number for one target.
+            least_distance: Between any two, in ranges.
+
+        Returns:
+            Number of the target and activation of each start, sorted by target.
+        """
+        seeds, first, grid = self._bins
+        starts = np.empty((len(targets), most, near.shape[1]))
+        box = self.box.low.copy(), self.box.high.copy(), self.scales.copy()
+
+        def task(block: slice) -> None:
+            room = (
+                np.empty(_MOST_IN_BINS),
+                np.empty(_MOST_IN_BINS, np.int64),
+                np.empty(near.shape[1]),
+            )
+            found = near[block], box, count, least_distance, room, starts[block]
+            choose_in_bins(seeds, first, grid, targets[block], *found)
+
+        parallel.run(partial(task, block) for block in parallel.blocks(len(targets), _BLOCK))
+        owner, slot = np.nonzero(~np.isnan(starts[:, :, 0]))
+        return owner, starts[owner, slot]
 
     def nearest(self, targets: Array, count: int = _CANDIDATES) -> Array:
         """Activations whose tips are nearest to each target, nearest first, (t, count, m)."""
@@ -91,8 +164,8 @@ def face_seeds(rod: TipMap) -> Seeds:
 
 def _with_tips(rod: TipMap, gamma: Array) -> Seeds:
     """Seeds at those activations that have a stable equilibrium."""
-    tip = rod.tips(gamma)
+    tip, slope = rod.tips_and_slopes(gamma)
     if rod.supports_unstable:
         known = np.isfinite(tip[:, 0])
-        gamma, tip = gamma[known], tip[known]
-    return Seeds(gamma, tip, rod.box.scales)
+        gamma, tip, slope = gamma[known], tip[known], slope[known]
+    return Seeds(gamma, tip, slope, rod.box)
