@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _USUAL, _SIZE = 1 << 17, 0.007  # points of the usual cloud, and the edge of each [L]
-_SIZES = 0.003, 0.02
+_SIZES = 0.003, 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
