@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import re
+import shutil
 
 import pytest
 from benchmarks.bench_cold import COMMANDS, ROOT, measured, recorded
@@ -82,6 +83,7 @@ def test_nothing_is_compiled_after_a_warm_up(tmp_path):
     """Kernels of all tests from here on: most have been compiled already."""
     warm_up = recorded(WARM_UP.split(), tmp_path, own_cache=False)
     assert _kernels() <= warm_up.used.keys()
+    shutil.copytree(ROOT / "examples", tmp_path, dirs_exist_ok=True)
     runs = [recorded(line.split(), tmp_path, own_cache=False) for line in (*_of_readme(), CRITICAL)]
     assert len(runs) >= 6
     assert [run.compiled for run in runs if run.compiled] == []

@@ -181,7 +181,7 @@ def test_a_load_that_is_too_large_shows_nothing_and_a_force_leans_the_arm(loads_
     tab.page.get_by_text("loads = too large").first.wait_for()
     assert not tab.drawn("/cloud")
     enter(tab, "payload [g]", "0", lambda one: one.payload == 0.0, "the payload is off")
-    assert tab.drawn("/cloud")
+    tab.wait(lambda: tab.drawn("/surface") or tab.drawn("/cloud"), "what it reaches is drawn again")
     assert tab.drawn("/arm/0")
 
     rest = tab.session.tip.copy()
