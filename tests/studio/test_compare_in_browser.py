@@ -111,7 +111,8 @@ def test_a_snapshot_is_drawn_around_the_design_beside_it_or_not_at_all(tab):
     become(tab, taper=0.015)
     eye = np.array(tab.session.camera.usual().position)
     tab.choose("draw", "beside this design")
-    tab.wait(lambda: tab.drawn("/reference/arm"), "it stands beside")
+    beside = "/reference/arm", "/reference/name"
+    tab.wait(lambda: all(map(tab.drawn, beside)), "it stands beside")
     assert tab.session.reference is known
     assert tab.drawn("/reference/name").text == "kept"
     tab.wait(lambda: far(tab, eye), "the eye steps back")
