@@ -27,6 +27,7 @@ __all__ = ["least_changes"]
 _CANDIDATES = 300
 _STARTS, _FACE_STARTS = 14, 10
 _APART = 0.15
+_MARKS = (("seeds", 14, True), ("face_seeds", 10, True))
 _SURVEY = 5  # steps after which searches are compared
 _SURVIVORS, _MERGED = 6, 0.05  # searches of a target that go on, and how far they are apart
 _SETTLED, _MOST_COARSE = 1e-4, 30  # step and steps at which searches of the coarse map end
@@ -247,8 +248,9 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     """The activation to stay near to, and seeds near the target that change little."""
     owners = [np.arange(len(request.targets))]
     starts = [prepared.rod.box.clip(request.near)]
-    for marks, most in ((prepared.seeds, _STARTS), (prepared.face_seeds, _FACE_STARTS)):
-        owner, start = marks.near(request.targets, request.near, _CANDIDATES, most, _APART)
+    for name, most, moves in _MARKS:
+        marks = getattr(prepared, name)
+        owner, start = marks.near(request.targets, request.near, _CANDIDATES, most, _APART, moves)
         owners.append(owner)
         starts.append(start)
     return np.concatenate(owners), np.concatenate(starts)

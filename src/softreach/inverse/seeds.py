@@ -81,7 +81,7 @@ class Seeds:
         return sorted_seeds, first, (corner, width, (nx, ny, nz))
 
     def near(
-        self, targets: Array, near: Array, count: int, most: int, least_distance: float
+        self, targets: Array, near: Array, count: int, most: int, least_distance: float, moves: bool = True
     ) -> tuple[Index, Array]:
         """Seeds with tips near each target, those nearest to an activation, that lie apart.
 
@@ -105,7 +105,7 @@ class Seeds:
                 np.empty(_MOST_IN_BINS, np.int64),
                 np.empty(near.shape[1]),
             )
-            found = near[block], box, count, least_distance, room, starts[block]
+            found = near[block], box, count, least_distance, moves, room, starts[block]
             choose_in_bins(seeds, first, grid, targets[block], *found)
 
         parallel.run(partial(task, block) for block in parallel.blocks(len(targets), _BLOCK))

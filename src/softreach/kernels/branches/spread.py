@@ -41,7 +41,7 @@ def choose_apart(points, scales, most, least_distance, chosen):
 
 
 @kernel
-def choose_in_bins(seeds, first, grid, targets, near, box, wanted, least_distance, room, starts):  # noqa: C901
+def choose_in_bins(seeds, first, grid, targets, near, box, wanted, least_distance, moves, room, starts):  # noqa: C901
     """Choose starts from seeds with tips near each target: those nearest to an activation.
 
     Each seed is moved to where its linearized tip meets the target, as far as the bounds allow;
@@ -90,7 +90,7 @@ def choose_in_bins(seeds, first, grid, targets, near, box, wanted, least_distanc
                     if skip < stride:
                         continue
                     skip = 0
-                    keys[count] = _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scales, moved)
+                    keys[count] = _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scales, moves, moved)
                     heap[count] = row
                     count += 1
         for start in range(count // 2 - 1, -1, -1):
@@ -102,7 +102,7 @@ def choose_in_bins(seeds, first, grid, targets, near, box, wanted, least_distanc
             count -= 1
             keys[0], heap[0] = keys[count], heap[count]
             _sift(keys, heap, 0, count)
-            _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scales, moved)
+            _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scales, moves, moved)
             for slot in range(chosen):
                 if apart:
                     distance = 0.0
@@ -115,7 +115,7 @@ def choose_in_bins(seeds, first, grid, targets, near, box, wanted, least_distanc
 
 
 @inline
-def _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scales, moved):
+def _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scales, moves, moved):
     """Move a seed to where its linearized tip meets the target; what it is to be sorted by."""
     x, y, z = targets[t, 0] - tips[row, 0], targets[t, 1] - tips[row, 1], targets[t, 2] - tips[row, 2]
     square = x * x + y * y + z * z
@@ -126,7 +126,7 @@ def _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scal
     for k in range(gamma.shape[1]):
         u, v, w = slopes[row, 0, k], slopes[row, 1, k], slopes[row, 2, k]
         at = gamma[row, k]
-        end = min(max(at + scales[k] * (u * a + v * b + w * c), low[k]), high[k])
+        end = min(max(at + scales[k] * (u * a + v * b + w * c), low[k]), high[k]) if moves else at
         way = (end - at) / scales[k]
         x -= u * way
         y -= v * way
@@ -135,7 +135,7 @@ def _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scal
         moved[k] = end
         key += (end - near[t, k]) ** 2
     left = x * x + y * y + z * z
-    return key + (_FAR if left > _MET * square or step > _LONG else 0.0)
+    return key + (_FAR if moves and (left > _MET * square or step > _LONG) else 0.0)
 
 
 @inline
