@@ -32,6 +32,11 @@ for profile, examples in {"usual": 8, "large": 25}.items():
 settings.load_profile("usual")
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """One more process than cores, as browsers and killed workers are waited for; at most four."""
+    return min(4, len(os.sched_getaffinity(0)) + 1) if hasattr(os, "sched_getaffinity") else 2
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """More random designs where the large sizes are asked for."""
     if config.option.markexpr == "large or not large":

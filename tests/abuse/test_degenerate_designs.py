@@ -156,7 +156,7 @@ def test_a_cloud_fills_as_many_dimensions_as_it_has_free_bundles(arm, dimension)
     assert local_dimension(points) == pytest.approx(dimension, rel=0.12)
 
 
-@pytest.mark.parametrize("jitter", [0.0, 1e-15, 1e-9])
+@pytest.mark.parametrize("jitter", [0.0, pytest.param(1e-15, marks=pytest.mark.large), 1e-9])
 @pytest.mark.parametrize("curve", ["circle", "helix", "moment curve"])
 def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(curve, jitter):
     t = np.random.default_rng(0).random(5_000)
@@ -171,7 +171,15 @@ def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(
         assert sr.concave_hull(points, 0.01).volume == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("jitter", [1e-8, 3e-9, 1e-9, 1e-12])
+@pytest.mark.parametrize(
+    "jitter",
+    [
+        1e-8,
+        pytest.param(3e-9, marks=pytest.mark.large),
+        1e-9,
+        pytest.param(1e-12, marks=pytest.mark.large),
+    ],
+)
 def test_many_points_that_crowd_near_a_curve_are_told_before_they_cost(jitter):
     tip = sr.compute_cloud(frozen(1, 2), 20_000).tip.values
     points = tip + jitter * np.random.default_rng(1).standard_normal(tip.shape)

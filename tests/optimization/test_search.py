@@ -84,7 +84,9 @@ def assert_same_front(one, other):
     np.testing.assert_allclose(ours, theirs, rtol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["search.journal", "search.db"])
+@pytest.mark.parametrize(
+    "name", ["search.journal", pytest.param("search.db", marks=pytest.mark.large)]
+)
 def test_a_search_that_was_killed_goes_on(name, tmp_path, alone):
     storage = tmp_path / name
     with started(storage, 6) as process:

@@ -10,7 +10,6 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed, find_parameter
-from softreach.arm.summary import describe
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Studio, StudioState
 from softreach.studio.captions import size_text
@@ -149,31 +148,6 @@ def test_surfaces_are_drawn_and_cut(tab):
     tab.session.update(lambda s: s.showing(slice=Slice(), surface=False, alpha_shape=False))
     tab.settle()
     assert not tab.drawn("/surface")
-
-
-@pytest.mark.large
-def test_designs_that_cannot_exist_show_the_librarys_message(tab):
-    tab.open("Design")
-    good = tab.session.state.design
-    tab.drag("taper φ [deg]", 90)
-    alert = tab.page.get_by_role("alert").filter(has_text="leaves no tip")
-    alert.wait_for()
-    assert "must be a finite number <" in alert.inner_text()
-    assert describe(tab.session.state.design).tip_radius > 0
-    tab.drag("taper φ [deg]", -95)
-    alert.wait_for(state="hidden")
-    assert tab.session.state.design != good
-
-    tab.open("Design")
-    tab.session.update(lambda s: s.replace(design=changed(s.design, {"extent": 2.0})))
-    tab.settle()
-    tab.drag("lowest γ", -300)
-    alert = tab.page.get_by_role("alert").filter(has_text="must keep ζ > 0")
-    alert.wait_for()
-    assert describe(tab.session.state.design).extension[0] > 0
-    tab.drag("lowest γ", 290)
-    alert.wait_for(state="hidden")
-    tab.settle()
 
 
 def test_a_state_is_saved_loaded_and_linked_and_tabs_stay_apart(tab, tmp_path, studio):

@@ -145,9 +145,10 @@ def _loaded() -> list[Callable[[], object]]:
     )
     arms = [free.replace(loads=loads) for loads in kinds]
     rest = [0.0] * free.bundles
+    pulled = free.input_bounds[:, 0].tolist()
     functions = (partial(f, arm) for arm in arms for f in (tip_positions, tip_jacobian))
     return [
         *(partial(f, [rest]) for f in functions),
         *(partial(configuration, arm, rest) for arm in arms),
-        partial(equilibria, arms[0], rest),
+        partial(equilibria, arms[0], pulled),
     ]
