@@ -52,8 +52,8 @@ def main() -> None:
                 tab.close()
         browser.close()
     for (impact, rule, html), places in sorted(faults.items()):
-        print(f"{impact} {rule} ({len(places)} views, first {places[0]}): {html}")
-    print(f"{len(faults)} faults that are serious or critical")
+        sys.stdout.write(f"{impact} {rule} ({len(places)} views, first {places[0]}): {html}\n")
+    sys.stdout.write(f"{len(faults)} faults that are serious or critical\n")
     sys.exit(bool(faults))
 
 
