@@ -14,6 +14,7 @@ import pytest
 import softreach.studio.app
 import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
+from softreach.inverse.prepared import prepared_map
 from softreach.studio import Studio, work
 from softreach.studio.session import Session
 from tests.studio.sockets import CAMERA, PATIENCE, connected, page, until
@@ -90,7 +91,10 @@ def test_memory_is_returned_once_a_tab_rests_and_when_it_is_gone(studio, monkeyp
     with page(studio) as session:
         assert session.settle(PATIENCE)
         until(lambda: 1 in returned)
+        prepared = weakref.ref(prepared_map(session.state.design))
+        del session
     until(lambda: 0 in returned)
+    until(lambda: prepared() is None)
 
 
 def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_full(

@@ -26,7 +26,7 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
-__all__ = ["PreparedMap", "prepared_map"]
+__all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 
 
 _CELLS = 32
@@ -159,3 +159,8 @@ def prepared_map(
 @lru_cache(maxsize=4)
 def _of_map(rod: TipMap, cells: int, depth: int) -> PreparedMap:
     return PreparedMap(rod, cells, depth)
+
+
+def forget_prepared() -> None:
+    """Free the maps that are remembered, of some 0.1 GB each."""
+    _of_map.cache_clear()

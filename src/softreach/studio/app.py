@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from softreach.inverse.prepared import forget_prepared
 from softreach.picture.axes_box import round_box
 from softreach.plot.style import pyplot
 from softreach.studio.fields import attempt
@@ -224,6 +225,8 @@ class Studio:
             session = self.sessions.pop(client.client_id, None)
         if session is not None:
             session.close()
+            if not self.sessions:
+                forget_prepared()
             if self.work is not None:
                 session.keep()
                 self._left.append((session.state_now(), session.history))
