@@ -25,7 +25,7 @@ def problems(bundles, n, *, to_corners=0.0, softness=1e-9):
 
 
 def projected(center, slope, wanted, softness, low, high):
-    point, multiplier = np.empty_like(center), np.empty_like(wanted)
+    point, multiplier = np.empty_like(center), np.zeros_like(wanted)
     project(center, slope, wanted, softness, low, high, point, multiplier)
     return point, multiplier
 

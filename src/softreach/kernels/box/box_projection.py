@@ -24,7 +24,7 @@ _FLAT = 0.1  # part of the slope at the start of a step at which its end is good
 
 
 @kernel
-def project(center, slope, wanted, softness, low, high, out, multiplier):
+def project(center, slope, wanted, softness, low, high, out, multiplier):  # noqa: C901
     """Write x into `out` (n, m) and y into `multiplier` (n, 3).
 
     Args:
@@ -35,19 +35,27 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):
         low: Lower bounds, shape (n, m).
         high: Upper bounds, shape (n, m).
         out: x, shape (n, m).
-        multiplier: y, shape (n, 3).
+        multiplier: y to begin with, 0 where nothing is known, and then y, shape (n, 3).
     """
     y, error, step, trial = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     gram = np.zeros((3, 3))
     for n in range(center.shape[0]):
-        y[:] = 0.0
+        known = False
+        for i in range(3):
+            y[i] = multiplier[n, i]
+            known = known or y[i] != 0.0
         best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for _ in range(_MOST_ITERATIONS):
             ascent = newton(gram, error, step)
-            if not ascent > _CONVERGED * (abs(best) + 1e-30):
-                break
             ends = center, slope, wanted, softness, low, high, n, y, step, trial
-            if not climbs(ends, best, ascent, _SHORTEST_NEWTON):
+            if not ascent > _CONVERGED * (abs(best) + 1e-30):
+                if not known:
+                    break
+                # Newton's last step from afar ends far below the tolerance.
+                known = False
+                for i in range(3):
+                    trial[i] = y[i] + step[i]
+            elif not climbs(ends, best, ascent, _SHORTEST_NEWTON):
                 # As arguments: arrays in a tuple that is unpacked elsewhere too are counted.
                 moves = _tops(center, slope, softness, low, high, n, y, step, trial, error, ascent)
                 if not moves:
