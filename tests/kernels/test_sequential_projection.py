@@ -33,7 +33,7 @@ def reference(rod, target, near, gamma, most):
         trial, force = trial[0], (1 + sigma) * force[0]
         moved = trial - gamma
         ahead = norm(miss + slope @ moved)
-        if ahead <= max(1e-2 * norm(miss), 1e-9):
+        if ahead <= max(1e-2 * norm(miss), 1e-9) and 1.5 * norm(force) < RESTORING:
             weight = penalty = max(penalty, 1.5 * norm(force))
         else:
             weight = RESTORING

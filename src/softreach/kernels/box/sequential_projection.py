@@ -220,14 +220,14 @@ def next_trials(running, n, owner, near):
             y += running.slope[i, 1, j] * moved
             z += running.slope[i, 2, j] * moved
         ahead = math.sqrt(x * x + y * y + z * z)
-        weight = _RESTORING
+        x, y, z = running.multiplier[i, 0], running.multiplier[i, 1], running.multiplier[i, 2]
+        asked = 1.5 * (1.0 + running.proximity[i]) * math.sqrt(x * x + y * y + z * z)
         # Where nothing meets the target, the multiplier says no more than that.
-        if ahead <= max(_MET * before, _MISS):
-            x, y, z = running.multiplier[i, 0], running.multiplier[i, 1], running.multiplier[i, 2]
-            force = (1.0 + running.proximity[i]) * math.sqrt(x * x + y * y + z * z)
-            weight = max(running.penalty[i], 1.5 * force)
+        if ahead <= max(_MET * before, _MISS) and asked < _RESTORING:
+            weight = max(running.penalty[i], asked)
             running.penalty[i] = weight
         else:
+            weight = _RESTORING
             for a in range(3):
                 running.multiplier[i, a] = 0.0
         foreseen += weight * ahead
