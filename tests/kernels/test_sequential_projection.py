@@ -33,7 +33,7 @@ def reference(rod, target, near, gamma, most):
         trial, force = trial[0], (1 + sigma) * force[0]
         moved = trial - gamma
         ahead = norm(miss + slope @ moved)
-        if ahead <= max(1e-2 * norm(miss), 1e-9) and 1.5 * norm(force) < RESTORING:
+        if ahead <= max(1e-2 * norm(miss), 1e-9) and 1.5 * norm(force) < 1e4:
             weight = penalty = max(penalty, 1.5 * norm(force))
         else:
             weight = RESTORING
@@ -118,4 +118,4 @@ def test_least_changes_are_stationary():
         change, slope = (request.near[row] - gamma)[free], slopes[row][:, free]
         left = change - slope.T @ np.linalg.lstsq(slope.T, change, rcond=None)[0]
         stationary.append(norm(left) < 1e-5)
-    assert np.mean(stationary) > 0.97
+    assert all(stationary)

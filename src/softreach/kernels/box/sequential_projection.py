@@ -25,7 +25,8 @@ LONGEST_STEP = 0.5
 """In ranges."""
 _MET = 1e-2  # part of a miss that may be left where the linearized target is met
 _MISS = 1e-9  # in L, that counts as none
-_RESTORING = 1e6  # penalty of a miss where it is not: nothing else counts
+_CREDIBLE = 1e4  # penalty above which the multiplier says no more than that nothing meets it
+_RESTORING = 1e6  # penalty of a miss where it is not met: nothing else counts
 _PROGRESS, _PATIENCE = 0.02, 6  # part of a miss, and steps after which less ends a search
 _SHORT = 0.1  # steps that tell the curvature, in ranges
 _LEAST_PENALTY = 1000.0  # in merits that are compared
@@ -222,8 +223,7 @@ def next_trials(running, n, owner, near):
         ahead = math.sqrt(x * x + y * y + z * z)
         x, y, z = running.multiplier[i, 0], running.multiplier[i, 1], running.multiplier[i, 2]
         asked = 1.5 * (1.0 + running.proximity[i]) * math.sqrt(x * x + y * y + z * z)
-        # Where nothing meets the target, the multiplier says no more than that.
-        if ahead <= max(_MET * before, _MISS) and asked < _RESTORING:
+        if ahead <= max(_MET * before, _MISS) and asked < _CREDIBLE:
             weight = max(running.penalty[i], asked)
             running.penalty[i] = weight
         else:
