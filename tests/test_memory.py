@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import pytest
 
 from softreach.support import memory
@@ -42,3 +45,15 @@ def test_files_that_a_container_keeps_only_to_read_count_as_free(container, file
 def test_without_a_limit_the_system_says_what_is_free(container, files):
     container(files)
     assert memory.free_memory() == 1e6
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems take freed memory themselves")
+def test_memory_that_was_freed_is_returned_to_the_system():
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+    pieces = [bytes(20_000) for _ in range(5000)]
+    del pieces[:-1]  # the last holds the others in the heap
+    before = resident()
+    memory.return_memory()
+    assert resident() < before - 50e6

@@ -14,7 +14,7 @@ import pytest
 import softreach.studio.app
 import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
-from softreach.studio import Studio
+from softreach.studio import Studio, work
 from softreach.studio.session import Session
 from tests.studio.sockets import CAMERA, PATIENCE, connected, page, until
 
@@ -82,6 +82,15 @@ def test_of_tabs_that_were_closed_nothing_stays(studio):
         return len({id(one()) for one in gone if one() is not None})
 
     until(lambda: clouds() <= 1)  # the one that all tabs begin with
+
+
+def test_memory_is_returned_once_a_tab_rests_and_when_it_is_gone(studio, monkeypatch):
+    returned: list[int] = []
+    monkeypatch.setattr(work, "return_memory", lambda: returned.append(len(studio.sessions)))
+    with page(studio) as session:
+        assert session.settle(PATIENCE)
+        until(lambda: 1 in returned)
+    until(lambda: 0 in returned)
 
 
 def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_full(

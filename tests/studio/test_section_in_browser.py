@@ -30,6 +30,21 @@ def test_the_section_is_that_of_the_exact_set(tab):
     assert np.abs(onto).max() < 2 * reach.exact.image.lattice.cell
 
 
+def test_the_picture_of_a_section_is_told_in_words_and_scrolled_by_keys(tab):
+    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
+    picture = tab.page.locator("img:visible").first
+    tab.wait(lambda: "one closed curve" in (picture.get_attribute("alt") or ""), "it has words")
+    area = tab.page.get_by_role("group", name="figures")
+    tab.wait(lambda: area.get_attribute("tabindex") == "0", "keys reach what scrolls")
+    before = tab.session.camera.actual()
+    area.evaluate("area => area.style.height = '200px'")
+    for key in ("ArrowDown", "ArrowLeft"):  # these turn the camera elsewhere
+        area.press(key, delay=200)
+    tab.wait(lambda: area.evaluate("area => area.scrollTop") > 0, "it is scrolled")
+    tab.settle()
+    assert tab.session.camera.actual() == before
+
+
 @pytest.mark.large
 def test_the_section_follows_the_slice_and_the_design(tab):
     tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))

@@ -23,7 +23,7 @@ from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState
-from softreach.studio.work import Latest, StaleCheck
+from softreach.studio.work import Latest, StaleCheck, return_memory_soon
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -401,6 +401,7 @@ class Session:
             yield
         finally:
             self.report("")
+            return_memory_soon()
 
     def follow(self, *kinds: type[Job]) -> None:
         """Do these jobs as soon as they are free, for the state there is by then."""
@@ -441,12 +442,14 @@ class Session:
         self.panels, self.trail, self.figures, self.bench = [], [], Figures(), None
         self.check = self.search = self.slopes = None
         self._shown.clear()
+        return_memory_soon()
 
     def _rested(self) -> None:
         """A job has nothing left to do; if that is true of all, the reader is told."""
         if not self.busy:
             self.doing = ""
             self.show()
+            return_memory_soon()
 
     def fail(self, error: Exception) -> None:
         """Show an error; one that is not ours is a bug and goes to the log too."""

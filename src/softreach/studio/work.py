@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
-from softreach.support.memory import free_memory
+from softreach.support.memory import free_memory, return_memory
 
 StaleCheck = Callable[[], None]
 """Raises `Dropped` if what is being done is no longer wanted."""
@@ -142,6 +142,25 @@ class Latest:
     def _check(self) -> None:
         if self._closed or self._canceled or self._waiting is not None:
             raise Dropped
+
+
+_REST = 1.0  # [s] without an end of any work, after which memory is returned
+
+
+def _return_memory(check: StaleCheck) -> None:
+    """Return what work has freed, once no more of it ends for a moment."""
+    for _ in range(10):
+        time.sleep(_REST / 10)
+        check()
+    return_memory()
+
+
+_returned = Latest(lambda _: None)
+
+
+def return_memory_soon() -> None:
+    """Return what has been freed in a moment, if no more work ends until then."""
+    _returned.submit(_return_memory)
 
 
 # Budget of one computation: a share of the free memory, and some seconds.

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
+import sys
 from pathlib import Path
 
 from softreach.support.errors import InvalidInput, warn
 
-__all__ = ["check_disk", "check_memory", "check_room", "free_disk", "free_memory"]
+__all__ = ["check_disk", "check_memory", "check_room", "free_disk", "free_memory", "return_memory"]
 
 _UNKNOWN = 4e9  # where the system does not say
 _CONTROL_GROUP = Path("/sys/fs/cgroup")
@@ -53,6 +55,12 @@ def _control_group() -> float:
         except (OSError, ValueError):  # no such group, or its limit is "max"
             continue
     return float("inf")
+
+
+def return_memory() -> None:
+    """Return to the system what has been freed: glibc keeps it, in an arena for each thread."""
+    if sys.platform == "linux" and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):
+        trim(0)
 
 
 def free_disk(path: str | os.PathLike[str]) -> float:

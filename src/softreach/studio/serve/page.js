@@ -37,10 +37,11 @@
 })();
 
 // viser turns its camera with every key that is not typed into a field. Keys of a slider, a tab or a
-// button are its own; those with Ctrl are commands.
+// button are its own, as are arrows where they scroll; those with Ctrl are commands.
 document.documentElement.addEventListener("keydown", function (event) {
-  var own = event.target.closest && event.target.closest("[role=slider], [role=tab], button");
-  if (own && !event.ctrlKey && !event.metaKey) event.stopPropagation();
+  var target = event.target, own = target.closest && target.closest("[role=slider], [role=tab], button");
+  var scrolls = target.matches && target.matches("[data-scrolls]") && event.key.startsWith("Arrow");
+  if ((own || scrolls) && !event.ctrlKey && !event.metaKey) event.stopPropagation();
 });
 
 // Keys of the page, in one table: how a key is written, what it does, and what is done here, if
@@ -113,11 +114,27 @@ document.documentElement.addEventListener("keydown", function (event) {
         control.setAttribute("aria-label", words);
       } else if (label) control.setAttribute("aria-label", label);
     });
+    document.querySelectorAll("img").forEach(function (picture) {
+      var around = picture.parentElement; // its folder, whose text says what is seen
+      while (around && !around.textContent.trim()) around = around.parentElement;
+      if (around) picture.alt = around.textContent.trim();
+    });
+  }
+  // What scrolls is reached by keys: by those of a control in it, or by its own.
+  function scroll() {
+    document.querySelectorAll("[data-scrollarea-viewport]").forEach(function (area) {
+      if (area.querySelector("button, input, a, [tabindex]")) return;
+      area.tabIndex = 0;
+      area.dataset.scrolls = "";
+      area.setAttribute("role", "group");
+      area.setAttribute("aria-label", "figures");
+    });
   }
   var waiting = false;
   function tidy() {
     waiting = false;
     name();
+    scroll();
     var status = document.querySelector("[data-history]");
     if (!status) return;
     var steps = status.dataset.history;
