@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.rod import tip_map
 from softreach.studio import StudioState
+from softreach.studio.jobs.inverse import SolveInverse
 
 
 @pytest.fixture
@@ -86,6 +88,14 @@ def test_a_tip_inside_the_exact_surface_is_dragged(inverse_tab):
     assert tab.drawn("/surface")
     assert not tab.drawn("/cloud")
 
+    tip, up = tip_of(tab), np.array([0.0, 0.0, 1.0])
+    tab.page.wait_for_timeout(200)
+    drag_tip(tab, tip + 0.08 * up, tip + 0.16 * up)
+    tab.page.mouse.up()
+    tab.wait(lambda: abs(tip_of(tab)[2] - tip[2] - 0.08) < 0.01, "the arrow lifts the tip")
+    tab.settle()
+    np.testing.assert_allclose(tip_of(tab)[:2], tip[:2], atol=2e-5)
+
 
 def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(full_tab):
     tab = full_tab
@@ -114,6 +124,25 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghos
     held = np.abs(answer.activations - tab.session.state.activation).max(axis=1)
     assert held.min() < 1e-3
     assert all(tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer)))
+
+
+def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
+    tab = inverse_tab
+    arm, scene = tab.session.state.design, tab.session.scene
+    tab.session.job(SolveInverse).aim(np.array([0.2932, 0.0739, 0.0088]))
+    tab.settle()
+    shapes, eye = tab.session.answer.activations, tab.session.client.camera.position
+    changes = np.abs(shapes - tab.session.state.activation).max(axis=1)
+    here, other = changes.argmin(), changes.argmax()
+    assert here != other
+    places = tip_map(arm).frames(shapes[[other]], np.linspace(0.3, 0.9, 31)).position[0]
+    place = next(p for p in places if scene.ghost_under(eye, p - eye) == other)
+    tab.page.mouse.click(*screen(tab, place))
+    there = tuple(shapes[other])
+    tab.wait(lambda: tab.session.state.activation == there, "the arm is in the other shape")
+    tab.settle()
+    pointing = sr.configuration(arm, there, 2).directors.values[-1, 2]
+    assert scene.pointing @ pointing > 1 - 1e-9
 
 
 @pytest.mark.large

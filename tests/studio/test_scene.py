@@ -8,9 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import softreach as sr
 from softreach.arm import Marker
+from softreach.rod import tip_map
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.reach import stages
+from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import Appearance
 from tests.made_arms import MADE_ARMS
@@ -118,3 +121,32 @@ def test_the_reach_without_loads_is_a_faint_surface_and_points_only_where_it_has
     assert len(meshes.added["/free"].points)
     scene.draw_free(reach, replace(look, free=False))
     assert not meshes.added
+
+
+def test_a_ghost_is_met_by_a_ray_to_it_but_not_behind_the_arm_or_where_all_meet(trunk):
+    scene, shapes = Scene(Meshes()), np.array([[-1.0, 0.0, -0.4], [0.0, -1.0, -0.4]])
+    scene.draw_arm(trunk, [0.0, 0.0, -1.2])
+    scene.draw_ghosts(trunk, shapes)
+    middles = tip_map(trunk).frames(shapes, [0.6 * trunk.length]).position[:, 0] / trunk.length
+    tips = sr.tip_positions(trunk, shapes) / trunk.length
+    for k, (middle, tip) in enumerate(zip(middles, tips, strict=True)):
+        eye = middle + np.array([0.3, -3.0, 0.1])
+        assert scene.ghost_under(eye, 2.0 * (middle - eye)) == k
+        assert scene.ghost_under(eye, eye - middle) is None
+        assert scene.ghost_under(tip + [0.0, 0.0, 3.0], np.array([0.0, 0.0, -1.0])) is None
+        behind = scene.spine[0][30] + 2.0 * (scene.spine[0][30] - middle)
+        assert scene.ghost_under(behind, middle - behind) is None
+    scene.remove("/ghosts")
+    assert scene.ghost_under(eye, middle - eye) is None
+
+
+def test_the_place_on_an_axis_is_nearest_to_the_line_of_sight():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        origin, eye, seen, axis = rng.normal(size=(4, 3))
+        axis /= np.linalg.norm(axis)
+        place = origin + along_axis(origin, axis, eye, seen) * axis
+        sight = (seen - eye) / np.linalg.norm(seen - eye)
+        gap = place - eye - (place - eye) @ sight * sight
+        assert gap @ axis == pytest.approx(0.0, abs=1e-9)
+    assert along_axis(origin, axis, origin - 3.0 * axis, origin) == 0.0

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import softreach as sr
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Quality, Studio
+from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.start import start_on_store
 from tests.studio.tab import Tab
 
@@ -136,13 +138,15 @@ def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
     for name in tabs:
         tab.open(name)
         tab.wait(lambda: not tab.page.evaluate(LACKING), f"controls of {name} are named")
+    inside = sr.tip_positions(tab.session.state.design, [[-0.5, -0.4, -0.3]])[0]
+    tab.session.job(SolveInverse).aim(inside)  # its button has another color
     for dark in (False, True):
         tab.session.update(lambda s, dark=dark: s.showing(dark=dark))
         tab.settle()
-        for name in ("Design", "View", "Compare", "Goals"):
+        for name in ("Design", "Move", "View", "Compare", "Goals"):
             tab.open(name)
             tab.wait(lambda: not tab.page.evaluate(FAINT), f"letters of {name} are seen")
-    tab.session.update(lambda s: s.showing(dark=False))
+    tab.session.update(lambda s: s.showing(dark=False).replace(target=None))
     tab.open("Design")
     assert tab.slider("taper φ [deg]").get_attribute("aria-label") == "taper φ [deg]"
 

@@ -43,7 +43,8 @@ def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(ta
     assert np.degrees(parameter(tab, "revolution")) > 130
     tab.page.get_by_text(size_text(after.size)).wait_for()
     assert after.volume != before.volume
-    assert not np.allclose(after.cloud.tip, before.cloud.tip)
+    first = slice(1 << 10)  # a tab keeps more samples than it needs
+    assert not np.allclose(after.cloud.tip[first], before.cloud.tip[first])
 
 
 def test_the_tip_is_where_the_library_says_and_its_trail_that_of_this_design_alone(tab):
@@ -60,7 +61,8 @@ def test_the_tip_is_where_the_library_says_and_its_trail_that_of_this_design_alo
 
     def shown():
         x, y, z = tab.session.tip
-        return tab.page.get_by_text(f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L").count()
+        text = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L, pointing along ("
+        return tab.page.get_by_text(text).count()
 
     tab.wait(shown, "the page says where the tip is")
 

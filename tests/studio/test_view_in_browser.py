@@ -53,7 +53,7 @@ def like(image: np.ndarray, color) -> int:
 
 
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
-    show(tab)
+    show(tab, mouse="none")  # the handle has a blue arrow
     seen = like(pixels(tab), BLUE)
     show(tab, cut="none")
     hidden = like(pixels(tab), BLUE)
@@ -84,7 +84,7 @@ def test_no_point_is_drawn_before_the_arm_from_any_side(tab):
 
     def arm(**look) -> int:
         """Pixels of the arm."""
-        show(tab, **look)
+        show(tab, mouse="none", **look)
         image = pixels(tab)
         return sum(like(image, color) for color in BUNDLES)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -16,23 +17,31 @@ from softreach.inverse.descent import descend
 from softreach.inverse.nearest import Reached, first_of_each, reach
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.sqp import constrained_minima, sqp, survey
+from softreach.inverse.sqp import Minima, constrained_minima, sqp
+from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, joined, rows
 
 __all__ = ["least_changes"]
 
 
 _CANDIDATES = 300
-_STARTS, _FACE_STARTS = 14, 10
+_STARTS = 7  # from seeds all over the box and from those on faces, as they are and moved
 _APART = 0.15
-_SURVEY = 5  # steps after which searches are compared
+_SURVEY = 3  # steps after which searches are compared
 _SURVIVORS, _MERGED = 6, 0.05  # searches of a target that go on, and how far they are apart
+_SETTLED, _MOST_COARSE = 1e-4, 30  # step and steps at which searches of the coarse map end
+_HIT = 1e-5  # miss of the coarse map in L, below which a search is on its target
+_NEARBY = 0.05  # the same, below which it may be on it on the exact map
+_LEADING, _DISTINCT = 4, 0.01  # searches that go on to the exact map, and how far they are apart
+_MARGIN = 1e-2  # by which, and by which part, the change of one may be above the least
+_NEARLY_HIT = 1e-8  # miss of the exact map in L, above which a search lost its target
+_STEEP = 1e3  # penalty, in 1/L, above which a target lies next to a fold or a boundary
 _HIGH_PENALTY = 1e4
 _EQUAL = 1e-6  # difference of changes below which neither is less
 _APART_IN_FAMILY = 1e-3  # least difference of two of a family, in ranges
 _ROUNDS = 4  # of random activations as many as are wanted
-_POLISHED, _MOST_POLISHING = 1e-9, 300
+_POLISHED, _MOST_POLISHING, _MOST_AGAIN = 1e-9, 300, 60
 _BLOCK = 4096  # targets at once: bounds the memory of their candidates
 
 
@@ -130,70 +139,121 @@ def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = No
 
 
 def _least_change(prepared: PreparedMap, request: Request, known: Array | None) -> Reached:
-    """The least of the local minima found; where none reaches its target, the nearest place."""
-    count = len(request.targets)
-    owner, start = _promising(prepared, request, *_starts(prepared, request))
+    """The least of the local minima found; where none reaches its target, the nearest place.
+
+    Searches run on a coarse map until they are compared, those worth it then on the exact one.
+    """
+    count, rod = len(request.targets), prepared.rod
+    every = _starts(prepared, request)
+    owner, start = _promising(prepared, request, *every)
     if known is not None:
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
-    gamma, residual = sqp(prepared.rod, request.of(owner), start)
-    best = _least(owner, gamma, residual, request)
-    ends = Reached(gamma[best], residual[best])
-    left = np.flatnonzero(ends.residual > request.residual)
-    more = reach(prepared, request.of(left), ends.gamma[left])
-    ends.gamma[left], ends.residual[left] = more
-    # Where some search lost its target, the target lies next to a fold or a boundary.
-    lost = np.bincount(owner, residual > request.residual, count) > 0
-    ends = _searched_again(prepared, request, ends, np.flatnonzero(lost), owner, start)
-    return _polished(prepared, request, ends)
-
-
-def _polished(prepared: PreparedMap, request: Request, ends: Reached) -> Reached:
-    """The best once more, until its steps are negligible; kept where that changes less."""
-    gamma, residual = sqp(
-        prepared.rod, request, ends.gamma, settled=_POLISHED, most=_MOST_POLISHING
+    coarse = sqp(prepared.coarse_rod, request, owner, start, settled=_SETTLED, most=_MOST_COARSE)
+    leading = _leading(prepared, request, owner, coarse)
+    fine = sqp(
+        rod,
+        request,
+        owner[leading],
+        coarse.gamma[leading],
+        proximity=coarse.proximity[leading],
+        settled=_POLISHED,
+        most=_MOST_POLISHING,
     )
-    owner = np.tile(np.arange(len(gamma)), 2)
-    gamma = np.concatenate([ends.gamma, gamma])
-    residual = np.concatenate([ends.residual, residual])
-    best = _least(owner, gamma, residual, request)
-    return Reached(gamma[best], residual[best])
+    # Where a search lost its target, that lies next to a fold or a boundary.
+    lost = np.zeros(count, bool)
+    off = (fine.residual > _NEARLY_HIT * rod.length) | (fine.penalty > _STEEP)
+    lost[owner[leading[off]]] = True
+    lost |= np.bincount(owner, coarse.residual <= _HIT * rod.length, count) == 0
+    owner = owner[leading]
+    ends = _best(owner, _on_target(rod, request, owner, fine), request)
+    left = np.flatnonzero(ends.residual > request.residual)
+    lost[left] = True
+    ends.gamma[left], ends.residual[left] = reach(prepared, request.of(left), ends.gamma[left])
+    return _searched_again(prepared, request, ends, np.flatnonzero(lost), *every)
+
+
+def _leading(prepared: PreparedMap, request: Request, owner: Index, ends: Minima) -> Index:
+    """Searches on their targets whose ends are apart and may be the least of their target."""
+    change = np.linalg.norm(ends.gamma - request.near[owner], axis=1)
+    miss = ends.residual / prepared.rod.length
+    worth = np.where(miss > _HIT, 1e100 * (1.0 + miss), change)
+    places = _by_owner(owner, worth, len(request.targets))
+    chosen = np.zeros(places.shape, bool)
+    choose_apart(ends.gamma[places], prepared.seeds.scales, _LEADING, _DISTINCT, chosen)
+    worth = worth[places]
+    chosen &= worth <= worth[:, :1] * (1.0 + _MARGIN) + _MARGIN
+    # Next to a fold the coarse map may miss by a little what the exact one reaches.
+    nearly = (miss[places] > _HIT) & (miss[places] < _NEARBY) & (change[places] < worth[:, :1])
+    return np.unique(places[chosen | nearly])
+
+
+def _by_owner(owner: Index, value: Array, count: int) -> Index:
+    """A row for every owner with what it owns, least value first, filled up with the least."""
+    order = np.lexsort((value, owner))
+    counts = np.bincount(owner, minlength=count)
+    first = np.cumsum(counts) - counts
+    places = first[:, None] + np.arange(counts.max(initial=0))
+    return order[np.where(places < (first + counts)[:, None], places, first[:, None])]
+
+
+def _on_target(rod: TipMap, request: Request, owner: Index, ends: Minima) -> Reached:
+    """Ends of searches, brought to their targets where these are nearly reached."""
+    gamma, residual = ends.gamma.copy(), ends.residual.copy()
+    off = np.flatnonzero(residual > request.residual)
+    more = descend(rod, request.targets[owner[off]], gamma[off], request.residual, most=20)
+    gamma[off], residual[off] = more.gamma, more.residual
+    return Reached(gamma, residual)
 
 
 def _searched_again(
-    prepared: PreparedMap, request: Request, ends: Reached, rows: Index, owner: Index, start: Array
+    prepared: PreparedMap, request: Request, ends: Reached, lost: Index, owner: Index, start: Array
 ) -> Reached:
-    """Search once more for some targets: first for them, then for less change without leaving."""
-    rod, chosen = prepared.rod, np.isin(owner, rows)
-    owner = np.concatenate([owner[chosen], rows])
-    start = np.concatenate([start[chosen], ends.gamma[rows]])
+    """Search once more for some targets, from every start and on the exact map alone.
+
+    Then first for the target, and for less change without leaving it.
+    """
+    rod, chosen = prepared.rod, np.isin(owner, lost)
+    owner = np.concatenate([owner[chosen], lost])
+    start = np.concatenate([start[chosen], ends.gamma[lost]])
+    plain = sqp(rod, request, owner, start, settled=_POLISHED, most=_MOST_AGAIN)
     at = descend(rod, request.targets[owner], start, request.residual)
-    hit = at.residual <= request.residual
-    gamma, residual = sqp(rod, request.of(owner[hit]), at.gamma[hit], penalty=_HIGH_PENALTY)
-    count = len(request.targets)
-    owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
-    gamma = np.concatenate([ends.gamma, at.gamma[hit], gamma])
-    residual = np.concatenate([ends.residual, at.residual[hit], residual])
-    best = _least(owner, gamma, residual, request)
-    return Reached(gamma[best], residual[best])
+    hit = np.flatnonzero(at.residual <= request.residual)
+    kept = sqp(
+        rod,
+        request,
+        owner[hit],
+        at.gamma[hit],
+        penalty=_HIGH_PENALTY,
+        settled=_POLISHED,
+        most=_MOST_AGAIN,
+    )
+    found = [
+        ends,
+        _on_target(rod, request, owner, plain),
+        Reached(at.gamma[hit], at.residual[hit]),
+        _on_target(rod, request, owner[hit], kept),
+    ]
+    owners = [np.arange(len(request.targets)), owner, owner[hit], owner[hit]]
+    return _best(np.concatenate(owners), joined(found), request)
 
 
-def _least(owner: Index, gamma: Array, residual: Array, request: Request) -> Index:
-    """The row of least change among those that reach their target, else the nearest one."""
-    change = np.linalg.norm(gamma - request.near[owner], axis=1)
-    change[residual > request.residual] = 1e100
-    worst = np.where(residual > request.residual, 1e100 * (1 + residual), change)
-    return first_of_each(owner, worst, len(request.targets))
+def _best(owner: Index, ends: Reached, request: Request) -> Reached:
+    """The end of least change among those that reach their target, else the nearest one."""
+    change = np.linalg.norm(ends.gamma - request.near[owner], axis=1)
+    worst = np.where(ends.residual > request.residual, 1e100 * (1 + ends.residual), change)
+    return rows(ends, first_of_each(owner, worst, len(request.targets)))
 
 
 def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     """The activation to stay near to, and seeds near the target that change little."""
     owners = [np.arange(len(request.targets))]
     starts = [prepared.rod.box.clip(request.near)]
-    for marks, most in ((prepared.seeds, _STARTS), (prepared.face_seeds, _FACE_STARTS)):
-        gamma = marks.nearest(request.targets, _CANDIDATES)
-        order = ((gamma - request.near[:, None]) ** 2).sum(axis=2).argsort(axis=1, kind="stable")
-        gamma = np.take_along_axis(gamma, order[:, :, None], axis=1)
-        owner, start = marks.starts(gamma, most, _APART)
+    marks = prepared.seeds, prepared.face_seeds
+    # Moved ones lie in the right basin where the seeds are dense, the others where they are few.
+    for moves, seeds in product((True, False), marks):
+        owner, start = seeds.near(
+            request.targets, request.near, _CANDIDATES, _STARTS, _APART, moves=moves
+        )
         owners.append(owner)
         starts.append(start)
     return np.concatenate(owners), np.concatenate(starts)
@@ -203,14 +263,9 @@ def _promising(
     prepared: PreparedMap, request: Request, owner: Index, start: Array
 ) -> tuple[Index, Array]:
     """Activations of the best searches of each target after a few steps, those that are apart."""
-    gamma, merit = survey(prepared.rod, request.of(owner), start, _SURVEY)
-    order = np.lexsort((merit, owner))
-    counts = np.bincount(owner, minlength=len(request.targets))
-    first = np.cumsum(counts) - counts
-    # A row for every target, filled up with its best, which is chosen once.
-    places = first[:, None] + np.arange(counts.max(initial=0))
-    places = np.where(places < (first + counts)[:, None], places, first[:, None])
-    return prepared.seeds.starts(gamma[order[places]], _SURVIVORS, _MERGED)
+    ends = sqp(prepared.coarse_rod, request, owner, start, most=_SURVEY)
+    places = _by_owner(owner, ends.merit, len(request.targets))
+    return prepared.seeds.starts(ends.gamma[places], _SURVIVORS, _MERGED)
 
 
 def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:

@@ -18,7 +18,7 @@ from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import coarsened, tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.support.arguments import as_integer, as_one_of
@@ -31,6 +31,7 @@ __all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 
 _CELLS = 32
 _FEW = 500  # targets; to divide space for more takes less time than not to
+_COARSE = 1e-3  # tolerance of the map that searches begin with
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,14 @@ class PreparedMap:
         Where an arm under loads has no stable equilibrium, it is NaN.
         """
         return free_bundles(stable_tips(self.whole))
+
+    @lazy
+    def coarse_rod(self) -> TipMap:
+        """The same in fewer steps, to move seeds and see which searches are worth the exact map.
+
+        Of an arm under loads it is the exact map.
+        """
+        return self.rod if self.rod.supports_unstable else coarsened(self.rod, _COARSE)
 
     @lazy
     def branch_map(self) -> TipMap:
@@ -114,7 +123,7 @@ class PreparedMap:
     @lazy
     def seeds(self) -> Seeds:
         """Starts of searches for a minimum."""
-        return seeds(self.rod)
+        return seeds(self.rod, self.coarse_rod)
 
     @lazy
     def coarse_cells(self) -> CoarseCells:
@@ -124,7 +133,7 @@ class PreparedMap:
     @lazy
     def face_seeds(self) -> Seeds:
         """Starts of searches for places on the boundary of the reachable set."""
-        return face_seeds(self.rod)
+        return face_seeds(self.rod, self.coarse_rod)
 
 
 def prepared_map(

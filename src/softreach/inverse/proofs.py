@@ -236,7 +236,7 @@ def _distances(targets: Array, at: Linearized) -> Array:
     n, _, m = at.slopes.shape
     away, slopes = targets - at.tips, at.slopes * at.half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
-    inside, force = np.empty((n, m)), np.empty((n, 3))
+    inside, force = np.empty((n, m)), np.zeros((n, 3))
     side = np.ones((n, m))
     project(np.zeros((n, m)), slopes, away, softness, -side, side, inside, force)
     size = np.linalg.norm(force, axis=1)

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from softreach.kernels.branches.spread import choose_apart
+from softreach.kernels.branches.spread import choose_apart, choose_in_bins
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.sampling import sample_cube
+from softreach.support import parallel
 from softreach.support.arrays import Array, Index
+from softreach.support.lazy import lazy
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 __all__ = ["Seeds", "face_seeds", "seeds"]
 
@@ -20,24 +28,96 @@ _MOST_ON_FACES = 60_000
 _SEED = 0
 _CANDIDATES = 24
 _STARTS = 3
+_IN_BIN, _BINS = 4, 512  # seeds in a bin, roughly, and the most bins along an axis
+_MOST_IN_BINS = 1024  # seeds that are looked at for one target
+_BLOCK = 1024
+_DAMPING = 1e-5  # of a Gram matrix, part of its trace
 _APART = 0.15  # of the ranges: two starts lead to different minima
+
+_Grid = tuple[Array, float, tuple[int, int, int]]
 
 
 class Seeds:
     """Activations with known tips."""
 
-    def __init__(self, gamma: Array, tip: Array, scales: Array) -> None:
-        """Index the tips.
+    def __init__(self, gamma: Array, tip: Array, coarse: TipMap) -> None:
+        """Keep the tips; what finds them is made when it is first needed.
 
         Args:
             gamma: Activations [-], shape (n, m).
             tip: Their tips [m], shape (n, 3).
-            scales: By which distances of activations are measured, shape (m,).
+            coarse: A tip map by which seeds are moved, and by the ranges of whose bounds distances
+                of activations are measured.
         """
+        self.gamma, self.tip, self.scales, self._coarse = gamma, tip, coarse.box.scales, coarse
+
+    @lazy
+    def tree(self) -> KDTree:
+        """The tips."""
         from scipy.spatial import KDTree
 
-        self.gamma, self.tip, self.scales = gamma, tip, scales
-        self.tree = KDTree(tip)
+        return KDTree(self.tip)
+
+    @lazy
+    def _bins(self) -> tuple[tuple[np.ndarray, ...], Index, _Grid]:
+        """Seeds bin by bin of their tips, the first row of each bin, and the bins."""
+        corner, extent = self.tip.min(axis=0), np.ptp(self.tip, axis=0)
+        extent = np.maximum(extent, 1e-3 * extent.max() + 1e-300)
+        width = float(np.cbrt(extent.prod() * _IN_BIN / len(self.tip)))
+        width = max(width, float(extent.max()) / _BINS)
+        nx, ny, nz = (int(n) for n in extent // width + 1)
+        x, y, z = ((self.tip - corner) // width).astype(np.int64).T
+        bins = (x * ny + y) * nz + z
+        first = np.zeros(nx * ny * nz + 1, np.int64)
+        first[1:] = np.bincount(bins, minlength=nx * ny * nz).cumsum()
+        order = bins.argsort(kind="stable")
+        exact = self._coarse.tips_and_slopes(self.gamma[order])[1] * self.scales
+        slope = exact.astype(np.float32)
+        gram = np.einsum("nij,nkj->nik", slope, slope, dtype=float)
+        gram += _DAMPING * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+        inverse = np.linalg.inv(gram)
+        sorted_seeds = self.gamma[order], self.tip[order], slope, inverse
+        return sorted_seeds, first, (corner, width, (nx, ny, nz))
+
+    def near(
+        self,
+        targets: Array,
+        near: Array,
+        count: int,
+        most: int,
+        least_distance: float,
+        *,
+        moves: bool,
+    ) -> tuple[Index, Array]:
+        """Seeds with tips near each target, those nearest to an activation, that lie apart.
+
+        Args:
+            targets: Shape (t, 3) [m].
+            near: An activation for each target, shape (t, m).
+            count: Seeds to look at, at least.
+            most: Largest number for one target.
+            least_distance: Between any two, in ranges.
+            moves: True to move each to where its linearized tip meets the target, before they are
+                compared.
+
+        Returns:
+            Number of the target and activation of each start, sorted by target.
+        """
+        seeds, first, grid = self._bins
+        targets, near = targets.copy(), near.copy()  # kernels are compiled for no read-only ones
+        starts = np.empty((len(targets), most, near.shape[1]))
+        limits = self._coarse.box
+        box = limits.low.copy(), limits.high.copy(), limits.scales.copy()
+
+        def task(block: slice) -> None:
+            of_seeds = np.empty(_MOST_IN_BINS), np.empty(_MOST_IN_BINS, np.int64)
+            room = *of_seeds, np.empty(near.shape[1])
+            wanted = near[block], box, count, least_distance, moves
+            choose_in_bins(seeds, first, grid, targets[block], *wanted, room, starts[block])
+
+        parallel.run(partial(task, block) for block in parallel.blocks(len(targets), _BLOCK))
+        owner, slot = np.nonzero(~np.isnan(starts[:, :, 0]))
+        return owner, starts[owner, slot]
 
     def nearest(self, targets: Array, count: int = _CANDIDATES) -> Array:
         """Activations whose tips are nearest to each target, nearest first, (t, count, m)."""
@@ -63,7 +143,7 @@ class Seeds:
         return np.nonzero(chosen)[0], candidates[chosen]
 
 
-def seeds(rod: TipMap) -> Seeds:
+def seeds(rod: TipMap, coarse: TipMap) -> Seeds:
     """Seeds on a grid over the box, or a low-discrepancy set where a grid is too coarse."""
     box, m = rod.box, rod.box.dimension
     if m == 0:
@@ -72,13 +152,13 @@ def seeds(rod: TipMap) -> Seeds:
         gamma = box.from_cube(np.array(sample_cube("grid", int(_MOST ** (1 / m)) ** m, m)))
     else:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
-    samples = _with_tips(rod, gamma)
+    samples = _with_tips(rod, gamma, coarse)
     if not len(samples.gamma):
         raise no_stable_equilibrium(len(gamma))
     return samples
 
 
-def face_seeds(rod: TipMap) -> Seeds:
+def face_seeds(rod: TipMap, coarse: TipMap) -> Seeds:
     """Seeds at corners of the box, on edges, and on faces with two free bundles."""
     box, m = rod.box, rod.box.dimension
     rng, count = np.random.default_rng(_SEED), _MOST_ON_FACES
@@ -86,13 +166,13 @@ def face_seeds(rod: TipMap) -> Seeds:
     dimension = rng.integers(0, min(m, _FACE_DIMENSION) + 1, count)
     free = rng.random((count, m)).argsort(axis=1).argsort(axis=1) < dimension[:, None]
     gamma = box.from_cube(np.where(free, rng.random((count, m)), corner))
-    return _with_tips(rod, gamma)
+    return _with_tips(rod, gamma, coarse)
 
 
-def _with_tips(rod: TipMap, gamma: Array) -> Seeds:
+def _with_tips(rod: TipMap, gamma: Array, coarse: TipMap) -> Seeds:
     """Seeds at those activations that have a stable equilibrium."""
     tip = rod.tips(gamma)
     if rod.supports_unstable:
         known = np.isfinite(tip[:, 0])
         gamma, tip = gamma[known], tip[known]
-    return Seeds(gamma, tip, rod.box.scales)
+    return Seeds(gamma, tip, coarse)

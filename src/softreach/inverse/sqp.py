@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -9,59 +11,161 @@ import numpy as np
 from softreach.inverse.descent import Objective, descend, linearized, minimize
 from softreach.inverse.request import Request
 from softreach.kernels.box.box_projection import project
-from softreach.rod.tip_map import TipMap
+from softreach.kernels.box.sequential_projection import (
+    FIRST_PROXIMITY,
+    LONGEST_STEP,
+    NOWHERE,
+    Running,
+    judge,
+    next_trials,
+)
+from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.support import parallel
 from softreach.support.arrays import Array, Index
 
-_LONGEST_STEP = 0.5  # in ranges
-_SOFTNESS = 1e-9  # of the linearized target, in |J|²
-_FIRST_PROXIMITY, _LARGEST_PROXIMITY = 0.3, 1e7
+_TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 
 _PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
 """Rising; with a lower first one a small miss would buy a large change of activation."""
 
 
+class Minima(NamedTuple):
+    """Ends of searches for the least change."""
+
+    gamma: Array
+    """Activations [-], shape (n, m)."""
+    residual: Array
+    """|tip - target| [m], shape (n,)."""
+    merit: Array
+    """½|γ - near|² and the penalty of the miss, shape (n,)."""
+    proximity: Array
+    """σ of the last step, shape (n,)."""
+    penalty: Array
+    """Penalty of the miss, in 1/L: half as much again as its multiplier, shape (n,)."""
+
+
 def sqp(
     rod: TipMap,
     request: Request,
+    owner: Index,
     start: Array,
     *,
     penalty: float = 0.0,
+    proximity: Array | float = FIRST_PROXIMITY,
     settled: float = 1e-6,
     most: int = 60,
-) -> tuple[Array, Array]:
+) -> Minima:
     """Minimize ½|γ - near|² subject to tip = target and bounds, from each start.
 
     Each step minimizes ½|x - near|² + ½σ|x - γ|² where the linearized map meets the target, inside
     the bounds, exactly: sequential quadratic programming with a multiple of the identity for
-    the Hessian. It is taken if ½|x - near|² + penalty·|miss| falls as it should; else σ
-    grows. Descent to the target ends the search.
+    the Hessian, of which σ is a secant estimate. It is taken if ½|x - near|² + penalty·|miss| falls
+    as it should; else σ grows.
 
     Args:
         rod: The tip map.
-        request: A target for each start, and what to stay near to.
+        request: Targets, and what to stay near to.
+        owner: Number of the target of each start, shape (n,).
         start: Activations to begin with, inside the bounds [-], shape (n, m).
         penalty: Least penalty. A high one keeps a search near the target once it is there, as it
             must where the target lies next to a fold or to the boundary of the reachable set.
+        proximity: σ of the first step, shape (n,) or one for all.
         settled: Step at which a search ends, in ranges.
-        most: Iterations.
-
-    Returns:
-        Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
+        most: Steps.
     """
-    state = _searched(rod, request, start, penalty, settled, most)
-    ends = descend(rod, request.targets, state.gamma, request.residual, most=20)
-    return ends.gamma, ends.residual
+    # Copies: kernels are compiled once more for arrays that are read-only or not contiguous.
+    n, owner = len(start), owner.copy()
+    request = replace(request, targets=request.targets.copy(), near=request.near.copy())
+    begin = np.empty(n)
+    begin[:] = proximity
+    minima = Minima(start.copy(), np.empty(n), np.empty(n), begin, np.empty(n))
+    # Searches that end make room for others; only the last of a task run by a few.
+    share = max(_TOGETHER, -(-n // parallel.thread_count()))
+    rod.prepare()
+    parallel.run(
+        partial(
+            _searched,
+            rod,
+            request,
+            owner[block],
+            Minima(*(part[block] for part in minima)),
+            penalty,
+            (settled, most),
+        )
+        for block in parallel.blocks(n, share)
+    )
+    return minima._replace(residual=minima.residual * rod.length)
 
 
-def survey(rod: TipMap, request: Request, start: Array, most: int) -> tuple[Array, Array]:
-    """Activations of searches as those of `sqp` after a few steps, and what they promise.
+def _searched(
+    rod: TipMap,
+    request: Request,
+    owner: Index,
+    ends: Minima,
+    penalty: float,
+    limits: tuple[float, int],
+) -> None:
+    """Run the searches that begin at `ends`, on the calling thread."""
+    box, total = rod.box, len(owner)
+    bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
+    running = _room(min(total, _TOGETHER), box.bundles)
+    tips, ahead = np.empty_like(running.miss), np.empty_like(running.slope)
+    begun = n = 0
+    while begun < total or n:
+        more = min(total - begun, len(tips) - n)
+        new, rows = slice(n, n + more), slice(begun, begun + more)
+        running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
+        running.trial[new], running.proximity[new] = ends.gamma[rows], ends.proximity[rows]
+        running.penalty[new], running.multiplier[new] = penalty, 0.0
+        running.reach[new] = LONGEST_STEP
+        n, begun = n + more, begun + more
+        rod.fill(running.trial[:n], tips[:n], ahead[:n])
+        if rod.supports_unstable:
+            lost = np.isnan(tips[:n, 0])
+            tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
+        n = judge(
+            running,
+            n,
+            tips,
+            ahead,
+            owner,
+            request.targets,
+            request.near,
+            bounds,
+            rod.length,
+            limits,
+            ends,
+        )
+        steps = (part[:n] for part in (running.center, running.slope, running.wanted))
+        limited = (part[:n] for part in (running.softness, running.low, running.high))
+        project(*steps, *limited, running.trial[:n], running.multiplier[:n])
+        next_trials(running, n, owner, request.near)
 
-    Returns:
-        Activations [-], shape (n, m), and what each search minimizes, ½|γ - near|² and the penalty
-        of the miss, shape (n,).
-    """
-    state = _searched(rod, request, start, 0.0, 1e-6, most)
-    return state.gamma, _merit(state.gamma, request.near, state.penalty, state.miss)
+
+def _room(n: int, m: int) -> Running:
+    """Room for so many searches."""
+    numbers = [np.empty(n) for _ in range(6)]
+    places = [np.empty((n, 3)) for _ in range(3)]
+    activations = [np.empty((n, m)) for _ in range(5)]
+    return Running(
+        row=np.empty(n, np.int64),
+        steps=np.empty(n, np.int64),
+        gamma=activations[0],
+        miss=places[0],
+        slope=np.empty((n, 3, m)),
+        penalty=numbers[0],
+        proximity=numbers[1],
+        reach=numbers[5],
+        weight=numbers[4],
+        gain=numbers[2],
+        center=activations[1],
+        wanted=places[1],
+        softness=numbers[3],
+        low=activations[2],
+        high=activations[3],
+        trial=activations[4],
+        multiplier=places[2],
+    )
 
 
 def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
@@ -100,85 +204,6 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
         residual[rows] = np.linalg.norm(error, axis=1) * rod.length
     ends = descend(rod, request.targets, gamma, request.residual)
     return ends.gamma, ends.residual
-
-
-class _State(NamedTuple):
-    """Every search as it stands, scaled with L."""
-
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    miss: Array
-    """(tip - target)/L, shape (n, 3)."""
-    slope: Array
-    """(∂r/∂γ)/L, shape (n, 3, m)."""
-    penalty: Array
-    """Penalty of a miss of L, beside ½|γ - near|², shape (n,)."""
-    proximity: Array
-    """σ: ½σ|step|² is added to what a step minimizes, shape (n,)."""
-
-
-def _searched(
-    rod: TipMap, request: Request, start: Array, penalty: float, settled: float, most: int
-) -> _State:
-    """The searches after so many steps, or fewer where they settled."""
-    n, length = len(start), rod.length
-    tip, slope = linearized(rod, start)
-    state = _State(
-        gamma=start.copy(),
-        miss=(tip - request.targets) / length,
-        slope=slope / length,
-        penalty=np.full(n, penalty),
-        proximity=np.full(n, _FIRST_PROXIMITY),
-    )
-    active = np.flatnonzero(np.isfinite(tip[:, 0]))
-    for _ in range(most):
-        if not len(active):
-            break
-        step = _advance(rod, request, state, active)
-        active = active[(step >= settled) & (state.proximity[active] < _LARGEST_PROXIMITY)]
-    return state
-
-
-def _advance(rod: TipMap, request: Request, state: _State, active: Index) -> Array:
-    """One step of the active searches; how long it would be without proximity, in ranges."""
-    gamma, near, slope = state.gamma[active], request.near[active], state.slope[active]
-    trial, force = _trials(rod, near, slope, state, active)
-    length, (tip, new_slope) = rod.length, linearized(rod, trial)
-    miss = (tip - request.targets[active]) / length
-    penalty = np.maximum(state.penalty[active], 1.5 * np.linalg.norm(force, axis=1))
-    linear_miss = state.miss[active] + np.einsum("nij,nj->ni", slope, trial - gamma)
-    ends, misses = np.stack([gamma, trial, trial]), (state.miss[active], linear_miss, miss)
-    before, foreseen, after = _merit(ends, near, penalty, np.stack(misses))
-    predicted, gained = before - foreseen, before - after
-    accepted = gained >= 0.1 * predicted - 1e-15
-    taken, sigma = active[accepted], state.proximity[active]
-    state.gamma[taken], state.miss[taken] = trial[accepted], miss[accepted]
-    state.slope[taken] = new_slope[accepted] / length
-    state.penalty[active] = penalty
-    eased = np.where(gained >= 0.7 * predicted, 0.4 * sigma, sigma)
-    state.proximity[active] = np.where(accepted, eased, 4.0 * sigma + 0.1)
-    return (np.abs(trial - gamma) / rod.box.scales).max(axis=1) * (1 + sigma)
-
-
-def _trials(
-    rod: TipMap, near: Array, slope: Array, state: _State, active: Index
-) -> tuple[Array, Array]:
-    """Ends of the steps, and the multipliers of the linearized targets."""
-    box, gamma = rod.box, state.gamma[active]
-    weight = 1.0 + state.proximity[active, None]
-    center = (near + state.proximity[active, None] * gamma) / weight
-    wanted = np.einsum("nij,nj->ni", slope, gamma) - state.miss[active]
-    softness = _SOFTNESS * (slope**2).sum(axis=(1, 2)) / (1.0 + state.penalty[active]) + 1e-30
-    reach = _LONGEST_STEP * box.scales
-    low, high = np.maximum(box.low, gamma - reach), np.minimum(box.high, gamma + reach)
-    trial, multiplier = np.empty_like(gamma), np.empty((len(active), 3))
-    project(center, slope, wanted, softness, low, high, trial, multiplier)
-    return trial, multiplier * weight
-
-
-def _merit(gamma: Array, near: Array, penalty: Array, miss: Array) -> Array:
-    """½|γ - near|² + penalty·|miss|, shape of the leading axes."""
-    return 0.5 * ((gamma - near) ** 2).sum(axis=-1) + penalty * np.linalg.norm(miss, axis=-1)
 
 
 def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:

@@ -187,7 +187,7 @@ def damped_steps(
     Returns:
         Ends of the steps, never outside the bounds, and the |miss + J d| that is left, shape (n,).
     """
-    step, multiplier = np.empty_like(gamma), np.empty((len(gamma), 3))
+    step, multiplier = np.empty_like(gamma), np.zeros((len(gamma), 3))
     low, high = (box.low - gamma) / box.scales, (box.high - gamma) / box.scales
     project(np.zeros_like(gamma), slopes * box.scales, -miss, damping, low, high, step, multiplier)
     # Where the step is the least, miss + J d is μ times the multiplier.

@@ -16,7 +16,7 @@ from softreach.support.arguments import as_flag, as_given, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 
-__all__ = ["in_steps", "refined", "tip_map"]
+__all__ = ["coarsened", "in_steps", "refined", "tip_map"]
 
 
 def tip_map(
@@ -60,10 +60,22 @@ def refined(rod: TipMap, tol: float) -> TipMap:
         rod: The tip map; one that is of no arm stays as it is.
         tol: Largest tip error, in L.
     """
-    if rod.tol <= check_tol(tol):
-        return rod
+    return rod if rod.tol <= check_tol(tol) else _to_tolerance(rod, tol)
+
+
+def coarsened(rod: TipMap, tol: float) -> TipMap:
+    """The tip map of the same arm to a larger tolerance; itself if its own is no smaller.
+
+    Args:
+        rod: The tip map; one that is of no arm stays as it is.
+        tol: Largest tip error, in L.
+    """
+    return rod if rod.tol >= check_tol(tol) else _to_tolerance(rod, tol)
+
+
+def _to_tolerance(rod: TipMap, tol: float) -> TipMap:
     if isinstance(rod, View | DrivenRod):
-        return replace(rod, base=refined(rod.base, tol))
+        return replace(rod, base=_to_tolerance(rod.base, tol))
     frame: Frame = "base" if isinstance(rod, ArmRod) else "world"
     return _of_arm(rod.arm, tol, frame) if isinstance(rod, ArmRod | PlacedRod) else rod
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
@@ -93,11 +95,12 @@ def loaded_share(session: Session) -> str:
 
 
 def tip_text(session: Session) -> list[Part]:
-    """Place of the tip, and whether a loaded arm rests there."""
+    """Place and direction of the tip, and whether a loaded arm rests there."""
     parts: list[Part] = []
     if session.tip is not None:
-        x, y, z = session.tip
-        parts.append(f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L")
+        place = ", ".join(f"{x:.6f}" for x in session.tip)
+        pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(session.scene.pointing, 3))
+        parts.append(f"tip at ({place}) L, pointing along ({pointing})")
     if session.posture is not None:
         parts.append(f"{' · ' if parts else ''}{_POSTURES[session.posture]}")
     return parts

@@ -179,6 +179,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, nearest: Nearest) -> No
         n = judge(running, n, tips, ahead, targets, nearest, enough, *bounds)
         slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
         low, high = running.low[:n], running.high[:n]
+        multiplier[:n] = 0.0
         project(center[:n], slope, wanted, softness, low, high, step[:n], multiplier[:n])
         next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
     nowhere = nearest.distance >= NOWHERE

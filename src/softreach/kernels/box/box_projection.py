@@ -2,7 +2,8 @@
 
 min ½ |x - c|² + |A x - b|²/(2 s) for low <= x <= high has the dual unknown y of three numbers only,
 however many variables there are: x = clip(c - Aᵀy) with A x - b = s y. The dual function is
-concave and piecewise quadratic; Newton's method with a line search maximizes it.
+concave and piecewise quadratic; Newton's method with a line search maximizes it. Where hardly a
+variable is between its bounds, Newton's step is as long as 1/s: the search along it is exact.
 """
 
 from __future__ import annotations
@@ -17,11 +18,13 @@ __all__ = ["climbs", "dual", "newton", "project"]
 
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-13  # of the largest terms
-_SHORTEST = 1e-9  # part of a step below which a search ends
+_SHORTEST_NEWTON = 0.2  # part of a step below which its best part is looked for
+_MOST_BRACKETS = 100
+_FLAT = 0.1  # part of the slope at the start of a step at which its end is good enough
 
 
 @kernel
-def project(center, slope, wanted, softness, low, high, out, multiplier):
+def project(center, slope, wanted, softness, low, high, out, multiplier):  # noqa: C901
     """Write x into `out` (n, m) and y into `multiplier` (n, 3).
 
     Args:
@@ -32,20 +35,31 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):
         low: Lower bounds, shape (n, m).
         high: Upper bounds, shape (n, m).
         out: x, shape (n, m).
-        multiplier: y, shape (n, 3).
+        multiplier: y to begin with, 0 where nothing is known, and then y, shape (n, 3).
     """
     y, error, step, trial = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     gram = np.zeros((3, 3))
     for n in range(center.shape[0]):
-        y[:] = 0.0
+        known = False
+        for i in range(3):
+            y[i] = multiplier[n, i]
+            known = known or y[i] != 0.0
         best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for _ in range(_MOST_ITERATIONS):
             ascent = newton(gram, error, step)
-            if not ascent > _CONVERGED * (abs(best) + 1e-30):
-                break
             ends = center, slope, wanted, softness, low, high, n, y, step, trial
-            if not climbs(ends, best, ascent):
-                break
+            if not ascent > _CONVERGED * (abs(best) + 1e-30):
+                if not known:
+                    break
+                # Newton's last step from afar ends far below the tolerance.
+                known = False
+                for i in range(3):
+                    trial[i] = y[i] + step[i]
+            elif not climbs(ends, best, ascent, _SHORTEST_NEWTON):
+                # As arguments: arrays in a tuple that is unpacked elsewhere too are counted.
+                moves = _tops(center, slope, softness, low, high, n, y, step, trial, error, ascent)
+                if not moves:
+                    break
             y[:] = trial
             best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for i in range(3):
@@ -53,11 +67,11 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):
 
 
 @inline
-def climbs(ends, best, ascent):
-    """Shorten a step until the dual function grows as it should; whether it does."""
+def climbs(ends, best, ascent, shortest):
+    """Shorten a step until the dual function grows as it should; whether it does in time."""
     center, slope, wanted, softness, low, high, n, y, step, trial = ends
     size = 1.0
-    while size > _SHORTEST:
+    while size > shortest:
         for i in range(3):
             trial[i] = y[i] + size * step[i]
         value = _value(center, slope, wanted, softness, low, high, n, trial)
@@ -65,6 +79,51 @@ def climbs(ends, best, ascent):
             return True
         size *= 0.5
     return False
+
+
+@inline
+def _tops(center, slope, softness, low, high, n, y, step, trial, error, ascent):
+    """Write the best end on the way of a step; False if that is where it begins.
+
+    Along it the slope of the dual function falls piecewise linearly: Newton's method from either
+    side of its zero, kept between the two.
+    """
+    square = step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
+    constant = error[0] * step[0] + error[1] * step[1] + error[2] * step[2]
+    for j in range(center.shape[1]):
+        along = _along(slope, n, j, step)
+        constant -= along * _clipped(center, slope, low, high, n, j, y)
+    first, last, size, before = 0.0, 1.0, 0.5, 1e300
+    for _ in range(_MOST_BRACKETS):
+        rise, fall = constant - size * softness[n] * square, softness[n] * square
+        for j in range(center.shape[1]):
+            along = _along(slope, n, j, step)
+            unbounded = center[n, j] - _along(slope, n, j, y) - size * along
+            x = min(max(unbounded, low[n, j]), high[n, j])
+            rise += along * x
+            fall += along * along * (x == unbounded)
+        if 0.0 <= rise <= _FLAT * ascent:
+            break
+        first, last = (size, last) if rise > 0.0 else (first, size)
+        ahead = size + rise / fall
+        # Halves where Newton's steps do not, by orders of magnitude while the zero is so far.
+        slow = abs(rise) > 0.5 * before
+        before = abs(rise)
+        if not first < ahead < last or slow:
+            ahead = math.sqrt(first * last) if first > 0.0 else 1e-3 * last
+        if abs(ahead - size) <= 1e-15 * size:
+            break
+        size = ahead
+    moved = False
+    for i in range(3):
+        trial[i] = y[i] + size * step[i]
+        moved = moved or trial[i] != y[i]
+    return moved
+
+
+@inline
+def _along(slope, n, j, y):
+    return slope[n, 0, j] * y[0] + slope[n, 1, j] * y[1] + slope[n, 2, j] * y[2]
 
 
 @inline

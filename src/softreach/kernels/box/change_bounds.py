@@ -19,6 +19,7 @@ __all__ = ["change_bounds"]
 
 _MOST_ITERATIONS = 20
 _CONVERGED = 1e-14  # of the bound that is wanted
+_SHORTEST = 1e-9  # part of a step below which a search ends
 
 
 @kernel
@@ -53,7 +54,7 @@ def change_bounds(center, slope, wanted, error, low, high, enough, out):
             )
             ascent = newton(gram, miss, step)
             ends = center, slope, wanted, softness, low, high, n, y, step, trial
-            if not ascent > _CONVERGED * goal or not climbs(ends, best, ascent):
+            if not ascent > _CONVERGED * goal or not climbs(ends, best, ascent, _SHORTEST):
                 break
             y[:] = trial
         out[n] = math.sqrt(2.0 * most)

@@ -34,6 +34,7 @@ _LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without bl
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
+_POINTER = 0.012  # radius of what is clicked [L]
 _ROOM = 1.12  # times what would just fill the picture
 
 
@@ -280,6 +281,22 @@ def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool
     ahead = (centers - camera) @ way
     aside = np.linalg.norm(centers - camera - ahead[:, None] * way, axis=1)
     return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
+
+
+def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
+    """Way along a ray to the first ball that it meets [L]; infinite where it meets none.
+
+    Args:
+        centers: Of the balls, shape (n, 3).
+        radii: Shape (n,); balls are met as if they were no thinner than a pointer.
+        origin: Of the ray, shape (3,).
+        direction: Shape (3,).
+    """
+    way = direction / np.linalg.norm(direction)
+    ahead = (centers - origin) @ way
+    aside = np.linalg.norm(centers - origin - ahead[:, None] * way, axis=1)
+    met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
+    return float(ahead[met].min(initial=np.inf))
 
 
 def _hides(seen: Array, viewpoint: Viewpoint) -> NDArray[np.bool_]:

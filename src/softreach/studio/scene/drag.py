@@ -1,4 +1,4 @@
-"""Drag of the tip in the scene: the ball on it, and how far the arm lags behind."""
+"""Drag of the tip in the scene: the ball on it with its three axes, and how far the arm lags."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.inverse.drag import Dragged
+from softreach.studio.scene.axes import add_label
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
-__all__ = ["DragBall", "TipDrag"]
+__all__ = ["DragBall", "TipDrag", "along_axis"]
 
 Array = NDArray[np.float64]
 OnDrag = Callable[[str, Array], None]
@@ -22,6 +23,11 @@ OnDrag = Callable[[str, Array], None]
 _HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
 _CLEAR = 0.4  # opacity of a ball that is seen through
 _COLOR, _LIGHT, _LAG = (25, 25, 30), (255, 225, 90), (220, 30, 120)
+_AXES = {"x": (200, 55, 55), "y": (45, 140, 60), "z": (55, 90, 210)}
+_ARROW = np.array([[0, 0.03], [5e-3, 0.03], [5e-3, 0.1], [0.012, 0.1], [0, 0.13]])
+"""Radii and heights of half of an arrow [L]."""
+_LETTER = 0.15  # of an axis, from the ball [L]
+_STEEPEST = 0.03  # sin² between axis and line of sight, below which a drag tells no distance
 
 
 class TipDrag(NamedTuple):
@@ -35,14 +41,15 @@ class TipDrag(NamedTuple):
 class DragBall:
     """Nodes that move instead of being drawn anew: a node that is replaced is let go."""
 
-    def __init__(self, api: SceneApi, on_drag: OnDrag) -> None:
+    def __init__(self, api: SceneApi, on_drag: OnDrag, eye: Callable[[], Array]) -> None:
         """Draw into the scene of a client once there is a tip.
 
         Args:
             api: The scene.
             on_drag: Called on the event loop, so that it must not take long.
+            eye: Where the camera is [L].
         """
-        self._api, self._on_drag = api, on_drag
+        self._api, self._on_drag, self._eye = api, on_drag, eye
         self._nodes: tuple[Any, Any] | None = None
         self._lag: tuple[Any, Any, Any] | None = None
         self._offset = np.zeros(3)
@@ -104,7 +111,32 @@ class DragBall:
                 self._offset = np.array(halo.position) - event.start_position
             self._on_drag(event.phase, end + self._offset)
 
+        for axis, name in enumerate(_AXES):
+            self._draw_axis(halo, axis, name)
         return halo, ball
+
+    def _draw_axis(self, halo: Any, axis: int, name: str) -> None:
+        """An arrow that drags the tip along one axis of the world alone."""
+        from trimesh.creation import revolve
+
+        direction = np.eye(3)[axis]
+        mesh = revolve(_ARROW, sections=12)
+        vertices = np.roll(mesh.vertices, axis + 1, axis=1).astype(np.float32)
+        arrow = self._api.add_mesh_simple(
+            f"/grip/{name}", vertices, mesh.faces, color=_AXES[name], cast_shadow=False
+        )
+        add_label(self._api, f"/grip/{name}/letter", name, _LETTER * direction)
+        begin, pressed = np.zeros(3), 0.0
+
+        @arrow.on_drag("left")
+        async def _(event: Any) -> None:
+            nonlocal begin, pressed
+            eye = self._eye()
+            if event.phase == "start":
+                begin = np.array(halo.position)
+                pressed = along_axis(begin, direction, eye, np.array(event.start_position))
+            reached = along_axis(begin, direction, eye, np.array(event.end_position))
+            self._on_drag(event.phase, begin + (reached - pressed) * direction)
 
     def _drawn_lag(self) -> tuple[Any, Any, Any]:
         pointer = self._api.add_icosphere("/lag", _POINTER, _LAG, cast_shadow=False)
@@ -112,3 +144,21 @@ class DragBall:
         line = self._api.add_line_segments("/lag line", points, _LAG, thickness=0.004)
         label = self._api.add_label("/lag label", "", anchor="bottom-center")
         return pointer, line, label
+
+
+def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:
+    """Place on an axis that is nearest to a line of sight, as the distance from its origin.
+
+    Args:
+        origin: Of the axis, shape (3,).
+        axis: Its direction, of length 1.
+        eye: Where the line of sight begins.
+        seen: Another place on it.
+
+    Returns:
+        The distance along the axis; 0 where it is seen end on, so that no distance is told.
+    """
+    sight = (seen - eye) / np.linalg.norm(seen - eye)
+    across = axis - (axis @ sight) * sight
+    steepness = float(across @ across)
+    return float((eye - origin) @ across) / steepness if steepness > _STEEPEST else 0.0

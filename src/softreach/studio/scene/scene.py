@@ -22,7 +22,7 @@ from softreach.rod.arm_shape import (
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.axes import NumberedBox, add_label
-from softreach.studio.scene.camera import Viewpoint
+from softreach.studio.scene.camera import Viewpoint, way_to
 from softreach.studio.scene.clouds import (
     FAINT,
     Clouds,
@@ -50,6 +50,8 @@ MOST_BUNDLES = 100
 """With more the body alone is drawn: skins of hundreds take a minute."""
 
 Color = tuple[int, int, int]
+Spine = tuple[Array, Array]
+"""Centers (n, 3) and radii (n,) of balls along an arm [L]."""
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
@@ -66,6 +68,7 @@ _FAINT = 0.2  # opacity of the reach without loads
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
+_AROUND_TIP = 0.06  # [L], where a click means no ghost: all shapes meet there
 _AROUND_PLACE = 0.02  # [L] that should be seen
 _AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
 """Corners around most clouds, seen from the base [L]."""
@@ -81,9 +84,27 @@ class Scene:
         self._api = api
         self.clouds = Clouds(api)
         self.axes = NumberedBox(api)
-        self.spine: tuple[Array, Array] = _NOTHING
-        """Centers and radii along the arm [L], as it is drawn."""
+        self.pointing: Array = np.full(3, np.nan)
+        """Direction d3 of the tip of the arm, as it is drawn."""
+        self._spines: dict[str, Spine] = {}
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
+
+    @property
+    def spine(self) -> Spine:
+        """Centers and radii along the arm [L], as it is drawn."""
+        return self._spines.get("/arm", _NOTHING)
+
+    def ghost_under(self, origin: Array, direction: Array) -> int | None:
+        """Number of the ghost that a ray meets before any other and before the arm.
+
+        Near their tips, where all shapes meet, ghosts are not met.
+        """
+        ghosts = [each for each in list(self._spines.items()) if each[0].startswith("/ghosts")]
+        ways = [(way_to(*_without_tip(*s), origin, direction), path) for path, s in ghosts]
+        way, nearest = min(ways, default=(np.inf, ""))
+        if way < way_to(*self.spine, origin, direction):
+            return int(nearest.rpartition("/")[2])
+        return None
 
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
@@ -151,8 +172,9 @@ class Scene:
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)
+        self._spines[path] = _spine(arm, shape)
         if path == "/arm":
-            self.spine = _spine(arm, shape)
+            self.pointing = shape["directors"].values[-1, 2]
         self.draw_dots(f"{path}/markers", marker_points(arm, shape) / length, _MARKER)
         meshes = _arm_meshes(arm, shape, length)
         known, handles = self._arms.get(path, (None, []))
@@ -367,6 +389,8 @@ class Scene:
             for known in list(self._arms):  # a copy: workers draw at the same time
                 if known == path or known.startswith(f"{path}/"):
                     self._arms.pop(known, None)
+                    if known != "/arm":  # which stays framed while it is away
+                        self._spines.pop(known, None)
             self.clouds.forget(path)
             if self._api.get_handle_by_name(path) is not None:
                 self._api.remove_by_name(path)
@@ -433,9 +457,14 @@ def shows_cloud(reach: Reach, look: Appearance) -> bool:
     return look.cloud or (look.surface and not reach.has_surface)
 
 
-def _spine(arm: Manipulator, shape: Any) -> tuple[Array, Array]:
+def _spine(arm: Manipulator, shape: Any) -> Spine:
     """Balls that fill the arm [L]."""
     return shape["position"].values / arm.length, shape["radius"].values / arm.length
+
+
+def _without_tip(centers: Array, radii: Array) -> Spine:
+    apart = np.linalg.norm(centers - centers[-1], axis=1) > _AROUND_TIP
+    return centers[apart], radii[apart]
 
 
 def _arm_meshes(

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from softreach.inverse import Solution
     from softreach.studio.session import Session
 
-_DRAG_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
+_DRAG_HINT = (
+    "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
+    "solutions."
+)
 _HINT = "Every activation that reaches a place: drag the tip there, type it, or click."
 _ABOUT_MOUSE = (
     "Use of the mouse in the scene, which it turns besides; a click is on a reached place"
@@ -34,7 +37,8 @@ class DragPanel:
     """Use of the mouse in the scene, and the ball on the tip that it may drag."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._ball = DragBall(session.client.scene, session.job(DragTip).order)
+        eye = lambda: np.array(session.camera.actual().position)  # noqa: E731
+        self._ball = DragBall(session.client.scene, session.job(DragTip).order, eye)
         self._fields = Fields(session, dragged=False)
         with tab:
             self._fields.dropdown("mouse", MOUSE, attribute("appearance.mouse"), _ABOUT_MOUSE)
@@ -107,24 +111,39 @@ class InversePanel:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Aim at the place under the cursor, if the mouse sets the target; return if it does."""
+        """Aim at the place under the cursor, if the mouse sets the target, or take the shape there.
+
+        Returns:
+            True if the click was for this panel.
+        """
         session = self._session
         if session.state.appearance.mouse != "target":
-            return False
+            return self._take_ghost(origin, direction)
         place = session.picked_place(origin, direction)
         if place is not None:
             attempt(session, lambda: session.job(SolveInverse).aim(place))
         return True
+
+    def _take_ghost(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
+        """Move the arm to the shape under the cursor, as the button of that solution does."""
+        answer = self._session.answer
+        ghost = self._session.scene.ghost_under(np.asarray(origin), np.asarray(direction))
+        if answer is None or ghost is None or ghost >= len(answer):
+            return False
+        attempt(self._session, lambda: self._take(answer.activations[ghost]))
+        return True
+
+    def _take(self, activation: Any) -> None:
+        target = tuple(activation.tolist())
+        self._session.update(lambda state: state.replace(activation=target))
 
     def _solve_typed(self) -> None:
         length = self._session.state.design.length
         self._session.job(SolveInverse).aim(length * np.asarray(self._target.value))
 
     def _button(self, activation: Any) -> Any:
-        target = tuple(activation.tolist())
         button = self._gui.add_button(_listed(activation), hint="Moves the arm to this solution")
-        take = lambda: self._session.update(lambda s: s.replace(activation=target))  # noqa: E731
-        bind_button(button, self._session, take)
+        bind_button(button, self._session, lambda: self._take(activation))
         return button
 
 
@@ -154,7 +173,8 @@ def _answer_text(answer: Solution, arm: Manipulator) -> str:
     names = ", ".join(arm.input_names)
     return (
         f"{count} {place} to {answer.residuals.max() / arm.length:.1e} L. "
-        f"Press one ({names}) to move the arm there; the one with a check mark is where it is."
+        f"Press one ({names}) to move the arm there, or click its shape; the one with a check mark "
+        "is where it is."
     )
 
 

@@ -1,0 +1,235 @@
+"""Searches for the least change of activation, many at a time: what happens between evaluations.
+
+Each step minimizes ½|x - near|² + ½σ|x - γ|² where the linearized map meets the target, inside the
+bounds: `box_projection`. It is taken if the change and the weighted miss fall as they should. σ is
+what the last step says of the curvature of the Lagrangian, so that steps are those of a secant
+method. Searches that end make room for the next.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.kernels.compiler import inline, kernel
+
+__all__ = ["FIRST_PROXIMITY", "LONGEST_STEP", "NOWHERE", "Running", "judge", "next_trials"]
+
+NOWHERE = 1e100
+"""Coordinate of tips that do not count."""
+FIRST_PROXIMITY = 0.3
+_LEAST_PROXIMITY, _LARGEST_PROXIMITY = -0.7, 1e7
+LONGEST_STEP = 0.5
+"""In ranges."""
+_MET = 1e-2  # part of a miss that may be left where the linearized target is met
+_MISS = 1e-9  # in L, that counts as none
+_CREDIBLE = 1e4  # penalty above which the multiplier says no more than that nothing meets it
+_RESTORING = 1e6  # penalty of a miss where it is not met: nothing else counts
+_PROGRESS, _PATIENCE = 0.02, 6  # part of a miss, and steps after which less ends a search
+_SHORT = 0.1  # steps that tell the curvature, in ranges
+_LEAST_PENALTY = 1000.0  # in merits that are compared
+_SOFTNESS, _SOFTNESS_NEARBY = 1e-6, 1e-15  # of the linearized target, in |J|²
+_NEARBY = 1e-3  # miss in L
+
+
+class Running(NamedTuple):
+    """Searches side by side, scaled with L, and the step each takes next."""
+
+    row: np.ndarray
+    """Number of the search, shape (n,), int64."""
+    steps: np.ndarray
+    """Steps it has taken, shape (n,), int64."""
+    gamma: np.ndarray
+    """Where it is [-], shape (n, m)."""
+    miss: np.ndarray
+    """(tip - target)/L there, shape (n, 3)."""
+    slope: np.ndarray
+    """(∂r/∂γ)/L there, shape (n, 3, m)."""
+    penalty: np.ndarray
+    """Penalty of a miss of L, beside ½|γ - near|², shape (n,)."""
+    proximity: np.ndarray
+    """σ: ½σ|step|² is added to what a step minimizes, shape (n,)."""
+    reach: np.ndarray
+    """Longest step, in ranges, shape (n,)."""
+    weight: np.ndarray
+    """Penalty by which the step under trial is judged, shape (n,)."""
+    gain: np.ndarray
+    """What the step under trial promises, shape (n,)."""
+    center: np.ndarray
+    """Least of what the step minimizes without the target [-], shape (n, m)."""
+    wanted: np.ndarray
+    """What the linearized map is to be, shape (n, 3)."""
+    softness: np.ndarray
+    """Of the linearized target, shape (n,)."""
+    low: np.ndarray
+    """Lower bounds of the step's end, shape (n, m)."""
+    high: np.ndarray
+    """Upper bounds of the step's end, shape (n, m)."""
+    trial: np.ndarray
+    """Activations to evaluate next [-], shape (n, m)."""
+    multiplier: np.ndarray
+    """Of the linearized target, over 1 + σ, shape (n, 3)."""
+
+
+@kernel
+def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, ends):  # noqa: C901
+    """Take in the trials of the first n, and set up the next steps of those that go on.
+
+    Args:
+        running: The searches; those that go on become the first.
+        n: Number of those that run.
+        tips: Of their trials [m], shape (n, 3).
+        ahead: ∂r/∂γ of their trials [m], shape (n, 3, m).
+        owner: Number of the target of all searches, shape (all,).
+        targets: Shape (t, 3) [m].
+        near: To stay near to [-], shape (t, m).
+        box: Lower and upper bounds and ranges, shape (m,) each.
+        length: L [m].
+        limits: Step at which a search has settled, in ranges, and the most steps.
+        ends: Activations, |tip - target|/L, merits, σ and penalties at the ends of all searches.
+
+    Returns:
+        Number of those that go on.
+    """
+    low, high, scales = box
+    at_end, residual, merit, proximity, penalties = ends
+    settled, most = limits
+    m, kept = len(low), 0
+    for i in range(n):
+        row = running.row[i]
+        target = owner[row]
+        sigma, penalty, steps = running.proximity[i], running.penalty[i], running.steps[i]
+        x = (tips[i, 0] - targets[target, 0]) / length
+        y = (tips[i, 1] - targets[target, 1]) / length
+        z = (tips[i, 2] - targets[target, 2]) / length
+        miss = math.sqrt(x * x + y * y + z * z)
+        reach = running.reach[i]
+        accepted, ended, ratio = steps == 0, steps >= most, 0.0
+        if steps == 0:
+            ended = ended or miss * length >= NOWHERE
+        else:
+            weight = running.weight[i]
+            after, step, square, bend = weight * miss, 0.0, 0.0, 0.0
+            for j in range(m):
+                change = running.trial[i, j] - near[target, j]
+                after += 0.5 * change * change
+                moved = running.trial[i, j] - running.gamma[i, j]
+                step = max(step, abs(moved) / scales[j])
+                square += moved * moved
+                for a in range(3):
+                    turn = ahead[i, a, j] / length - running.slope[i, a, j]
+                    bend += running.multiplier[i, a] * turn * moved
+            gain, gained = running.gain[i], _merit(running, i, near[target], weight) - after
+            accepted = gained >= 0.1 * gain - 1e-14
+            ended = ended or step * (1.0 + sigma) < settled
+            if not accepted:
+                if weight < _RESTORING:
+                    sigma = 4.0 * max(sigma, 0.0) + 0.1
+                else:
+                    reach = 0.3 * step
+            else:
+                reach = min(LONGEST_STEP, 2.0 * reach)
+                # A minimum of the distance that is no root is approached ever more slowly.
+                stuck = gained < _PROGRESS * weight * miss and steps > _PATIENCE
+                ended = ended or (weight >= _RESTORING and stuck)
+                if weight < _RESTORING and step < _SHORT:
+                    bend = (1.0 + sigma) * bend / max(square, 1e-300)
+                    sigma = min(max(bend, _LEAST_PROXIMITY), 4.0 * max(sigma, 0.0) + 1.0)
+                    ratio = (1.0 + running.proximity[i]) / (1.0 + sigma)
+                elif gained >= 0.7 * gain:
+                    sigma = 0.4 * max(sigma, 0.0)
+                else:
+                    sigma = max(sigma, 0.0)
+            ended = ended or sigma >= _LARGEST_PROXIMITY or reach < settled
+        if accepted:
+            for j in range(m):
+                running.gamma[kept, j] = running.trial[i, j]
+                for a in range(3):
+                    running.slope[kept, a, j] = ahead[i, a, j] / length
+            running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2] = x, y, z
+        else:
+            for j in range(m):
+                running.gamma[kept, j] = running.gamma[i, j]
+                for a in range(3):
+                    running.slope[kept, a, j] = running.slope[i, a, j]
+            for a in range(3):
+                running.miss[kept, a] = running.miss[i, a]
+        if ended:
+            x, y, z = running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2]
+            for j in range(m):
+                at_end[row, j] = running.gamma[kept, j]
+            residual[row] = math.sqrt(x * x + y * y + z * z)
+            merit[row] = _merit(running, kept, near[target], _LEAST_PENALTY)
+            proximity[row], penalties[row] = sigma, penalty
+            continue
+        running.row[kept], running.steps[kept] = row, steps + 1
+        square = 0.0
+        running.penalty[kept], running.proximity[kept] = penalty, sigma
+        running.reach[kept] = reach
+        for a in range(3):
+            running.wanted[kept, a] = -running.miss[kept, a]
+            for j in range(m):
+                slope = running.slope[kept, a, j]
+                square += slope * slope
+                running.wanted[kept, a] += slope * running.gamma[kept, j]
+        for a in range(3):
+            running.multiplier[kept, a] = running.multiplier[i, a] * ratio
+        x, y, z = running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2]
+        nearby = x * x + y * y + z * z < _NEARBY * _NEARBY
+        running.softness[kept] = (_SOFTNESS_NEARBY if nearby else _SOFTNESS) * square + 1e-30
+        for j in range(m):
+            at, farthest = running.gamma[kept, j], reach * scales[j]
+            running.center[kept, j] = (near[target, j] + sigma * at) / (1.0 + sigma)
+            running.low[kept, j] = max(low[j], at - farthest)
+            running.high[kept, j] = min(high[j], at + farthest)
+        kept += 1
+    return kept
+
+
+@inline
+def _merit(running, i, near, penalty):
+    """½|γ - near|² + penalty·|miss| where a search is."""
+    x, y, z = running.miss[i, 0], running.miss[i, 1], running.miss[i, 2]
+    merit = penalty * math.sqrt(x * x + y * y + z * z)
+    for j in range(running.gamma.shape[1]):
+        change = running.gamma[i, j] - near[j]
+        merit += 0.5 * change * change
+    return merit
+
+
+@kernel
+def next_trials(running, n, owner, near):
+    """What the steps of the first n promise, with the penalty that their multipliers ask for.
+
+    Args:
+        running: The searches, with ends and multipliers of their steps.
+        n: Number of those that run.
+        owner: Number of the target of all searches, shape (all,).
+        near: To stay near to [-], shape (t, m).
+    """
+    for i in range(n):
+        target, foreseen = owner[running.row[i]], 0.0
+        x, y, z = running.miss[i, 0], running.miss[i, 1], running.miss[i, 2]
+        before = math.sqrt(x * x + y * y + z * z)
+        for j in range(running.gamma.shape[1]):
+            moved = running.trial[i, j] - running.gamma[i, j]
+            change = running.trial[i, j] - near[target, j]
+            foreseen += 0.5 * change * change + 0.5 * running.proximity[i] * moved * moved
+            x += running.slope[i, 0, j] * moved
+            y += running.slope[i, 1, j] * moved
+            z += running.slope[i, 2, j] * moved
+        ahead = math.sqrt(x * x + y * y + z * z)
+        x, y, z = running.multiplier[i, 0], running.multiplier[i, 1], running.multiplier[i, 2]
+        asked = 1.5 * (1.0 + running.proximity[i]) * math.sqrt(x * x + y * y + z * z)
+        if ahead <= max(_MET * before, _MISS) and asked < _CREDIBLE:
+            weight = max(running.penalty[i], asked)
+            running.penalty[i] = weight
+        else:
+            weight = _RESTORING
+            for a in range(3):
+                running.multiplier[i, a] = 0.0
+        foreseen += weight * ahead
+        running.weight[i] = weight
+        running.gain[i] = _merit(running, i, near[target], weight) - foreseen
