@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import shutil
 import sys
@@ -59,6 +60,9 @@ def _control_group() -> float:
 
 def return_memory() -> None:
     """Return to the system what has been freed: glibc keeps it, in an arena for each thread."""
+    gc.collect()
+    if arrow := sys.modules.get("pyarrow"):  # whose pool is another
+        arrow.default_memory_pool().release_unused()
     if sys.platform == "linux" and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):
         trim(0)
 

@@ -102,7 +102,8 @@ class Scene:
         ghosts = [each for each in list(self._spines.items()) if each[0].startswith("/ghosts")]
         ways = [(way_to(*_without_tip(*s), origin, direction), path) for path, s in ghosts]
         way, nearest = min(ways, default=(np.inf, ""))
-        if way < way_to(*self.spine, origin, direction):
+        arm = self.spine if "/arm" in self._arms else _NOTHING
+        if way < way_to(*arm, origin, direction):
             return int(nearest.rpartition("/")[2])
         return None
 
