@@ -121,7 +121,13 @@ def uneven_arm() -> Manipulator:
 ARMS = {name: getattr(designs, name) for name in designs.__all__} | {"uneven_arm": uneven_arm}
 
 
-@pytest.mark.parametrize("design", ARMS)
+@pytest.mark.parametrize(
+    "design",
+    [
+        pytest.param(name, marks=[pytest.mark.large] if name == "elephant_trunk" else [])
+        for name in ARMS
+    ],
+)
 def test_an_arm_that_is_given_a_value_that_it_has_stays_as_it_is(design):
     arm = ARMS[design]()
     for name, one in parameters(arm).items():

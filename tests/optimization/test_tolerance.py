@@ -72,7 +72,9 @@ def tolerated(arm: Manipulator, checked: int = 16) -> Tolerance:
     return tolerance(arm, SIGMAS, needs, samples=2000, checked=checked, accuracy=3e-2)
 
 
-@BOTH
+@pytest.mark.parametrize(
+    "arm", [NARROW, pytest.param(TRUNK, marks=pytest.mark.large)], ids=["flux", "raster"]
+)
 def test_the_first_order_agrees_with_arms_that_are_made(arm):
     result = tolerated(arm)
     assert result.made == 16

@@ -65,8 +65,10 @@ of_makers = {
 }  # steps are searched once
 pytestmark = pytest.mark.parametrize(
     "make",
-    [  # what is placed and loaded is placed
-        pytest.param(make, id=name, marks=[pytest.mark.large] if name == "placed" else [])
+    [  # what is placed and loaded is either
+        pytest.param(
+            make, id=name, marks=[pytest.mark.large] if name in ("placed", "loaded") else []
+        )
         for name, make in of_makers.items()
     ],
 )

@@ -74,8 +74,9 @@ class Seeds:
         exact = self._coarse.tips_and_slopes(self.gamma[order])[1] * self.scales
         slope = exact.astype(np.float32)
         gram = np.einsum("nij,nkj->nik", slope, slope, dtype=float)
-        gram += _DAMPING * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-        inverse = np.linalg.inv(gram)
+        size = np.trace(gram, axis1=1, axis2=2)[:, None, None]
+        # Slack tendons move no tip, so that nothing is moved to a target there.
+        inverse = np.linalg.inv(gram + np.where(size == 0.0, 1.0, _DAMPING * size) * np.eye(3))
         sorted_seeds = self.gamma[order], self.tip[order], slope, inverse
         return sorted_seeds, first, (corner, width, (nx, ny, nz))
 
