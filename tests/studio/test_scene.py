@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from softreach.arm import Marker
-from softreach.rod.kinematics import marker_positions
+from softreach.rod.kinematics import configuration, marker_positions
 from softreach.studio.reach import stages
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import Appearance
@@ -82,6 +82,19 @@ def test_markers_are_dots_in_a_body_that_is_clear_and_lengths_are_over_the_one_t
     np.testing.assert_allclose(
         0.5 * vertices, arm.length * meshes.added["/ghosts/0/0"].vertices, atol=1e-6
     )
+
+
+def test_a_ray_hits_the_ghost_that_is_before_the_arm_and_none_where_there_is_the_arm(trunk):
+    scene, there = Scene(Meshes()), (-1.0, 0.0, 0.0)
+    scene.draw_arm(trunk, (0.0, 0.0, 0.0))
+    scene.draw_ghosts(trunk, np.array([(0.0, 0.0, 0.0), there]))
+    ghost = configuration(trunk, there, 51)["position"].values / trunk.length
+    eye = np.array([2.0, -4.0, 1.0])
+    assert scene.clicked_ghost(eye, ghost[35] - eye) == there
+    assert scene.clicked_ghost(eye, eye - ghost[35]) is None
+    assert scene.clicked_ghost(eye, np.array([0.0, 0.0, 0.1]) - eye) is None
+    scene.remove("/ghosts")
+    assert scene.clicked_ghost(eye, ghost[35] - eye) is None
 
 
 def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or_on_demand(trunk):

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from softreach.rod.kinematics import configuration
 from softreach.studio.reach import cloud_points
 from softreach.studio.session import Session
 from tests.studio.sockets import page
@@ -50,6 +51,17 @@ def test_a_click_for_a_path_hits_as_closely_with_a_long_lens_as_with_the_usual_o
     across /= np.linalg.norm(across)
     beside = points[np.argmax(points @ across)] + 0.4 * across
     assert clicked_path(session, eye, beside - eye) is None
+
+
+def test_a_click_on_a_ghost_takes_its_activation_in_one_step(session):
+    (panel,) = (one for one in session.panels if type(one).__name__ == "InversePanel")
+    before, there, eye = session.state, (-1.0, 0.0, 0.0), np.array([2.0, -4.0, 1.0])
+    session.scene.draw_ghosts(before.design, np.array([there]))
+    ghost = configuration(before.design, there, 51)["position"].values / before.design.length
+    assert panel.click(eye, ghost[35] - eye)
+    assert session.state.activation == there
+    session.step(back=True)
+    assert session.state == before
 
 
 def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_design(session):

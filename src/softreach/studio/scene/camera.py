@@ -339,6 +339,22 @@ def picked_point(
     return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / tolerance))])
 
 
+def first_hit(origin: ArrayLike, direction: ArrayLike, centers: Array, radii: Array) -> float:
+    """Depth along a ray of the first of some balls that it hits; infinite if it hits none.
+
+    Args:
+        origin: Where the camera is, shape (3,).
+        direction: Of the ray, any length.
+        centers: Of the balls, shape (n, 3).
+        radii: Shape (n,).
+    """
+    ray = np.asarray(direction, float) / np.linalg.norm(direction)
+    offset = centers - np.asarray(origin, float)
+    depth = offset @ ray
+    hit = (np.linalg.norm(offset - depth[:, None] * ray, axis=1) <= radii) & (depth > 0)
+    return float(np.min(depth, initial=np.inf, where=hit))
+
+
 def plane_crossing(
     origin: ArrayLike, direction: ArrayLike, point: ArrayLike, normal: ArrayLike
 ) -> Array | None:

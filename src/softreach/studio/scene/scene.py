@@ -22,7 +22,7 @@ from softreach.rod.arm_shape import (
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.axes import NumberedBox, add_label
-from softreach.studio.scene.camera import Viewpoint
+from softreach.studio.scene.camera import Viewpoint, first_hit
 from softreach.studio.scene.clouds import (
     FAINT,
     Clouds,
@@ -64,6 +64,7 @@ _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.4
 _FAINT = 0.2  # opacity of the reach without loads
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
+_CLICKED = 0.012  # [L]: thinner arms are as thick for a click
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
 _AROUND_PLACE = 0.02  # [L] that should be seen
@@ -84,6 +85,8 @@ class Scene:
         self.spine: tuple[Array, Array] = _NOTHING
         """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
+        self._ghosts: dict[str, tuple[tuple[float, ...], Array, Array]] = {}
+        """Activation of each ghost, and the balls that fill it."""
 
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
@@ -201,7 +204,25 @@ class Scene:
         """Many shapes at once, transparent."""
         self.remove("/ghosts")
         for k, activation in enumerate(activations):
-            self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
+            path, pulls = f"/ghosts/{k}", activation.tolist()
+            shape = configuration(solvable_rod(arm), activation, _STATIONS)
+            self._draw_shape(arm, shape, path, arm.length)
+            self._ghosts[path] = (tuple(pulls), *_spine(arm, shape))
+
+    def clicked_ghost(
+        self, origin: Sequence[float], direction: Sequence[float]
+    ) -> tuple[float, ...] | None:
+        """Activation of the ghost that a ray hits before the arm; None if it hits none.
+
+        Ghosts are no nodes that take clicks: these would keep the pointer from the ball on the tip,
+        where all of them end.
+        """
+        arm = self.spine if "/arm" in self._arms else _NOTHING
+        nearest, hit = first_hit(origin, direction, *_thick(*arm)) - _CLICKED, None
+        for activation, *balls in list(self._ghosts.values()):
+            if (depth := first_hit(origin, direction, *_thick(*balls))) < nearest:
+                nearest, hit = depth, activation
+        return hit
 
     def draw_surfaces(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """The exact boundary and the α-shape, as far as they are shown; slow the first time.
@@ -367,6 +388,7 @@ class Scene:
             for known in list(self._arms):  # a copy: workers draw at the same time
                 if known == path or known.startswith(f"{path}/"):
                     self._arms.pop(known, None)
+                    self._ghosts.pop(known, None)
             self.clouds.forget(path)
             if self._api.get_handle_by_name(path) is not None:
                 self._api.remove_by_name(path)
@@ -436,6 +458,11 @@ def shows_cloud(reach: Reach, look: Appearance) -> bool:
 def _spine(arm: Manipulator, shape: Any) -> tuple[Array, Array]:
     """Balls that fill the arm [L]."""
     return shape["position"].values / arm.length, shape["radius"].values / arm.length
+
+
+def _thick(centers: Array, radii: Array) -> tuple[Array, Array]:
+    """Balls that can be hit."""
+    return centers, np.maximum(radii, _CLICKED)
 
 
 def _arm_meshes(

@@ -107,8 +107,16 @@ class InversePanel:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Aim at the place under the cursor, if the mouse sets the target; return if it does."""
+        """Take the ghost under the cursor, or aim there if the mouse sets the target.
+
+        Returns:
+            True if the click meant one of these.
+        """
         session = self._session
+        ghost = session.scene.clicked_ghost(origin, direction)
+        if ghost is not None:
+            attempt(session, lambda: self._take(ghost))
+            return True
         if session.state.appearance.mouse != "target":
             return False
         place = session.picked_place(origin, direction)
@@ -123,9 +131,12 @@ class InversePanel:
     def _button(self, activation: Any) -> Any:
         target = tuple(activation.tolist())
         button = self._gui.add_button(_listed(activation), hint="Moves the arm to this solution")
-        take = lambda: self._session.update(lambda s: s.replace(activation=target))  # noqa: E731
-        bind_button(button, self._session, take)
+        bind_button(button, self._session, lambda: self._take(target))
         return button
+
+    def _take(self, activation: tuple[float, ...]) -> None:
+        """Move the arm to a solution, in one step."""
+        self._session.update(lambda state: state.replace(activation=activation))
 
 
 def _listed(activation: Any) -> str:
