@@ -66,8 +66,7 @@ def choose_in_bins(  # noqa: C901
         starts: Chosen activations, NaN for none, shape (t, chosen, m).
     """
     corner, width, (nx, ny, nz) = grid
-    low, high, scales = box
-    gamma, tips, slopes, inverses = seeds
+    scales = box[2]
     keys, heap, moved = room
     widest = max(nx, ny, nz)
     for t in range(targets.shape[0]):
@@ -92,21 +91,7 @@ def choose_in_bins(  # noqa: C901
                     if skip < stride:
                         continue
                     skip = 0
-                    keys[count] = _moved(
-                        gamma,
-                        tips,
-                        slopes,
-                        inverses,
-                        row,
-                        targets,
-                        near,
-                        t,
-                        low,
-                        high,
-                        scales,
-                        moves,
-                        moved,
-                    )
+                    keys[count] = _moved(seeds, row, targets, near, t, box, moves, moved)
                     heap[count] = row
                     count += 1
         for start in range(count // 2 - 1, -1, -1):
@@ -118,21 +103,7 @@ def choose_in_bins(  # noqa: C901
             count -= 1
             keys[0], heap[0] = keys[count], heap[count]
             _sift(keys, heap, 0, count)
-            _moved(
-                gamma,
-                tips,
-                slopes,
-                inverses,
-                row,
-                targets,
-                near,
-                t,
-                low,
-                high,
-                scales,
-                moves,
-                moved,
-            )
+            _moved(seeds, row, targets, near, t, box, moves, moved)
             for slot in range(chosen):
                 if apart:
                     distance = 0.0
@@ -145,8 +116,10 @@ def choose_in_bins(  # noqa: C901
 
 
 @inline
-def _moved(gamma, tips, slopes, inverses, row, targets, near, t, low, high, scales, moves, moved):
+def _moved(seeds, row, targets, near, t, box, moves, moved):
     """Move a seed if it `moves`; what it is to be sorted by."""
+    gamma, tips, slopes, inverses = seeds
+    low, high, scales = box
     x, y, z = (
         targets[t, 0] - tips[row, 0],
         targets[t, 1] - tips[row, 1],

@@ -277,9 +277,7 @@ def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool
         radii: Shape (n,).
     """
     distance = float(np.linalg.norm(point - camera))
-    way = (point - camera) / distance
-    ahead = (centers - camera) @ way
-    aside = np.linalg.norm(centers - camera - ahead[:, None] * way, axis=1)
+    ahead, aside = _beside(centers, camera, (point - camera) / distance)
     return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
 
 
@@ -292,11 +290,16 @@ def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> flo
         origin: Of the ray, shape (3,).
         direction: Shape (3,).
     """
-    way = direction / np.linalg.norm(direction)
-    ahead = (centers - origin) @ way
-    aside = np.linalg.norm(centers - origin - ahead[:, None] * way, axis=1)
+    ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
     met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
     return float(ahead[met].min(initial=np.inf))
+
+
+def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
+    """Distances of points along a ray whose direction `way` has length 1, and from it."""
+    offset = points - origin
+    ahead = offset @ way
+    return ahead, np.linalg.norm(offset - ahead[:, None] * way, axis=1)
 
 
 def _hides(seen: Array, viewpoint: Viewpoint) -> NDArray[np.bool_]:
