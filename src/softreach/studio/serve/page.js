@@ -66,9 +66,9 @@ document.documentElement.addEventListener("keydown", function (event) {
   }
 
   function toggleTable() {
-    var shown = document.querySelector("dialog.keys");
-    if (shown) shown.close();
-    else tableOfKeys().showModal();
+    var table = document.querySelector("dialog.keys") || tableOfKeys();
+    if (table.open) table.close();
+    else table.showModal();
   }
 
   function tableOfKeys() {
@@ -82,7 +82,6 @@ document.documentElement.addEventListener("keydown", function (event) {
     });
     dialog.append(table);
     dialog.addEventListener("click", function () { dialog.close(); });
-    dialog.addEventListener("close", function () { dialog.remove(); });
     return document.body.appendChild(dialog);
   }
 
