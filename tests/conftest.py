@@ -63,8 +63,8 @@ def coarse() -> Iterator[None]:
 def closed_figures() -> Iterator[None]:
     """No figure of one test is seen by the next, on which worker it may run."""
     yield
-    if pyplot := sys.modules.get("matplotlib.pyplot"):
-        pyplot.close("all")
+    if figures := sys.modules.get("matplotlib._pylab_helpers"):  # pyplot may be half imported
+        figures.Gcf.destroy_all()
 
 
 @pytest.fixture

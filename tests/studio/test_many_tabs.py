@@ -13,6 +13,7 @@ import pytest
 
 import softreach.studio.app
 import softreach.studio.reach as stages
+from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.inverse.prepared import prepared_map
 from softreach.studio import Studio, work
@@ -25,6 +26,11 @@ def studio(studio) -> Iterator[Studio]:
     """A studio without the tab that all journeys share, which would be counted."""
     with Studio(studio.start) as running:
         yield running
+
+
+@pytest.fixture(autouse=True)
+def _short_rest(monkeypatch) -> None:
+    monkeypatch.setattr(work, "_LONG_REST", 0.5)  # its thread would be counted
 
 
 def own_threads() -> int:
@@ -95,6 +101,14 @@ def test_memory_is_returned_once_a_tab_rests_and_when_it_is_gone(studio, monkeyp
         del session
     until(lambda: 0 in returned)
     until(lambda: prepared() is None)
+
+
+def test_designs_prepared_for_the_inverse_are_forgotten_after_a_long_rest(studio):
+    with page(studio) as session:
+        assert session.settle(PATIENCE)
+        prepared = weakref.ref(prepared_map(designs.filament()))
+        work.return_memory_soon()
+        until(lambda: prepared() is None)
 
 
 def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_full(

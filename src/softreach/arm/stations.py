@@ -186,7 +186,7 @@ class Span(Located):
         """Faults of ends that an arm of a length [m] does not have."""
         faults = super().place_faults(length)
         start, end = self.span(length)
-        if faults or start < end:
+        if faults or end - start >= _SHORTEST * length:
             return faults
         if self.end is None:
             return [Fault("start", start, f"must be below its end at Z = {end:g} m")]
@@ -197,9 +197,11 @@ class Span(Located):
         start, end = self.start_over_length, self.end_over_length
         in_meters = self.start is not None or self.end is not None
         blamed = any(fault.path.endswith("_over_length") for fault in faults)
-        if in_meters or blamed or start < end:
+        if in_meters or blamed or end - start >= _SHORTEST:
             return faults
         allowed = f"must be above start_over_length = {start:g}"
+        if end > start:
+            allowed += f" by {_SHORTEST:g} at least"
         return [*faults, Fault("end_over_length", end, allowed)]
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numba.core import event
 from numpy.typing import NDArray
 
+from softreach.inverse.prepared import forget_prepared
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
 from softreach.support.memory import free_memory, return_memory
@@ -144,15 +145,22 @@ class Latest:
             raise Dropped
 
 
-_REST = 1.0  # [s] without an end of any work, after which memory is returned
+_REST, _LONG_REST = 1.0, 60.0  # [s] without an end of any work
 
 
 def _return_memory(check: StaleCheck) -> None:
-    """Return what work has freed, once no more of it ends for a moment."""
-    for _ in range(10):
-        time.sleep(_REST / 10)
-        check()
+    """Return what work has freed; after a minute's rest also what is only kept to be quick."""
+    _rest(check, _REST)
     return_memory()
+    _rest(check, _LONG_REST)
+    forget_prepared()
+    return_memory()
+
+
+def _rest(check: StaleCheck, seconds: float) -> None:
+    for _ in range(math.ceil(seconds / _PATIENCE)):
+        time.sleep(_PATIENCE)
+        check()
 
 
 _returned = Latest(lambda _: None)
