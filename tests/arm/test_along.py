@@ -178,6 +178,11 @@ TWO = {"stations_over_length": (0, 1)}
             {"angle": 0.1, "start_over_length": 0.5, "end_over_length": 0.5},
             "end_over_length = 0.5: must be above start_over_length = 0.5",
         ),
+        (
+            fiber,
+            {"angle": 0.1, "end_over_length": 1e-300},
+            "end_over_length = 1e-300: must be above start_over_length = 0 by 1e-09 L at least",
+        ),
         (fiber, {"angle": 0.1, "end_over_length": 1.1}, "end_over_length = 1.1: .*<= 1"),
         (fiber, {"angle": 0.1, "start_over_length": -0.1}, "start_over_length = -0.1: .*>= 0"),
         (fiber, {"angle": 0.1, "start_over_length": math.nan}, "start_over_length = nan"),

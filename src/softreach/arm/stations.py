@@ -22,6 +22,8 @@ Made = TypeVar("Made", bound=Part)
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
 """Declaration of the place of a named station."""
 
+_SHORTEST = 1e-9  # of L, of a part between two places: below it, places round to one another
+
 
 class Stations(Mapping[str, float]):
     """Z [m] of stations by name; frozen.
@@ -188,9 +190,10 @@ class Span(Located):
         start, end = self.span(length)
         if faults or end - start >= _SHORTEST * length:
             return faults
+        least = _least(start, end)
         if self.end is None:
-            return [Fault("start", start, f"must be below its end at Z = {end:g} m")]
-        return [Fault("end", end, f"must be above its start at Z = {start:g} m")]
+            return [Fault("start", start, f"must be below its end at Z = {end:g} m{least}")]
+        return [Fault("end", end, f"must be above its start at Z = {start:g} m{least}")]
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
@@ -199,10 +202,13 @@ class Span(Located):
         blamed = any(fault.path.endswith("_over_length") for fault in faults)
         if in_meters or blamed or end - start >= _SHORTEST:
             return faults
-        allowed = f"must be above start_over_length = {start:g}"
-        if end > start:
-            allowed += f" by {_SHORTEST:g} at least"
+        allowed = f"must be above start_over_length = {start:g}{_least(start, end)}"
         return [*faults, Fault("end_over_length", end, allowed)]
+
+
+def _least(start: float, end: float) -> str:
+    """What a refusal of ends in the right order adds."""
+    return f" by {_SHORTEST:g} L at least" if end > start else ""
 
 
 def placed(part: Made, stations: Mapping[str, float]) -> Made:
