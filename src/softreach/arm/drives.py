@@ -117,7 +117,7 @@ class Drive(Part):
 
     @property
     def numbers(self) -> dict[str, Number]:
-        """What can be varied, by its name: see `value_of`."""
+        """Names of the numbers that can be varied: see `value_of`."""
         declared = {
             "lower": ("min u", "lowest input"),
             "upper": ("max u", "highest input"),

@@ -90,7 +90,7 @@ class Manipulator:
     stations: Mapping[str, float] = Stations()
     """Z [m] of stations by name, at which actuators, rigid pieces and markers may be."""
     rigid_pieces: tuple[RigidPiece, ...] = ()
-    """Where it neither bends nor twists nor changes its length."""
+    """Rigid pieces, which neither bend nor twist nor change their length."""
     markers: tuple[Marker, ...] = ()
     """Points that go with its sections; they change nothing about the arm."""
     display_unit: str | None = field(default=None, compare=False)

@@ -1,4 +1,4 @@
-"""What a laboratory measured on an arm: stiffnesses and mass per length."""
+"""Stiffnesses and mass per length that a laboratory measured on an arm."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Measured"]
 
 @dataclass(frozen=True, kw_only=True)
 class Measured(Part):
-    """What was measured on the sections of an arm, in place of what follows from its materials.
+    """Measured numbers of the sections of an arm, in place of what follows from its materials.
 
     Each is a number for all of the arm, or a function along it; None follows from the materials.
 

@@ -207,7 +207,7 @@ class Span(Located):
 
 
 def _least(start: float, end: float) -> str:
-    """What a refusal of ends in the right order adds."""
+    """Least distance of ends in the right order, for a refusal."""
     return f" by {_SHORTEST:g} L at least" if end > start else ""
 
 

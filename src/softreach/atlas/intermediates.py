@@ -1,4 +1,4 @@
-"""What the metrics of a design are computed from: each result at its first use, and only once."""
+"""Intermediate results behind the metrics of a design, each computed once, at its first use."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SPACINGS = 1.6  # of samples that fill the box evenly, over L: radius of the al
 
 
 class Settings(NamedTuple):
-    """What the metrics of a single design are computed to, as a `Command` has it for many."""
+    """Settings for the metrics of a single design, as a `Command` has them for many."""
 
     tol: float
     """Error of tips over L."""

@@ -1,4 +1,4 @@
-"""What a laboratory would use without a rod: constant curvature, and a quadratic ridge."""
+"""Baselines without a rod: constant curvature, and a quadratic ridge."""
 
 from __future__ import annotations
 

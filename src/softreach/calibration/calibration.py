@@ -52,7 +52,7 @@ class Rival(NamedTuple):
 
     name: str
     numbers: int
-    """How many were fitted."""
+    """Number of fitted parameters."""
     train: Misses
     held_out: Misses
 
@@ -244,7 +244,7 @@ class Calibration:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """What limits the fit; samples far off are left out."""
+        """Limitation of the fit; samples far off are left out."""
         held = bool(self.held.any())
         rows, name = (self.held, "held-out") if held else (~self.held, "fitted")
         near = rows & ~np.isin(self.data.rows, self.outliers)
@@ -358,7 +358,7 @@ class Calibration:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What the calibration was made of."""
+        """Version, date and data behind the result."""
         return {
             "softreach_version": str(versions()["softreach_version"]),
             "date": self.date,

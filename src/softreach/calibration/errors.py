@@ -32,7 +32,7 @@ class Misses(NamedTuple):
     most: float
     """95 % of them are below it."""
     number: int
-    """How many places."""
+    """Number of places."""
 
     def text(self, length: float) -> str:
         """Of the command line: "median 3.1, mean 4.0, rms 5.2, 95 % below 9.9 mm (1.4 % of L)"."""
@@ -93,7 +93,7 @@ def repeatability(data: Measurements) -> Repeatability:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What limits a fit."""
+    """Limitation of a fit."""
 
     limit: str
     """"noise", "memory" or "physics"; "data" where there is too little to tell."""
@@ -105,7 +105,7 @@ class Verdict:
 def judged(
     data: Measurements, residuals: Array, error: float, repeated: Repeatability, name: str
 ) -> Verdict:
-    """What limits a fit, from its residuals in the order in which samples were taken.
+    """Limitation of a fit, from its residuals in the order in which samples were taken.
 
     Args:
         data: All samples.

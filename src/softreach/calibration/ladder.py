@@ -1,4 +1,4 @@
-"""How many numbers the data bears: ladders of fits, runs left out, profiles of one number."""
+"""Number of parameters that the data bear: ladders of fits, runs left out, profiles."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ _CORNERS = 10
 _APART = 0.5
 """Distance of two poses in the box at least, over the mean distance of so many points."""
 _TRUSTED = 2.0
-"""How much a pose may react to the numbers, over the median of all, and count in full."""
+"""Largest reaction of a pose to the numbers that counts in full, over the median of all."""
 _ROUNDS = 50
 _GAIN = 1e-6
 """Least gain of the logarithm of the determinant for which a pose is exchanged."""

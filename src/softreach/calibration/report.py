@@ -125,7 +125,7 @@ def error_cells(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, ..
 
 
 def remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
-    """What is odd about a calibration, and what limits it."""
+    """Remarks on a calibration: oddities and limitations."""
     if len(result.data.marker_names) > 1:
         each = ((name, errors.rms / unit.size) for name, errors in result.by_marker.items())
         listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)

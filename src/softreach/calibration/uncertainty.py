@@ -86,7 +86,7 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
 
 
 def _bent(fit: Fit, seen: NDArray[np.bool_], scale: Array) -> Array:
-    """What the second derivative of a robust loss lacks of that of weighted squares.
+    """Difference between the second derivatives of a robust loss and of weighted squares.
 
     Of 2W²(√(1 + d²/W²) - 1) in the distance d of a place it is w - w (1 - w²) along the residual,
     with w = 1/√(1 + d²/W²).

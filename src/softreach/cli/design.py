@@ -100,7 +100,7 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
 
 
 def _measured_rows(arm: Manipulator) -> Rows:
-    """What was measured, in place of what follows from the materials."""
+    """Measured stiffnesses and mass, in place of what follows from the materials."""
     from softreach.arm.number import fields_of
 
     if (measured := arm.section.measured) is None:

@@ -112,7 +112,7 @@ class PreparedMap:
 
     @lazy
     def leaves(self) -> ImageLeaves:
-        """What stands for that tree before many targets were asked for."""
+        """Substitute for that tree until many targets are asked for."""
         return ImageLeaves(self.mesh)
 
     @lazy

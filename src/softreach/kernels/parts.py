@@ -165,7 +165,7 @@ def _name_symbols() -> None:
 
 
 def loaded(kept: FunctionCache, sig: Any, target_context: Any) -> Any:
-    """What a cache holds for one set of types; None if it must be compiled.
+    """Cached machine code for one set of types; None if it must be compiled.
 
     Numba would first declare to itself every function that it can compile, for a tenth of a second.
     It asks for this under its own lock, so that one thread at a time loads these declarations.

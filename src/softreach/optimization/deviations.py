@@ -105,7 +105,7 @@ class Spread:
     deviation: float
     """Standard deviation."""
     quantile: float
-    """What 5 % of the arms are worse than."""
+    """5 % quantile of the arms."""
     error: float = 0.0
     """Of the mean, from how finely sets were computed."""
     sense: float = 1.0

@@ -1,4 +1,4 @@
-"""What deviations make of a reachable set to first order: theory (99)."""
+"""First-order effect of deviations on a reachable set: theory (99)."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ class DesignCase:
     @lazy
     @no_warnings()
     def check(self) -> Check:
-        """What is met and what is missed; on the way by poses that few descents find."""
+        """Requirements met and missed; on the way by poses that few descents find."""
         if self.fine:
             return checked(self.arm, self.requirements, self.accuracy, self.set_of)
         return quick_check(self.arm, self.requirements, self.accuracy, self.set_of)

@@ -65,7 +65,7 @@ class Point:
 
     @lazy
     def rooms(self) -> tuple[Part, ...]:
-        """What must not fall below 0: limits, measures, regions, other goals."""
+        """Quantities kept above 0: limits, measures, regions, other goals."""
         near = (_near_place(part) for part in self._tips if part.within > 0.0)
         return (*near, *self._rules(), *self._shares(), *self._of_design(), *self._other_goals())
 
@@ -315,7 +315,7 @@ def lazily(make: Callable[[], Array]) -> Callable[[], Array]:
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:
-    """How far poses are from what the rules forbid, over L or over the limit, shape (n, rule).
+    """Distances of poses from what the rules forbid, over L or the limit, shape (n, rule).
 
     With a little to spare, but for what touches at the base, which nothing moves.
     """

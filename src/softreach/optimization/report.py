@@ -141,7 +141,7 @@ def _cells(search: Search, each: Candidate, unit: LengthUnit) -> Iterator[str]:
 
 
 def missed_text(search: Search) -> Iterator[str]:
-    """What the best design misses, and by how much."""
+    """Requirements that the best design misses, each with its gap."""
     if search.best.fault:
         yield search.best.fault.splitlines()[0]
         return
@@ -153,7 +153,7 @@ def missed_text(search: Search) -> Iterator[str]:
 
 
 def remarks(search: Search) -> Iterator[str]:
-    """How designs were judged."""
+    """Remarks on a search: spreads, and counts of designs by how they were judged."""
     for spread in search.spreads:
         word = "robust" if search.robust else "as made"
         nominal = f"nominal {spread.nominal:.6g}"

@@ -121,7 +121,7 @@ class Search:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What the search was made of."""
+        """Version, objectives and numbers of designs behind the result."""
         judged = ", ".join(f"{count} {word}" for word, count in self.judged.items())
         goals = [f"{'max' if goal.sense > 0 else 'min'}imize {goal.name}" for goal in self.goals]
         return {

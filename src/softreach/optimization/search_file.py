@@ -48,7 +48,7 @@ _WRONG: Any = object()
 
 @dataclass(frozen=True, kw_only=True)
 class SearchFile:
-    """What a file asks to be searched."""
+    """Contents of a search file."""
 
     base: Manipulator | Mapping[str, Manipulator]
     """The design to vary, or several by name."""
@@ -254,7 +254,7 @@ class _Reader:
         return list(names)
 
     def _tried(self, path: str, value: Any, make: Callable[[], Any]) -> Any:
-        """What is made of a value; `_WRONG` with a fault where it is refused."""
+        """Value as read; `_WRONG` with a fault where it is refused."""
         try:
             return make()
         except InvalidInput as error:
@@ -363,7 +363,7 @@ class _Names:
         return read_quantity(value, unit)
 
     def allowed(self, key: str) -> str:
-        """What values under a key must be."""
+        """Kind of value allowed under a key, in words."""
         if key in self.written:
             return "must be finite numbers" + " without a unit" * (self.by_key[key].unit != "1")
         unit = self.by_key[key].unit

@@ -39,7 +39,7 @@ _MOST_DRAWN = 4  # times as many rows, until all designs of enough of them exist
 
 
 class Multiplier(NamedTuple):
-    """What a requirement costs: by how much the goal would be better if it allowed more."""
+    """Price of a requirement: by how much the goal would be better if it allowed more."""
 
     name: str
     """Requirement, place of a target, or end of a parameter's range."""
@@ -68,7 +68,7 @@ class VarianceShares(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Sensitivity:
-    """What decides a design: by parameters nearby, over the ranges, and by requirements."""
+    """Influences on a design: of parameters nearby and over their ranges, and of requirements."""
 
     goals: tuple[str, ...]
     goal_units: tuple[str, ...]
@@ -167,7 +167,7 @@ def sensitivity(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Sensitivity:
-    """What each free parameter is worth to the goals, and which requirement decides.
+    """Effect of each free parameter on the goals, and the requirements that decide.
 
     Derivatives at the design are exact; poses at the targets follow so that the tips stay where
     they must be. Multipliers explain the slope of the first goal by requirements that have no room

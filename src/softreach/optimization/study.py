@@ -197,7 +197,7 @@ class Study:
         return kinds.FloatDistribution(parameter.low, parameter.high)
 
     def _costs(self, candidate: Candidate) -> list[float]:
-        """What the samplers make small: objectives, or what is missed before all of them."""
+        """Values that the samplers minimize: objectives, or the excess over requirements first."""
         if candidate.is_feasible and self.problem.goals:
             return [*self.problem.costs(candidate)]
         if not self.problem.goals and not candidate.fault:

@@ -66,7 +66,7 @@ class Swatches(NamedTuple):
     entries: Sequence[tuple[str, str]]
     """Label and color, as CSS has it."""
     title: str = ""
-    """What they stand for."""
+    """Meaning of the colors."""
 
 
 class ColorScale(NamedTuple):

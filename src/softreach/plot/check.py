@@ -33,7 +33,7 @@ _REGIONS = {
 
 
 class _Check(Protocol):
-    """What `check` returned."""
+    """Result of `check`."""
 
     @property
     def arm(self) -> Manipulator: ...

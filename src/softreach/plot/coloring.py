@@ -52,7 +52,7 @@ class BundleKey(NamedTuple):
     unstable: bool = False
     """True if some samples are marked as unstable equilibria."""
     title: str = ""
-    """What a color alone stands for; empty if it is one part of a mixture."""
+    """Meaning of a color by itself; empty if it is one part of a mixture."""
 
     @property
     def labels(self) -> tuple[str, ...]:

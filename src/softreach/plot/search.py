@@ -180,7 +180,7 @@ def _draw_front(ax: Axes, shown: _Shown) -> None:
 
 
 def _draw_missed(ax: Axes, shown: _Shown) -> None:
-    """What each design misses, in their order; infinite ones stand at the upper edge."""
+    """Excess of each design, in their order; infinite ones stand at the upper edge."""
     way = ~shown.final
     excess, at = shown.data["excess"].values, shown.looked_at
     met, never = way & shown.feasible, way & ~np.isfinite(excess)

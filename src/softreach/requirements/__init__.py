@@ -1,4 +1,4 @@
-"""What a user asks of an arm: places, regions, bounds; met or missed, and by how much."""
+"""Requirements of an arm: places, regions, bounds; met or missed, and by how much."""
 
 from softreach.requirements.checks import Check, Coverage, check
 from softreach.requirements.findings import Finding, quick_excess

@@ -1,4 +1,4 @@
-"""What it would take to reach a place that is missed: bounds that bind, wider ones, length."""
+"""Advice for a place that is missed: bounds that bind, wider ones, a longer arm."""
 
 from __future__ import annotations
 

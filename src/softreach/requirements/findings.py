@@ -1,4 +1,4 @@
-"""What a design misses, by how much: what can be proved at once, and the numbers of a design."""
+"""Findings about a design: what it misses and by how much, proofs made at once, its numbers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Finding:
 
 
 def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding, ...]:
-    """What a design is proved to miss, by no more than `check` finds, in a few milliseconds.
+    """Proved lower bounds of what a design misses, in a few milliseconds; `check` finds no less.
 
     Places farther from the base than the longest arm that its bounds allow, ∫ max ζ dZ, as long as
     nothing loads it; limits that follow from the design alone. Nothing in it says that a

@@ -53,7 +53,7 @@ class Target:
     within: float = 0.0
     """Distance to which the tip must come to a place [m]; 0 for the error of the tips."""
     name: str = ""
-    """What it is called in results."""
+    """Name in results."""
 
     def __post_init__(self) -> None:
         if (self.places is None) == (self.region is None):
@@ -95,7 +95,7 @@ class Keep:
     clearance: float = 0.0
     """Distance to keep from the boundary [m]."""
     name: str = ""
-    """What it is called in results."""
+    """Name in results."""
 
     def __post_init__(self) -> None:
         as_instance("region", self.region, Region, _REGION)
@@ -111,7 +111,7 @@ class Keep:
         return "stay_inside" if self.inside else "avoid"
 
     def missed(self, points: Array) -> Array:
-        """How far points (n, 3) are from where they may be [m], negative where they are well."""
+        """Signed distances of points (n, 3) from the allowed region [m], negative inside it."""
         distance = self.region.distance(points)
         return (distance if self.inside else -distance) + self.clearance
 

@@ -38,11 +38,11 @@ class Judged(NamedTuple):
     """Poses by the rules, one column for each."""
 
     value: Array
-    """How far a region is missed [m], negative where it is kept to; values of limits."""
+    """Distances by which regions are missed [m], negative where kept to; values of limits."""
     excess: Array
-    """What is missed: over L, or over the limit; 0 where nothing is, shape (n, rule)."""
+    """Excess over L, or over the limit; 0 where nothing is missed, shape (n, rule)."""
     error: Array
-    """How much worse it may be between the stations that were looked at, shape (n, rule)."""
+    """Largest possible addition between the stations looked at, shape (n, rule)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class PoseRules:
         return Judged(value, np.where(excess > 1e-9, excess, 0.0), np.nan_to_num(error))
 
     def _kept(self, gamma: Array) -> tuple[Array, Array]:
-        """How far every region is missed [m], and how much more it may be, (n, keep) each."""
+        """Distances by which regions are missed [m], and what may come on top, (n, keep) each."""
         value = np.empty((len(gamma), len(self.keeps)))
         error = np.zeros_like(value)
         left: dict[int, Index] = {}
@@ -198,7 +198,7 @@ class Body(NamedTuple):
         )
 
     def missed(self, keep: Keep, rows: Index) -> tuple[Array, Array]:
-        """How far some poses miss a region at the stations [m], and at most between them, (n,)."""
+        """Distances by which poses miss a region at stations [m], and at most between, (n,)."""
         part = (self.center[rows], self.tangent[rows], self.radius[rows])
         least, most = keep.region.section_distances(*part)
         missed = (most if keep.inside else -least) + keep.clearance
@@ -214,7 +214,7 @@ class Body(NamedTuple):
 
 
 def _tips_missed(keep: Keep, tips: Array) -> Array:
-    """How far tips miss a region [m], NaN where there is none, shape (n,)."""
+    """Distances by which tips miss a region [m], NaN where there is none, shape (n,)."""
     missed = keep.missed(np.where(np.isnan(tips), 0.0, tips))
     missed[np.isnan(tips).any(axis=1)] = np.nan
     return missed
@@ -259,7 +259,7 @@ def worst_pose(rules: PoseRules) -> Worst:
 
 
 def _coarse(rules: PoseRules, gamma: Array) -> Array:
-    """How far poses miss the one region, at few stations [m], shape (n,)."""
+    """Distances by which poses miss the one region, at few stations [m], shape (n,)."""
     (keep,) = rules.keeps
     if keep.of == "tip":
         values = _tips_missed(keep, rules.rod.tips(gamma))

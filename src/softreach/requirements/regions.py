@@ -278,7 +278,7 @@ class HalfSpace(Region):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Region):
-    """What closed triangles hold.
+    """Solid inside closed triangles.
 
     Raises:
         InvalidInput: Triangles that leave an edge open, share one by more than two, or do not face

@@ -42,7 +42,7 @@ REQUIREMENTS_FILE: Formats = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Requirements:
-    """What an arm is for; `check` says how far a design meets it.
+    """Purpose of an arm; `check` says how far a design meets it.
 
     Raises:
         InvalidInput: A part of another kind.

@@ -142,7 +142,7 @@ def _kept_always(made: Check, keep: Keep, rules: Sequence[PoseRules]) -> Finding
 def _kept(
     keep: Keep, value: float, error: float, excess: float, where: str, unit: LengthUnit
 ) -> Finding:
-    """How far a region is missed, or by how much it is kept to."""
+    """Distance by which a region is missed, or kept to."""
     of = "the tip" if keep.of == "tip" else "the arm"
     close = f" (to {_length(error, unit, 2)})" if keep.of == "arm" else ""
     if excess > 0.0:

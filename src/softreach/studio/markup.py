@@ -95,7 +95,7 @@ def fields_style() -> str:
 
 
 def status(*lines: str, available: Sequence[str]) -> str:
-    """What is known of the design as HTML, as high whatever it says: the tabs below never jump.
+    """Numbers of the design as HTML, of one height: the tabs below never jump.
 
     Args:
         lines: As the other functions here make them.

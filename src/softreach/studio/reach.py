@@ -45,7 +45,7 @@ _ALPHA_NUMBERS = 128
 """A point of an α-shape takes about as much memory as a sample of so many activations."""
 
 _INSIDE = 2e-3
-"""How far behind a boundary is counted what leads there [L]."""
+"""Depth behind a boundary at which activations are counted [L]."""
 _NEIGHBORS = 8
 
 Rows = slice | NDArray[np.int64]

@@ -178,7 +178,7 @@ class Session:
         self.compiling = False
         """True while kernels are being compiled, for whichever tab."""
         self.compiled = 0
-        """How many were, since the studio was started."""
+        """Number of kernels compiled since the studio was started."""
         self.free: Reach | None = None
         """Reach of a loaded design without its loads."""
         self.reference: Reach | None = None
@@ -293,7 +293,7 @@ class Session:
         self.camera.look_from(camera)
 
     def picture(self, scale: int = 1) -> NDArray[np.uint8]:
-        """What the tab shows, `scale` pixels for each of the page along each side, RGBA.
+        """Picture of the tab, `scale` pixels for each of the page along each side, RGBA.
 
         Raises:
             InvalidInput: As `TabCamera.picture`.

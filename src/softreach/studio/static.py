@@ -170,7 +170,7 @@ def _gap(error: SoftreachError) -> dict[str, Any]:
 
 
 def _brief(content: dict[str, Any]) -> dict[str, Any]:
-    """What the page says of every design, without what it draws."""
+    """Numbers and words of every design on the page, without what it draws."""
     return {name: content[name] for name in ("gap", "numbers", "box") if name in content}
 
 

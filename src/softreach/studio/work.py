@@ -340,7 +340,7 @@ class CompilationWatch(event.Listener):
         """Watch from now on, until `close`."""
         self._changed, self._running, self._lock = changed, 0, threading.Lock()
         self.done = 0
-        """How many times all of it has ended: of the kernels of a studio, each once."""
+        """Number of times that all of it has ended: of the kernels of a studio, each once."""
         event.register(_KIND, self)
 
     @property

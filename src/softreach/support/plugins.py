@@ -90,14 +90,14 @@ def imported() -> tuple[ModuleType, ...]:
 
 
 def declared(group: str) -> dict[str, EntryPoint]:
-    """What installed packages declare in a group, by name; nothing of it is imported."""
+    """Entry points of installed packages in a group, by name; none is imported."""
     from importlib.metadata import entry_points
 
     return {entry.name: entry for entry in entry_points(group=group)}
 
 
 def loaded(entry: EntryPoint) -> Any:
-    """What an installed package declares.
+    """Object behind an entry point of an installed package.
 
     Raises:
         InvalidInput: It cannot be imported.

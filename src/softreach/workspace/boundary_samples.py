@@ -28,14 +28,14 @@ class BoundarySamples:
     cube: Array
     """In the unit cube of the free bundles, shape (n, dimension)."""
     places: Array
-    """Where they are [m], shape (n, 3)."""
+    """Places [m], shape (n, 3)."""
     area: Array
     """Outward area vectors [m²], shape (n, 3)."""
     group: Index
     """Number of the set of lines that each is on: an axis, and every other line, shape (n,)."""
 
     def derivative(self, slopes: Array, weights: Array | None = None) -> Array:
-        """What the boundary sweeps: derivatives of the volume, theory (98), shape (parameters,).
+        """Derivatives of the volume, swept by the boundary, theory (98), shape (parameters,).
 
         Args:
             slopes: ∂r/∂p at the nodes, shape (n, 3, parameters).

@@ -263,7 +263,7 @@ class _Sum(NamedTuple):
 
 
 def _sum(nodes: BoundarySamples | HullCorners | Flux, tips: TipDerivatives) -> _Sum:
-    """What nodes with area vectors sweep."""
+    """Volume swept by nodes with area vectors."""
     slopes = tips.at(nodes.faces.cube if isinstance(nodes, Flux) else nodes.cube)
     swept = np.einsum("ni,nip->np", nodes.area, slopes)
     error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())

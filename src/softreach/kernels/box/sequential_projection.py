@@ -42,7 +42,7 @@ class Running(NamedTuple):
     steps: np.ndarray
     """Steps it has taken, shape (n,), int64."""
     gamma: np.ndarray
-    """Where it is [-], shape (n, m)."""
+    """Present points [-], shape (n, m)."""
     miss: np.ndarray
     """(tip - target)/L there, shape (n, 3)."""
     slope: np.ndarray
@@ -56,11 +56,11 @@ class Running(NamedTuple):
     weight: np.ndarray
     """Penalty by which the step under trial is judged, shape (n,)."""
     gain: np.ndarray
-    """What the step under trial promises, shape (n,)."""
+    """Decrease promised by the step under trial, shape (n,)."""
     center: np.ndarray
     """Least of what the step minimizes without the target [-], shape (n, m)."""
     wanted: np.ndarray
-    """What the linearized map is to be, shape (n, 3)."""
+    """Wanted values of the linearized map, shape (n, 3)."""
     softness: np.ndarray
     """Of the linearized target, shape (n,)."""
     low: np.ndarray
@@ -201,7 +201,7 @@ def _merit(running, i, near, penalty):
 
 @kernel
 def next_trials(running, n, owner, near):
-    """What the steps of the first n promise, with the penalty that their multipliers ask for.
+    """Decrease promised by the steps of the first n, with the penalty of their multipliers.
 
     Args:
         running: The searches, with ends and multipliers of their steps.

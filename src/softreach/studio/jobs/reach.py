@@ -65,7 +65,7 @@ class ComputeReach(Job):
 
 
 class DifferentiateVolume(Job):
-    """How the volume changes with each slider, once it is known; dropped when one moves."""
+    """Slopes of the volume by the sliders, once known; dropped when one moves."""
 
     depends_on = ("design",)
 

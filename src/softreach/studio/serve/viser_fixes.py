@@ -130,7 +130,7 @@ def guard_inputs(client: ClientHandle, refuse: Callable[[str, int], None]) -> No
 
 
 class _Inputs:
-    """What a page says that a person did."""
+    """Message of a page about what a person did."""
 
     def __init__(self, gui: Any, refuse: Callable[[str, int], None]) -> None:
         self._gui, self._refuse = gui, refuse

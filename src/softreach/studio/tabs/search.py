@@ -57,7 +57,7 @@ _EMPTY = {
     _PAYLOAD: "mass at the tip in g",
     _SHORTENING: "of any bundle, in %",
 }
-"""What is added -> what the field holds."""
+"""Kind of need -> contents of its field, in words."""
 _NOTHING = "nothing more"
 _ALL = "everything"
 _ADD = "choose a number"
