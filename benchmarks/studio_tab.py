@@ -12,6 +12,7 @@ from tests.studio.tab import Tab
 from softreach import tip_positions
 from softreach.arm import designs
 from softreach.studio import Studio
+from softreach.studio.captions import size_text
 from softreach.studio.jobs.inverse import DragTip
 from softreach.studio.start import start_on_design
 
@@ -51,8 +52,7 @@ def _wait_for_numbers(tab: Tab) -> None:
     tab.settle()
     reach = tab.session.reach
     assert reach is not None and reach.size is not None, "the design has a volume"  # noqa: PT018
-    name, value, error, unit = reach.size
-    tab.page.get_by_text(f"{name} {value:.4f} ± {error:.1g} {unit}").first.wait_for()
+    tab.page.get_by_text(size_text(reach.size)).first.wait_for()
 
 
 SCENES = {
@@ -175,7 +175,7 @@ def print_latencies(repeat: int = 5) -> None:
         return
     with sync_playwright() as playwright, Studio(start_on_design(designs.minimal_trunk())) as run:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        tab = Tab(browser, run, width=1366, height=768)
+        tab = Tab(browser, run, (1366, 768), drawing="")
         moved_slider(tab)  # compile
         found = {name: measured(tab, repeat, scene) for name, scene in SCENES.items()}
         tab.close()

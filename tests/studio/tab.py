@@ -51,13 +51,15 @@ FLASH = """
 class Tab:
     """One page and its session."""
 
-    def __init__(self, browser, studio: Studio, size: tuple[int, int] = SIZE) -> None:
+    def __init__(
+        self, browser, studio: Studio, size: tuple[int, int] = SIZE, *, drawing: str = CHEAP
+    ) -> None:
         self.context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, accept_downloads=True
         )
         self.requests: list[str] = []
         self.errors: list[str] = []
-        self.context.add_init_script(CHEAP + FLASH)
+        self.context.add_init_script(drawing + FLASH)
         self.context.on("request", lambda request: self.requests.append(request.url))
         self.page = self.context.new_page()
         self.page.set_default_timeout(1000 * PATIENCE)

@@ -11,6 +11,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.plot.morph_movie import morph_frames
+from softreach.studio.captions import size_text
 from softreach.studio.jobs import morph
 
 images = pytest.importorskip("PIL.Image")
@@ -22,6 +23,11 @@ def cells(tab):
     """Texts of the table, row by row."""
     text = "tables => tables.flatMap(t => [...t.rows].map(r => [...r.cells].map(c => c.innerText)))"
     return tab.page.locator("table").evaluate_all(text)
+
+
+def shown(size) -> str:
+    """The number of a size, to the first digit of its error."""
+    return size_text(size).split()[1]
 
 
 def take(tab, name):
@@ -41,26 +47,26 @@ def become(tab, **values):
 
 def test_snapshots_are_taken_compared_saved_restored_and_deleted(tab, tmp_path):
     tab.open("Compare")
-    first = tab.session.reach.volume
+    first = tab.session.reach.size
     take(tab, "wide")
     become(tab, taper=0.01, revolution=1.0)
-    second = tab.session.reach.volume
+    second = tab.session.reach.size
     take(tab, "")
     tab.wait(lambda: len(cells(tab)) == 4, "two snapshots and the design have rows")
     head, one, other, now = cells(tab)
     assert head[:3] == ["design", "volume [L³]", "UNR [%]"]
     assert set(head[3:]) == {"revolution Ω [deg]", "taper φ [deg]"}
-    assert one[:2] == ["wide", f"{first:.4f}"]
+    assert one[:2] == ["wide", shown(first)]
     volume, difference = other[1].split("\n")
     assert other[0] == "design 1"
-    assert float(volume) == pytest.approx(second, abs=1e-4)
+    assert volume == shown(second)
     assert float(difference.split()[0].replace("\N{MINUS SIGN}", "-")) == pytest.approx(
-        second - first, rel=1e-3
+        second.value - first.value, abs=first.error + second.error
     )
     assert now[0] == "now"
 
     become(tab, taper=0.02)
-    wanted = f"{tab.session.reach.volume:.4f}"
+    wanted = shown(tab.session.reach.size)
     tab.wait(lambda: cells(tab)[-1][1].startswith(wanted), "the row shows the new volume")
 
     before = tab.session.state.design

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 
 import numpy as np
 import pytest
@@ -51,6 +52,15 @@ def test_differences_are_from_the_first_design():
     assert table.difference(1, 3) == pytest.approx(-2)
     assert table.difference(2, 0) is None
     assert table.difference(2, 2) == pytest.approx(np.degrees(1.0) - 108)
+
+
+def test_digits_of_volumes_and_of_their_differences_follow_the_errors():
+    sizes = (0.691648, 2e-5), (0.6926257, 3e-4)
+    rows = [Numbers(Size("volume", *size, "L³"), 0.311592 + k) for k, size in enumerate(sizes)]
+    table = comparison_html(compared([Candidate(f"{k}", TRUNK, rows[k]) for k in (0, 1)]))
+    texts = re.sub("<[^>]*>", " ", table).split()
+    for text in ("0.69165", "0.6926", "+0.0010", "(+0.14", "31.16", "131.16", "+100.00"):
+        assert text in texts
 
 
 def test_designs_that_differ_in_more_than_sliders_say_so():

@@ -210,6 +210,28 @@ def test_numbers_of_an_edge_keep_their_distance_in_a_small_picture(eye):
     assert min(seen_from(far, low, high, 300.0).steps) > max(wide.steps)
 
 
+@pytest.mark.parametrize("eye", [(2.1, -3.85, 1.45), (-3, 3, 1), (3, 2, -2), (1.5, -5, 0.9)])
+@pytest.mark.parametrize("focal", [420.0, 600.0, 1200.0])
+def test_the_name_of_an_axis_keeps_its_distance_from_the_number_beside_it(eye, focal):
+    low, high = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+    box = axes_box(low[None], high[None], camera=eye, focal=focal)
+    forward = (low + high) / 2 - eye
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    ways = np.stack([right, np.cross(right, forward)])
+    seen = {text: focal * ways @ (at - eye) / (forward @ (at - eye)) for text, at in box.labels}
+    for name in {"x / L", "y / L", "z / L"} & set(seen):
+        axis = "xyz".index(name[0])
+        places = [(text, at) for text, at in box.labels if not text.endswith("/ L")]
+        middle = next(at for text, at in box.labels if text == name)
+        numbers = [at for _, at in places if abs(at[axis] - middle[axis]) < 1e-9]
+        for at in numbers:
+            number = focal * ways @ (at - eye) / (forward @ (at - eye))
+            beside, above = np.abs(seen[name] - number)
+            assert beside > 19 or above > 11
+
+
 def test_a_sweep_is_a_smooth_loop_through_the_box_from_where_the_arm_is(rng):
     bounds = np.array([[-5 / 3, 0.0], [-1.0, 0.5], [0.2, 0.2]])
     start = rng.uniform(*bounds.T)

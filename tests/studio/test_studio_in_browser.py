@@ -266,3 +266,11 @@ def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_
     tab.settle()
     assert tab.session.slopes.arm == tab.session.state.design
     tab.page.locator("[role=img][title^='of the design before']").first.wait_for(state="detached")
+
+    last = tab.slider("offset of longitudinal [deg]")
+    below = last.bounding_box()["y"] - first.bounding_box()["y"]
+    tab.session.slopes = None  # as in a tab that was opened a moment ago
+    tab.session.show()
+    tab.page.locator("[role=img][title='not known yet']").first.wait_for()
+    none = tab.page.locator("[role=img][title='not known yet']").first
+    assert last.bounding_box()["y"] - none.bounding_box()["y"] == pytest.approx(below, abs=1)

@@ -15,6 +15,12 @@ _TICK = 0.02  # length of a tick, of the largest side
 _MOST = 8  # ticks along the longest edge
 _WIDE, _HIGH = 32.0, 16.0  # pixels from one number to the next, beside or above each other
 _END_ON = 0.97  # cosine of the angle to an axis below which its numbers would hide each other
+_NUMBERS_AT, _NAME_AT = (
+    2.5,
+    7.0,
+)  # from an edge to its numbers and to the name of its axis, in ticks
+_FARTHEST = 20.0  # that a name is from its edge, in ticks
+_BESIDE, _ABOVE = 20.0, 12.0  # pixels from the name of an axis to a number at the same place
 _FLAT = 0.25  # of its length, that a tick along the floor has at least in the picture
 
 
@@ -36,6 +42,8 @@ class Side(NamedTuple):
     """With the numbers of x, y and z; None of an axis that is seen end on."""
     steps: tuple[float, float, float]
     """From one number to the next [L]."""
+    names: tuple[float, float, float] = (_NAME_AT, _NAME_AT, _NAME_AT)
+    """From an edge to the name of its axis, in ticks."""
 
 
 class AxesBox(NamedTuple):
@@ -63,14 +71,24 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
     picture = _picture(toward)
     edges = [_outer_edge(axis, (x, y, z), toward, picture) for axis in range(3)]
     usual = _round_step(float((high - low).max()))
-    steps = [usual] * 3
+    steps, names = [usual] * 3, [_NAME_AT] * 3
     for axis, edge in enumerate(edges):
         if edge is not None:
             ends = np.tile(np.where(edge.high, high, low), (2, 1))
             ends[:, axis] = low[axis], high[axis]
             seen = _seen(ends - place, toward, picture) / (high - low)[axis]
-            steps[axis] = max(usual, _round_up(_room(seen, focal)))
-    return Side((x, y, z), (edges[0], edges[1], edges[2]), (steps[0], steps[1], steps[2]))
+            steps[axis] = max(usual, _round_up(_room(seen, focal, (_WIDE, _HIGH))))
+            ends[:] = ends.mean(axis=0)
+            ends[1, edge.outward] += _TICK * float((high - low).max())
+            tick = _seen(ends - place, toward, picture)
+            away = np.ceil(_NUMBERS_AT + _room(tick, focal, (_BESIDE, _ABOVE)))
+            names[axis] = float(np.clip(away, _NAME_AT, _FARTHEST))
+    return Side(
+        (x, y, z),
+        (edges[0], edges[1], edges[2]),
+        (steps[0], steps[1], steps[2]),
+        (names[0], names[1], names[2]),
+    )
 
 
 def _seen(ends: Array, toward: Array, picture: Array) -> Array:
@@ -80,14 +98,15 @@ def _seen(ends: Array, toward: Array, picture: Array) -> Array:
     return np.abs(last - first)
 
 
-def _room(seen: Array, focal: float) -> float:
-    """The least step of numbers [L] that neither touch beside nor above each other.
+def _room(seen: Array, focal: float, apart: tuple[float, float]) -> float:
+    """The least step, in units of a length, of texts that touch neither beside nor above.
 
     Args:
-        seen: How far 1 L leads to the right and up, in focal lengths, shape (2,).
+        seen: How far that length leads to the right and up, in focal lengths, shape (2,).
         focal: Focal length [pixel].
+        apart: Pixels from one text to the next, beside or above each other.
     """
-    return float((np.array([_WIDE, _HIGH]) / ((seen + 1e-9) * focal)).min())
+    return float((np.array(apart) / ((seen + 1e-9) * focal)).min())
 
 
 def _picture(toward: Array) -> Array:
@@ -140,9 +159,9 @@ def axes_box(
         for value in _ticks(low[axis], high[axis], side.steps[axis]):
             at = np.where(np.arange(3) == axis, value, corner)
             lines.append(np.stack([at, at + away]))
-            labels.append((_number(value), at + 2.5 * away))
+            labels.append((_number(value), at + _NUMBERS_AT * away))
         middle = np.where(np.arange(3) == axis, (low[axis] + high[axis]) / 2, corner)
-        labels.append((f"{'xyz'[axis]} / L", middle + 7 * away))
+        labels.append((f"{'xyz'[axis]} / L", middle + side.names[axis] * away))
     return AxesBox(np.array(lines), labels)
 
 

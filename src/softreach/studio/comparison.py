@@ -21,7 +21,9 @@ from softreach.studio.snapshots import Numbers
 from softreach.support.errors import SoftreachError
 
 _EQUAL = 1e-9  # relative difference that is rounding
+_FINEST = 1e-6  # error of what is shown: six digits after the point are enough
 _MINUS = "\N{MINUS SIGN}"
+_UNR = "UNR [%]"
 _MOST = 24
 """Columns of parameters; designs that differ in more are other arms altogether."""
 
@@ -122,24 +124,31 @@ def _cell(comparison: Comparison, row: int, column: int) -> list[Part]:
     value, difference = comparison.values[row][column], comparison.difference(row, column)
     if value is None:
         return ["–"]
-    lines: list[Part] = [_written(value, comparison.errors[row][column])]
+    error, first = comparison.errors[row][column], comparison.values[0][column]
+    percent = comparison.titles[column] == _UNR
+    lines: list[Part] = [_digits(value, error, "", ".2f" if percent else ".5g")]
     if row and difference is not None:
-        lines.append(_change(difference, comparison.values[0][column], comparison.titles[column]))
+        before = comparison.errors[0][column]
+        both = None if error is None or before is None else error + before
+        lines.append(_change(difference, both, first, "+.2f" if percent else "+.4g"))
     return lines
 
 
-def _written(value: float, error: Value) -> str:
-    text = f"{value:.5g}" if error is None else f"{value:.4f}"
-    return text.replace("-", _MINUS)
-
-
-def _change(difference: float, first: Value, title: str) -> str:
-    """Difference from the first design; of sizes in percent too."""
+def _change(difference: float, error: Value, first: Value, usual: str) -> str:
+    """Difference from the first design; of what has an error in percent too."""
     if difference == 0:
         return "="
-    size = title.startswith(("volume", "area", "length ")) and first
-    share = f" ({100 * difference / first:+.3g} %)" if size and first else ""
-    return f"{difference:+.4g}{share}".replace("-", _MINUS)
+    text = _digits(difference, error, "+", usual)
+    if error is None or not first:
+        return text
+    return f"{text} ({_digits(100 * difference / first, 100 * error / first, '+', usual)} %)"
+
+
+def _digits(value: float, error: Value, sign: str, usual: str) -> str:
+    """A number to the first digit of its error; as usual without one."""
+    if error is not None and 0 < (error := max(error, _FINEST)) < math.inf:
+        usual = f"{sign}.{max(0, -math.floor(math.log10(error)))}f"
+    return f"{value:{usual}}".replace("-", _MINUS)
 
 
 def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
@@ -156,7 +165,7 @@ def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
         )
     shares = [None if each is None else _finite(100 * each.unreachability) for each in numbers]
     if any(share is not None for share in shares):
-        columns.append(_Column("UNR [%]", shares, [None] * len(shares)))
+        columns.append(_Column(_UNR, shares, [None] * len(shares)))
     return columns
 
 

@@ -118,6 +118,7 @@ _IN_WORDS = {"R2(L)": "R₂ at the tip", "R2(0)": "R₂ at the base"}
 _Unit = tuple[str, float]
 """Name of a unit, and how many units of the parameter it is."""
 _DEGREES: _Unit = ("deg", math.radians(1))
+_KPA: _Unit = ("kPa", 1e3)
 
 
 @lru_cache(maxsize=16)
@@ -139,7 +140,7 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
                 slider = _own_slider(arm, parameter)
             else:
                 offered = _is_offered(arm, known, parameter)
-                slider = _slider(parameter, parameter.value(arm)) if offered else None
+                slider = _slider(arm, parameter) if offered else None
             sliders += [_on_slider(arm, parameter, slider)] if slider else []
     return tuple(sliders)
 
@@ -174,23 +175,30 @@ def _own_slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     return _Slider(_titled(f"{parameter.symbol}{owner}", unit), *ends, step)
 
 
-def _slider(parameter: Parameter, value: float) -> _Slider | None:
+def _slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     """Ends and label; None for what the design leaves open, or for a zero of unknown size."""
+    value = parameter.value(arm)
     fixed = (_OF_PART if parameter.owner else _OF_ARM).get(parameter.field)
     outside_arm = parameter.field == "distance_ratio" and value > 1
     if fixed and parameter.unit in ("1", "rad", "m") and not outside_arm:
         return fixed if math.isfinite(value) else None
-    return None if value == 0 or math.isnan(value) else _around(parameter, value)
+    return None if value == 0 or math.isnan(value) else _around(arm, parameter, value)
 
 
-def _around(parameter: Parameter, value: float) -> _Slider:
+def _around(arm: Manipulator, parameter: Parameter, value: float) -> _Slider:
     """From zero, or near it where it is not allowed, to twice the value."""
-    owner = f" of {parameter.owner.removesuffix('.material')}" if parameter.owner else ""
-    unit, _ = _unit(parameter, {})
-    ends = (0.01 if parameter.field == "young_modulus" else 0.0) * value, 2 * value
+    owner = f" of {owner_label(parameter.owner)}" if parameter.owner else ""
+    unit, scale = _unit(parameter, _units_on_sliders(arm))
+    size = value / scale
+    ends = (0.01 if parameter.field == "young_modulus" else 0.0) * size, 2 * size
     return _Slider(
-        _titled(f"{parameter.symbol}{owner}", unit), min(ends), max(ends), abs(value) / 100
+        _titled(f"{parameter.symbol}{owner}", unit), min(ends), max(ends), abs(size) / 100
     )
+
+
+def owner_label(path: str) -> str:
+    """The part that owns a parameter, by the name that the list of parts has for it."""
+    return path.removesuffix(".material").replace("rings[", "ring ").replace("]", "")
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Parameter) -> bool:
@@ -226,7 +234,7 @@ def _on_slider(arm: Manipulator, parameter: Parameter, slider: _Slider) -> Shown
 
 
 def _units_on_sliders(arm: Manipulator) -> Mapping[str, _Unit]:
-    return {"rad": _DEGREES, "m": ("L", arm.length)}
+    return {"rad": _DEGREES, "m": ("L", arm.length), "Pa": _KPA}
 
 
 class Part(NamedTuple):
@@ -289,7 +297,7 @@ def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
 
     Of those of the whole arm, what its parts differ in is typed with each of them.
     """
-    units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
+    units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": _KPA}
     known = [
         parameter
         for parameter in parameters(arm).values()

@@ -23,7 +23,7 @@ __all__ = ["NO_BAR", "PART", "Slope", "VolumeSlopes", "slope_bars", "volume_slop
 
 PART = 0.01
 """Part of the range of a slider over which the change of the volume is told."""
-NO_BAR = markup.bar(0.0, "", "not known yet", faded=True)
+NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)
 """Room for a bar."""
 _FINEST = 1e-3  # [%] of V: more digits tell nobody more
 

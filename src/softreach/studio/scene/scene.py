@@ -35,7 +35,7 @@ from softreach.studio.scene.clouds import (
 )
 from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
 from softreach.studio.state import Appearance, Camera, Slice, StudioState, solvable_rod
-from softreach.support.palette import BODY, bundle_color
+from softreach.support.palette import bundle_color
 from softreach.workspace import ReachableSolid
 
 if TYPE_CHECKING:
@@ -55,6 +55,8 @@ Spine = tuple[Array, Array]
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
+_BODY = 0.62, 0.60, 0.58
+"""Color of the body: stands out through the surface from a light and from a dark page."""
 _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
@@ -473,7 +475,7 @@ def _arm_meshes(
 ) -> list[tuple[Array, NDArray[Any], Color]]:
     """Vertices over `length`, faces and color of the body and of every bundle."""
     body = arm_surface(arm, shape, _SIDES)
-    meshes = [(body.vertices / length, body.faces, _rgb(BODY))]
+    meshes = [(body.vertices / length, body.faces, _rgb(_BODY))]
     if arm.bundles > MOST_BUNDLES:
         return meshes
     for k, skin in enumerate(bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed
+from softreach.arm.parameters import changed, find_parameter
 from softreach.studio.fields import Attribute, Fields
 from softreach.studio.shown_parameters import (
     ShownParameter,
@@ -124,7 +124,9 @@ class DesignPanel:
         field = self._sliders.slider(
             parameter.label, parameter.limits, parameter.step, at, parameter.hint
         )
-        self._bars[parameter.name] = Line(self._gui)
+        assert self._base is not None
+        if not find_parameter(self._base, parameter.name).whole:  # what jumps has no slope
+            self._bars[parameter.name] = Line(self._gui)
         return field
 
     def _changed(self, state: StudioState) -> StudioState:

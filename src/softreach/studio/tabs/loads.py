@@ -14,6 +14,7 @@ from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import Attribute, Fields
+from softreach.studio.shown_parameters import owner_label
 from softreach.studio.state import StudioState, Vector, vector
 from softreach.studio.widgets import Line, show_where
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
@@ -257,12 +258,7 @@ def _in_words(error: InvalidDesign) -> InvalidDesign:
         owner, _, field = fault.path.rpartition(".")
         if field not in _SYMBOLS:
             return in_file_terms(error, "")
-        lacking.setdefault(_owner(owner), []).append(_SYMBOLS[field])
+        lacking.setdefault(owner_label(owner), []).append(_SYMBOLS[field])
     needed = "; ".join(f"{' and '.join(what)} of {owner}" for owner, what in lacking.items())
     line = f"need {needed}: choose a material or type the numbers on the tab Parts"
     return InvalidDesign([Fault("loads", None, line)])
-
-
-def _owner(path: str) -> str:
-    """A part by the name that the list of parts has for it."""
-    return path.removesuffix(".material").replace("rings[", "ring ").replace("]", "")
