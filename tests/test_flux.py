@@ -15,10 +15,12 @@ from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import ReachableSolid, reachable_set
-from softreach.workspace.flux import grid_faces, signed_volume
+from softreach.workspace.flux import box_slopes, grid_faces, signed_volume
+from softreach.workspace.grid import cube_grid
 from softreach.workspace.injective import is_injective
 from softreach.workspace.measure import extrapolated_hull
 from softreach.workspace.reach import rasterized_set
+from softreach.workspace.recovery import monomial_slopes, recovers
 from tests.bodies import rubber
 
 Map = Callable[[np.ndarray], np.ndarray]
@@ -167,6 +169,51 @@ def test_a_fold_at_one_corner_is_found():
     assert is_injective(dented(-0.6))
 
 
+def test_a_polynomial_recovers_what_is_one_to_one_and_nothing_that_folds_or_overlaps():
+    def found(of):
+        cube = cube_grid(8)
+        tips, slopes = box_slopes(Mapped(of), cube)
+        return recovers(tips, slopes.reshape(9, 9, 9, 3, 3))
+
+    for of in (affine, mirrored, twisted, around(0.6, 0.0)):
+        assert found(of)
+    for of in (pressed, around(1.01, 0.0), around(1.15, 0.8), lambda x: affine((x - 0.4) ** 2)):
+        assert not found(of)
+
+
+def test_folds_that_miss_every_vertex_are_not_recovered():
+    # det J = 1 + 2 cos(2 π k x - phase): below zero between vertices of 8 cells for every phase.
+    cube = cube_grid(8)
+    for turns in (3, 5, 7):
+        for phase in np.linspace(0.0, 2 * np.pi, 7):
+
+            def waved(x, rate=2 * np.pi * turns, phase=phase):
+                return columns(x[:, 0] + 2.0 * np.sin(rate * x[:, 0] - phase) / rate, *x.T[1:])
+
+            tips, slopes = box_slopes(Mapped(waved), cube)
+            assert not recovers(tips, slopes.reshape(9, 9, 9, 3, 3))
+
+
+def test_slopes_of_monomials_are_those_of_their_values():
+    cube = cube_grid(2)
+    tips, slopes = box_slopes(Mapped(twisted), cube)
+    half = np.ptp(tips, axis=0) / 2
+    powers = [p for p in np.ndindex(4, 4, 4) if 0 < sum(p) <= 3]
+
+    def monomials(x):
+        place = (twisted(x) - tips.min(axis=0) - half) / half
+        return np.stack([(place**power).prod(axis=1) for power in np.array(powers)])
+
+    expected = np.empty((len(powers), 3, len(cube)))
+    for k in range(3):
+        moved = cube.astype(complex)
+        moved[:, k] += 1j * STEP
+        expected[:, k] = np.imag(monomials(moved)) / STEP
+    computed = monomial_slopes(tips, slopes, 3)
+    order, like = (np.lexsort(each.reshape(19, -1).round(9).T) for each in (computed, expected))
+    assert np.allclose(computed[order], expected[like], atol=1e-12)
+
+
 def narrowed(arm: Manipulator, low: float, high: float) -> Manipulator:
     return arm.with_bounds((low, high))
 
@@ -174,6 +221,7 @@ def narrowed(arm: Manipulator, low: float, high: float) -> Manipulator:
 ONE_TO_ONE = {
     "minimal trunk": narrowed(ARM, -0.9, -0.3),
     "laboratory arm": narrowed(designs.lce_arm(), -3.0, -1.0),
+    "laboratory arm from rest": narrowed(designs.lce_arm(), -2.0, 0.0),
     "little twist": narrowed(designs.minimal_trunk(np.radians(36), np.radians(1)), -0.9, -0.3),
 }
 

@@ -1,7 +1,8 @@
 """Injectivity of three bundles, one activation for each place: a test that is close to a proof.
 
-A map of a box is one to one if det J keeps its sign in the box and no two points of the boundary
-meet. Both are bounded on cells, from samples with a margin for what may lie between them.
+A map of a box is one to one if a polynomial of its values grows with the activations (`recovery`),
+or else if det J keeps its sign in the box and no two points of the boundary meet. All is bounded on
+cells, from samples with a margin for what may lie between them.
 """
 
 from __future__ import annotations
@@ -16,9 +17,16 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress
 from softreach.workspace.flux import box_slopes, cross_products, grid_faces, signed_volume
-from softreach.workspace.grid import cube_grid, grid_stretches, grid_tips
+from softreach.workspace.grid import (
+    cube_grid,
+    grid_stretches,
+    grid_tips,
+    least_in_cells,
+    second_differences,
+)
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.measure import Estimate, extrapolated_hull
+from softreach.workspace.recovery import recovers
 from softreach.workspace.solid import ReachableSolid
 
 _LIMIT = 0.8  # of 1, for slopes between the samples
@@ -30,7 +38,7 @@ _HALVINGS = 6
 _MOST_PAIRS = 200_000
 _FACE_MARGIN = 1.25  # on differences of slopes, for those between the vertices
 _CELLS = (4, 8, 16)  # along each axis; the first finds nearly every fold, for next to nothing
-_MARGIN = 1.5  # on second differences, for those between the vertices
+_RECOVERED = 8  # of which polynomials are tried first
 
 
 def is_injective(rod: TipMap) -> bool:
@@ -42,10 +50,13 @@ def is_injective(rod: TipMap) -> bool:
     if rod.supports_unstable or rod.box.dimension != 3:
         return False
     for cells in _CELLS:
-        slopes = _grid_slopes(rod, cells)
+        tips, slopes = box_slopes(rod, cube_grid(cells))
+        slopes = slopes.reshape(*(cells + 1,) * 3, 3, 3)
         stretch = np.linalg.det(slopes)
         if not stretch.min() * stretch.max() > 0.0:
             return False
+        if cells == _RECOVERED and recovers(tips, slopes):
+            return True
         if cells == _CELLS[0] or not _keeps_sign(stretch):
             continue
         meet = faces_meet(rod, slopes)
@@ -337,31 +348,9 @@ def _quarters(which: Index, side: int) -> Index:
     return (face[:, None] * 2 * side + rows) * 2 * side + columns
 
 
-def _grid_slopes(rod: TipMap, cells: int) -> Array:
-    """∂r/∂x at the vertices of a grid of the unit cube, (cells + 1, cells + 1, cells + 1, 3, 3)."""
-    cube = cube_grid(cells)
-    return box_slopes(rod, cube)[1].reshape(*(cells + 1,) * 3, 3, 3)
-
-
 def _keeps_sign(stretch: Array) -> bool:
-    """True if det J has no zero within the cells either, shape (n + 1, n + 1, n + 1).
-
-    A function differs from its trilinear interpolant by no more than the sum of its second
-    differences over 8.
-    """
-    curved, inside = np.zeros_like(stretch), np.arange(len(stretch)).clip(1, len(stretch) - 2) - 1
-    for axis in range(3):
-        curved += np.abs(np.diff(stretch, 2, axis)).take(inside, axis)
-    least, most = _of_corners(np.minimum, np.abs(stretch)), _of_corners(np.maximum, curved)
-    return bool((least > _MARGIN / 8.0 * most).all())
-
-
-def _of_corners(choose: np.ufunc, values: Array) -> Array:
-    """One of the values at the eight corners of each cell, (n + 1)³ to n³."""
-    for axis in range(3):
-        values = np.moveaxis(values, axis, 0)
-        values = np.moveaxis(choose(values[1:], values[:-1]), 0, axis)
-    return values
+    """True if det J has no zero within the cells either, shape (n + 1, n + 1, n + 1)."""
+    return bool(least_in_cells(np.abs(stretch), second_differences(stretch)).min() > 0.0)
 
 
 def _rasterized(rod: TipMap, cells: int, lattice: Lattice) -> Image:
