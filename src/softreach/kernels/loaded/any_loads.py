@@ -30,6 +30,7 @@ from softreach.kernels.loaded.load_continuation import (
     PAST,
     STEP,
     TRIAL,
+    UNSURE,
     advance_with,
     start,
 )
@@ -45,6 +46,7 @@ __all__ = ["TRACE", "solve"]
 
 AXIAL = SIZE  # whether no load turns with the world about its first axis
 WHOLE = SIZE + 1
+_TOGETHER = 32  # a block of fewer rods steps whole groups of so many lanes, for vectors and bits
 
 
 @inline
@@ -192,6 +194,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, ends, slopes, compli
     columns = np.zeros((3 + bundles + units, COLUMN_ROWS * LANES))
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
+        used = min(LANES, -(-count // _TOGETHER) * _TOGETHER)
         load_all(lanes, gamma, first, count)
         walks, turn, tables, tangents = 0, -1, coarse, columns.shape[0]
         while True:
@@ -200,7 +203,9 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, ends, slopes, compli
                 _aim(w, work, axes)
             if walks == 0:
                 _set_out(w, work, guesses, first, count, increment, widest)
-            walk(w, columns, tangents, lanes, unloaded, tables, bundles, trace[first:])
+                for i in range(used, LANES):
+                    w[DONE + i] = UNSURE
+            walk(w, columns, tangents, lanes, unloaded, tables, bundles, trace[first:], used)
             walks += 1
             waiting = _improve(w, turn, limits)
             turn += turn >= 0

@@ -97,10 +97,10 @@ def _drives(w, change, i):
 
 
 @pasted
-def step_state(w, scalars):
+def step_state(w, scalars, used):
     """Step the states, and keep those at the stages."""
     c = _all_constants(scalars)
-    for i in range(LANES):
+    for i in range(used):
         s, at = state_step(_nodes(w, c, i), get_four(w, STATE, i))
         put_four(w, STATE, i, s)
         put_four(w, STAGES, i, at[0])
@@ -117,8 +117,8 @@ def step_state(w, scalars):
 
 
 @pasted
-def _step_column(w, c, change):
-    for i in range(LANES):
+def _step_column(w, c, change, used):
+    for i in range(used):
         n, v = _nodes(w, c, i), _drives(w, change, i)
         places = (
             (n[0], get_four(w, STAGES, i), v[0]),
@@ -141,7 +141,7 @@ def _step_column(w, c, change):
 
 
 @inline
-def _drive(w, lanes, unloaded, bends, change, j):
+def _drive(w, lanes, unloaded, bends, change, j, used):
     """Turn of the unloaded arm over a step by an activation: δω̂ of theory (73) at its five nodes.
 
     Args:
@@ -151,9 +151,10 @@ def _drive(w, lanes, unloaded, bends, change, j):
         bends: U at the nodes (node, 3, bundle).
         change: dη dZ at the nodes (node,).
         j: Bundle.
+        used: Lanes that are stepped.
     """
     for n in range(5):
-        for i in range(LANES):
+        for i in range(used):
             x, y, z = 0.0, 0.0, 0.0
             for b in range(bends.shape[2]):
                 x += bends[n, 0, b] * lanes[b, i]
@@ -170,7 +171,7 @@ def _drive(w, lanes, unloaded, bends, change, j):
 
 
 @pasted
-def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bundles):
+def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bundles, used):
     """Step the first `count` tangents: three of rotations, `bundles` of activations, the others."""
     c = _all_constants(scalars)
     for n in range(count):
@@ -181,9 +182,9 @@ def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bu
                 (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j]),
                 (lengths[5, j], lengths[6, j], lengths[7, j], lengths[8, j], lengths[9, j]),
             )
-            _drive(w, lanes, unloaded, bends, lengths[:, j], j)
+            _drive(w, lanes, unloaded, bends, lengths[:, j], j, used)
         elif n == 0 or j == bundles:
             w[DRIVE : DRIVE + 15 * LANES] = 0.0
         copy(w, COLUMN, columns[n], 0, COLUMN_ROWS * LANES)
-        _step_column(w, c, change)
+        _step_column(w, c, change, used)
         copy(columns[n], 0, w, COLUMN, COLUMN_ROWS * LANES)

@@ -143,7 +143,7 @@ def _watch(w, columns, i):
 
 
 @pasted
-def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
+def walk(w, columns, count, lanes, unloaded, tables, bundles, trace, used):
     """From tip to base, with the first `count` tangents.
 
     Args:
@@ -155,6 +155,7 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
         tables: (pieces, lengths, scalars, bends, jumps).
         bundles: Columns of activations.
         trace: Filled with the sections between steps; or empty.
+        used: Lanes that are stepped; the others are idle.
     """
     _, lengths, scalars, bends, jumps = tables
     _begin(w, columns, count, 3 + bundles)
@@ -164,12 +165,12 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
         copy(w, REST, unloaded[k], 0, STEP_ROWS * LANES)
         if k == 0 and trace.shape[0] > 0:
             _keep(w, unloaded[k], STEP_ROWS * LANES, trace[:, 0])
-        step_state(w, scalars[k])
+        step_state(w, scalars[k], used)
         step_columns(
-            w, columns, count, lanes, unloaded[k], scalars[k], lengths[k], bends[k], bundles
+            w, columns, count, lanes, unloaded[k], scalars[k], lengths[k], bends[k], bundles, used
         )
         if count > 0:
-            for i in range(LANES):
+            for i in range(used):
                 _watch(w, columns, i)
         if trace.shape[0] > 0:
             _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])

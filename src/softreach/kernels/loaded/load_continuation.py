@@ -26,6 +26,7 @@ __all__ = [
     "PAST",
     "STEP",
     "TRIAL",
+    "UNSURE",
     "advance_with",
     "start",
 ]
