@@ -64,6 +64,8 @@ def main() -> int:
     record = CaseRecord()
     code = pytest.main(["-q", str(CASES), *sys.argv[1:]], plugins=[record])
     cases, failed = sum(map(len, record.seconds.values())), sum(record.failed.values())
+    if not cases:  # a typing error in the options must not empty the page
+        return int(code)
     said = (
         f"\n{datetime.now(UTC).date()}, softreach {version('softreach')}, Python "
         f"{platform.python_version()}: {cases:,} cases, {failed} failed.\n\n"
