@@ -15,11 +15,8 @@ _TICK = 0.02  # length of a tick, of the largest side
 _MOST = 8  # ticks along the longest edge
 _WIDE, _HIGH = 32.0, 16.0  # pixels from one number to the next, beside or above each other
 _END_ON = 0.97  # cosine of the angle to an axis below which its numbers would hide each other
-_NUMBERS_AT, _NAME_AT = (
-    2.5,
-    7.0,
-)  # from an edge to its numbers and to the name of its axis, in ticks
-_FARTHEST = 20.0  # that a name is from its edge, in ticks
+# From an edge to its numbers, to the name of its axis, and to that at most, in ticks.
+_NUMBERS_AT, _NAME_AT, _FARTHEST = 2.5, 7.0, 20.0
 _BESIDE, _ABOVE = 20.0, 12.0  # pixels from the name of an axis to a number at the same place
 _FLAT = 0.25  # of its length, that a tick along the floor has at least in the picture
 
