@@ -92,7 +92,7 @@ def dragged_tip(tab: Tab, seconds: float = 2.0) -> Drag:
     arm = tab.session.state.design
     ends = [np.array(place(tab, tip)) for tip in np.asarray(tip_positions(arm, [CURLED, NEXT]))]
     served = _count_pulls(tab)
-    mouse = tab.page.mouse
+    mouse, browser = tab.page.mouse, tab.context.new_cdp_session(tab.page)
     mouse.move(*ends[0])
     tab.page.wait_for_timeout(200)
     mouse.down()
@@ -101,7 +101,9 @@ def dragged_tip(tab: Tab, seconds: float = 2.0) -> Drag:
     events, first, begin = 0, len(served), time.perf_counter()
     while (spent := time.perf_counter() - begin) < seconds:
         share = 0.5 - 0.5 * np.cos(2 * np.pi * spent)
-        mouse.move(*(ends[0] + share * (ends[1] - ends[0])))
+        x, y = ends[0] + share * (ends[1] - ends[0])
+        moved = {"type": "mouseMoved", "x": x, "y": y, "button": "left", "buttons": 1}
+        browser.send("Input.dispatchMouseEvent", moved)  # mouse.move asks the page three times more
         events += 1
     count = len(served) - first
     mouse.up()

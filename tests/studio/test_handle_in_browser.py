@@ -10,7 +10,7 @@ import pytest
 import softreach as sr
 from softreach.rod import tip_map
 from softreach.studio import StudioState
-from softreach.studio.jobs.inverse import SolveInverse
+from softreach.studio.jobs.inverse import DragTip, SolveInverse
 
 
 @pytest.fixture
@@ -95,6 +95,30 @@ def test_a_tip_inside_the_exact_surface_is_dragged(inverse_tab):
     tab.wait(lambda: abs(tip_of(tab)[2] - tip[2] - 0.08) < 0.01, "the arrow lifts the tip")
     tab.settle()
     np.testing.assert_allclose(tip_of(tab)[:2], tip[:2], atol=2e-5)
+
+
+MOVES = """async ([x, y]) => {
+    for (let step = 1; step <= 8; step++) {
+        const place = {clientX: x + step, clientY: y, pointerId: 1, buttons: 1, bubbles: true};
+        document.querySelector("canvas").dispatchEvent(new PointerEvent("pointermove", place));
+        await null;
+    }
+}"""
+
+
+def test_every_place_of_a_dragged_tip_is_told_at_once(inverse_tab, monkeypatch):
+    tab, told = inverse_tab, []
+    begin = pose(tab, START)
+    drag_tip(tab, begin, begin + [0.0, 0.0, 0.05], steps=2)
+    tab.settle()
+    monkeypatch.setattr(tab.session, "follow", told.append)
+    tab.page.evaluate(MOVES, screen(tab, begin))
+    tab.wait(lambda: len(told) >= 8, "all are told")
+    monkeypatch.undo()
+    tab.page.mouse.up()
+    tab.wait(lambda: not tab.session.is_dragged, "the drag rests")
+    tab.settle()
+    assert told == [DragTip] * 8
 
 
 def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(full_tab):

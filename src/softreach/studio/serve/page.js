@@ -180,6 +180,22 @@ document.documentElement.addEventListener("keydown", function (event) {
   };
 })();
 
+// While a node is dragged, viser tells where the mouse is after 50 ms and the picture that follows. Here
+// it is told at every move, of which browsers make one a picture.
+(function () {
+  var wait = window.setTimeout, held = false;
+  ["pointerdown", "pointerup", "pointercancel"].forEach(function (kind) {
+    addEventListener(kind, function (event) {
+      held = kind === "pointerdown" && event.target.tagName === "CANVAS";
+    }, true);
+  });
+  window.setTimeout = function (call, delay) {
+    if (!held || delay !== 50) return wait.apply(window, arguments);
+    queueMicrotask(call);
+    return 0;
+  };
+})();
+
 // Presentation: F hides the panel and leaves the scene, its key and its numbers; F or Escape ends it.
 (function () {
   var root = document.documentElement;
