@@ -52,7 +52,7 @@ def _wait_for_numbers(tab: Tab) -> None:
     tab.settle()
     reach = tab.session.reach
     assert reach is not None and reach.size is not None, "the design has a volume"  # noqa: PT018
-    tab.page.get_by_text(size_text(reach.size)).first.wait_for()
+    tab.page.get_by_text(size_text(reach.size, reach.arm)).first.wait_for()
 
 
 SCENES = {

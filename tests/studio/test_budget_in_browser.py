@@ -49,7 +49,7 @@ def test_a_running_computation_is_canceled_and_taken_up_again(tab):
     tab.press("Compute what is missing")
     tab.wait(lambda: tab.session.reach.fine, "the rest is computed")
     tab.settle()
-    tab.page.get_by_text(size_text(tab.session.reach.size)).first.wait_for()
+    tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).first.wait_for()
 
 
 @pytest.mark.large
@@ -65,7 +65,7 @@ def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, mo
     monkeypatch.undo()
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
-    tab.page.get_by_text(size_text(tab.session.reach.size)).first.wait_for()
+    tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).first.wait_for()
 
 
 @pytest.mark.large

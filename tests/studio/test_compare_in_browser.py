@@ -25,9 +25,9 @@ def cells(tab):
     return tab.page.locator("table").evaluate_all(text)
 
 
-def shown(size) -> str:
+def shown(size, arm) -> str:
     """The number of a size, to the first digit of its error."""
-    return size_text(size).split()[1]
+    return size_text(size, arm).split()[1]
 
 
 def take(tab, name):
@@ -54,19 +54,19 @@ def test_snapshots_are_taken_compared_saved_restored_and_deleted(tab, tmp_path):
     take(tab, "")
     tab.wait(lambda: len(cells(tab)) == 4, "two snapshots and the design have rows")
     head, one, other, now = cells(tab)
-    assert head[:3] == ["design", "volume [L³]", "UNR [%]"]
+    assert head[:3] == ["design", "volume [m³]", "UNR [%]"]
     assert set(head[3:]) == {"revolution Ω [deg]", "taper φ [deg]"}
-    assert one[:2] == ["wide", shown(first)]
+    assert one[:2] == ["wide", shown(first, TRUNK)]
     volume, difference = other[1].split("\n")
     assert other[0] == "design 1"
-    assert volume == shown(second)
+    assert volume == shown(second, TRUNK)
     assert float(difference.split()[0].replace("\N{MINUS SIGN}", "-")) == pytest.approx(
         second.value - first.value, abs=first.error + second.error
     )
     assert now[0] == "now"
 
     become(tab, taper=0.02)
-    wanted = shown(tab.session.reach.size)
+    wanted = shown(tab.session.reach.size, TRUNK)
     tab.wait(lambda: cells(tab)[-1][1].startswith(wanted), "the row shows the new volume")
 
     before = tab.session.state.design
@@ -83,7 +83,7 @@ def test_snapshots_are_taken_compared_saved_restored_and_deleted(tab, tmp_path):
         rows = list(csv.DictReader(text))
     assert [row["design"] for row in rows] == ["wide", "design 1", "now"]
     measured = tab.session.snapshots.named("wide").numbers.size.value
-    assert float(rows[0]["volume [L³]"]) == measured
+    assert float(rows[0]["volume [m³]"]) == measured
 
     struck = "<b class=struck>x"
     take(tab, struck)

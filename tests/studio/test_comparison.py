@@ -19,7 +19,7 @@ TRUNK = designs.minimal_trunk()
 
 
 def numbers(volume, unr=0.3):
-    return Numbers(Size("volume", volume, 1e-4, "L³"), unr)
+    return Numbers(Size("volume", volume, 1e-4, 3), unr)
 
 
 def trio():
@@ -37,7 +37,7 @@ def trio():
 def test_only_the_parameters_that_differ_have_columns():
     table = trio()
     assert table.titles == (
-        "volume [L³]",
+        "volume [m³]",
         "UNR [%]",
         "revolution Ω [deg]",
         "taper φ [deg]",
@@ -56,7 +56,7 @@ def test_differences_are_from_the_first_design():
 
 def test_digits_of_volumes_and_of_their_differences_follow_the_errors():
     sizes = (0.691648, 2e-5), (0.6926257, 3e-4)
-    rows = [Numbers(Size("volume", *size, "L³"), 0.311592 + k) for k, size in enumerate(sizes)]
+    rows = [Numbers(Size("volume", *size, 3), 0.311592 + k) for k, size in enumerate(sizes)]
     table = comparison_html(compared([Candidate(f"{k}", TRUNK, rows[k]) for k in (0, 1)]))
     texts = re.sub("<[^>]*>", " ", table).split()
     for text in ("0.69165", "0.6926", "+0.0010", "(+0.14", "31.16", "131.16", "+100.00"):
@@ -73,10 +73,10 @@ def test_designs_that_differ_in_more_than_sliders_say_so():
 def test_the_table_as_text_has_every_number():
     rows = list(csv.DictReader(io.StringIO(comparison_csv(trio()))))
     assert [row["design"] for row in rows] == ["a", "b", "c"]
-    assert float(rows[1]["volume [L³]"]) == 0.5
-    assert float(rows[1]["volume [L³] error"]) == 1e-4
-    assert float(rows[1]["volume [L³] difference"]) == pytest.approx(-0.2)
-    assert rows[2]["volume [L³]"] == ""
+    assert float(rows[1]["volume [m³]"]) == 0.5
+    assert float(rows[1]["volume [m³] error"]) == 1e-4
+    assert float(rows[1]["volume [m³] difference"]) == pytest.approx(-0.2)
+    assert rows[2]["volume [m³]"] == ""
 
 
 def test_no_name_is_a_formula_of_a_spreadsheet_or_markup():

@@ -279,7 +279,7 @@ def reach_a_place(tab, folder) -> None:
     tab.session.update(lambda s: s.replace(design=folded, activation=(-0.4, -0.65, -0.18)))
     tab.settle()
     tab.open("Move")
-    typed(tab, "target / L", ", ".join(f"{x:.5f}" for x in tab.session.tip))
+    typed(tab, "target [m]", ", ".join(f"{x:.5f}" for x in tab.session.tip))
     tab.wait(lambda: tab.session.answer and len(tab.session.answer) > 1, "two shapes reach it")
     tab.settle()
     tab.open("View")

@@ -80,7 +80,7 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
 
 def test_a_saved_page_holds_everything_itself(fine):
     saved = static_page(StudioState(design=fine.arm), fine)
-    assert size_text(fine.size) in saved
+    assert size_text(fine.size, fine.arm) in saved
     assert "taper_deg = 2.0" in saved
     assert '<script src="http' not in saved
     assert '<link href="http' not in saved

@@ -119,7 +119,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, folder):
         tab.settle()
         tab.session = reloaded(tab, studio)
         assert taper(tab) == 0.02
-        tab.page.get_by_text(size_text(tab.session.reach.size)).wait_for()
+        tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).wait_for()
         tab.press("Undo")
         become(tab, lambda: tab.session.state.design == TRUNK, "the history is there too")
         tab.close()
@@ -138,7 +138,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was_beside_another_tab(browser
         one.session = reloaded(one, studio)
         assert taper(one) == 0.02
         assert one.session.reach.arm == one.session.state.design
-        one.page.get_by_text(size_text(one.session.reach.size)).wait_for()
+        one.page.get_by_text(size_text(one.session.reach.size, one.session.reach.arm)).wait_for()
         one.press("Undo")
         become(one, lambda: one.session.state.design == TRUNK, "the history is there too")
         assert taper(other) == 0.01

@@ -23,7 +23,7 @@ STATE = StudioState(design=TRUNK)
 
 
 def numbers(volume, unr=0.3):
-    return Numbers(Size("volume", volume, 1e-4, "L³"), unr)
+    return Numbers(Size("volume", volume, 1e-4, 3), unr)
 
 
 def snapshot(name="first", taken=1.0, **changes):
@@ -36,6 +36,16 @@ def test_a_snapshot_comes_back_from_its_text(known):
     back = Snapshot.from_json(kept.to_json())
     assert (back.name, back.state, back.taken) == (kept.name, kept.state, kept.taken)
     np.testing.assert_equal(back.numbers, known)
+
+
+def test_sizes_of_older_snapshots_are_in_lengths_of_their_arm():
+    arm = changed(TRUNK, {"length": 0.2})
+    kept = Snapshot(name="small", state=StudioState(design=arm), taken=1.0, numbers=numbers(0.7))
+    older = json.loads(kept.to_json())
+    older["numbers"]["size"] = {"name": "volume", "value": 0.7, "error": 1e-4, "unit": "L³"}
+    size = Snapshot.from_json(json.dumps(older)).numbers.size
+    np.testing.assert_allclose((size.value, size.error), (0.7 * 0.2**3, 1e-4 * 0.2**3))
+    assert size.power == 3
 
 
 def broken(**changes):

@@ -176,7 +176,7 @@ def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
 
 @pytest.mark.parametrize(
     ("error", "text"),
-    [(9e-5, "volume 0.25642 ± 0.00009 L³"), (4e-9, "volume 0.256423 ± 0.000001 L³")],
+    [(9e-5, "volume 0.25642 ± 0.00009 m³"), (4e-9, "volume 0.256423 ± 0.000001 m³")],
 )
 def test_digits_of_a_size_follow_its_error(error, text):
-    assert size_text(Size("volume", 0.2564231, error, "L³")) == text
+    assert size_text(Size("volume", 0.2564231, error, 3), designs.minimal_trunk()) == text

@@ -113,7 +113,7 @@ def test_histograms_are_those_of_the_samples_that_the_slice_leaves(tab):
     ).first.wait_for()
     cut = Slice(axis="z", center=0.6, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut))
-    tab.page.get_by_text("within the slice z = 0.6 L").wait_for()
+    tab.page.get_by_text("within the slice z = 0.6 m").wait_for()
     picture = tab.page.locator("img").first
     assert picture.evaluate("image => image.naturalWidth") > 600
 

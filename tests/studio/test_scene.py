@@ -10,9 +10,11 @@ import pytest
 
 import softreach as sr
 from softreach.arm import Marker
+from softreach.arm.parameters import changed
 from softreach.rod import tip_map
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.reach import stages
+from softreach.studio.scene.axes import NumberedBox
 from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import Appearance
@@ -33,6 +35,12 @@ class Meshes:
     def add_point_cloud(self, path, points, colors, **style):
         self.added[path] = SimpleNamespace(points=points, colors=colors, **style)
 
+    def add_line_segments(self, path, points, colors, **style):
+        self.added[path] = SimpleNamespace(points=points, **style)
+
+    def add_label(self, path, text, position, **style):
+        self.added[path] = SimpleNamespace(text=text, position=position, **style)
+
     def add_glb(self, path, data, **style):
         self.added[path] = SimpleNamespace(data=data, **style)
 
@@ -41,6 +49,28 @@ class Meshes:
 
     def get_handle_by_name(self, path):
         return self.added.get(path)
+
+
+@pytest.mark.parametrize(("unit", "size"), [("mm", 1e-3), ("cm", 1e-2), ("L", 0.2)])
+def test_numbers_along_the_axes_are_places_in_the_unit_of_the_design(unit, size):
+    arm, drawn = MADE_ARMS["fiber"]().replace(display_unit=unit), Meshes()
+    arm = changed(arm, {"length": 0.2})
+    corners = np.array([[-0.5, -0.7, 0.1], [0.6, 0.5, 1.1]])
+    box = NumberedBox(drawn)
+    box.draw(corners, arm=arm, shown=True)
+    labels = [node for path, node in drawn.added.items() if path.startswith("/axes/label")]
+    names = [label.text for label in labels if label.text[0] in "xyz"]
+    assert names == [arm.length_unit.label(axis) for axis in "xyz"]
+    low, high = box.corners
+    assert (low <= corners[0] + 1e-12).all()
+    assert (high >= corners[1] - 1e-12).all()
+    axis = 0
+    for label in labels:
+        if label.text[0] in "xyz":
+            axis += 1
+            continue
+        number = float(label.text.replace("\N{MINUS SIGN}", "-"))
+        assert number * size == pytest.approx(label.position[axis] * arm.length, abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", MADE_ARMS)

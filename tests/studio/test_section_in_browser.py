@@ -18,7 +18,7 @@ from tests.studio.conftest import SMALL
 def test_the_section_is_that_of_the_exact_set(tab):
     tab.open("Plots")
     tab.page.get_by_label("section", exact=True).check()
-    tab.page.get_by_text("y = 0 L: ").wait_for()
+    tab.page.get_by_text("y = 0 m: ").wait_for()
     picture = tab.page.locator("img").first
     assert picture.evaluate("image => image.naturalWidth") > 600
     reach = tab.session.reach
@@ -52,17 +52,17 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     before = tab.page.locator("img").first.get_attribute("src")
     cut = Slice(axis="z", center=0.5, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut))
-    tab.page.get_by_text("z = 0.5 L: ").wait_for()
+    tab.page.get_by_text("z = 0.5 m: ").wait_for()
     assert tab.page.locator("img").first.get_attribute("src") != before
     area = enclosed_area(section_curves(tab.session.reach, cut), 2)
-    tab.page.get_by_text(f"{area:.4f} L²").wait_for()
+    tab.page.get_by_text(f"{area:.4g} m²").wait_for()
     tab.open("Design")
     tab.drag("revolution Ω [deg]", 40)
     tab.settle()
     assert tab.session.figures.plots["section"].arm == tab.session.state.design
     changed = enclosed_area(section_curves(tab.session.reach, cut), 2)
     assert changed != area
-    tab.page.get_by_text(f"{changed:.4f} L²").wait_for()
+    tab.page.get_by_text(f"{changed:.4g} m²").wait_for()
 
 
 @pytest.mark.large
@@ -88,7 +88,7 @@ def test_the_section_is_drawn_for_a_dark_page_too(tab):
 def test_beside_the_set_nothing_is_reached(tab):
     cut = Slice(axis="x", center=1.4, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut, plots=PlotSettings(shown=("section",))))
-    tab.page.get_by_text("Nothing is reached at x = 1.4 L.").wait_for()
+    tab.page.get_by_text("Nothing is reached at x = 1.4 m.").wait_for()
     tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings()))
     tab.settle()
 

@@ -26,7 +26,7 @@ def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(ta
     assert not tab.page.evaluate("flashed")
     reach = tab.session.reach
     assert reach.fine
-    tab.page.get_by_text(size_text(reach.size)).wait_for()
+    tab.page.get_by_text(size_text(reach.size, reach.arm)).wait_for()
     assert reach.volume == pytest.approx(0.69, abs=0.02)
     assert tab.page.locator("canvas").count() > 0
 
@@ -41,7 +41,7 @@ def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(ta
     assert after.fine
     assert after.arm == tab.session.state.design
     assert np.degrees(parameter(tab, "revolution")) > 130
-    tab.page.get_by_text(size_text(after.size)).wait_for()
+    tab.page.get_by_text(size_text(after.size, after.arm)).wait_for()
     assert after.volume != before.volume
     first = slice(1 << 10)  # a tab keeps more samples than it needs
     assert not np.allclose(after.cloud.tip[first], before.cloud.tip[first])
@@ -61,7 +61,7 @@ def test_the_tip_is_where_the_library_says_and_its_trail_that_of_this_design_alo
 
     def shown():
         x, y, z = tab.session.tip
-        text = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L, pointing along ("
+        text = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) m, pointing along ("
         return tab.page.get_by_text(text).count()
 
     tab.wait(shown, "the page says where the tip is")

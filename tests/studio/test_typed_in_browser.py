@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from softreach import tip_positions
+from softreach.arm import designs
 from softreach.arm.parameters import find_parameter
 
 
@@ -168,11 +170,32 @@ def test_an_expression_with_a_unit_is_worked_out_and_a_wrong_one_says_why(tab):
 
 def test_components_of_a_typed_target_are_expressions(tab):
     tab.open("Move")
-    place = tab.page.locator("xpath=//label[normalize-space()='target / L']/following::input[1]")
+    place = tab.page.locator("xpath=//label[normalize-space()='target [m]']/following::input[1]")
     place.fill("(0.1*2 m, 0, 30 cm + 0.4 m)")
     place.press("Enter")
     tab.wait(lambda: tab.session.state.target is not None, "it is applied")
     np.testing.assert_allclose(tab.session.state.target, (0.2, 0.0, 0.7), atol=1e-12)
-    length = tab.session.state.design.length
-    shown = f"{0.2 / length:.12g}, 0, {0.7 / length:.12g}"
-    tab.wait(lambda: place.input_value() == shown, "its numbers are shown")
+    tab.wait(lambda: place.input_value() == "0.2, 0, 0.7", "its numbers are shown")
+
+
+def test_an_arm_is_read_and_aimed_in_the_unit_of_its_design(tab):
+    arm = designs.lce_arm().replace(display_unit="mm")
+    tab.session.update(lambda state: state.replace(design=arm))
+    tab.settle()
+    volume = tab.session.reach.exact.volume * 1e6
+    tab.page.get_by_text(f"volume {volume:.0f}").first.wait_for()
+    assert " mL" in tab.page.get_by_text(f"volume {volume:.0f}").first.inner_text()
+    tab.open("Move")
+    place = tab.page.locator("xpath=//label[normalize-space()='target [mm]']/following::input[1]")
+    aim = np.round(1e3 * tip_positions(arm, [arm.bounds @ (0.4, 0.6)])[0], 2)
+    place.fill(", ".join(map(str, aim)))
+    place.press("Enter")
+    tab.wait(lambda: tab.session.answer is not None, "it is solved")
+    tab.settle()
+    np.testing.assert_allclose(tab.session.state.target, 1e-3 * aim, atol=1e-12)
+    there = "({:.3f}, {:.3f}, {:.3f}) mm".format(*(aim + 0.0))
+    tab.page.get_by_text(f"1 activation reaches {there} to").wait_for()
+    at = "({:.5f}, {:.5f}, {:.5f}) mm".format(*(1e3 * arm.length * tab.session.tip))
+    tab.page.get_by_text(f"tip at {at}, pointing along (").wait_for()
+    axes = [tab.drawn(f"/axes/label {k}") for k in range(60)]
+    assert {label.text for label in axes if label is not None} >= {"x [mm]", "z [mm]"}

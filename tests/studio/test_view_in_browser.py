@@ -160,14 +160,14 @@ def test_buttons_look_from_the_front_the_side_and_the_top(tab):
         tab.press(view)
         tab.wait(lambda axis=axis: along(tab, axis) > 0.99, f"the {view} is seen")
         tab.settle()
-        names = {f"{'xyz'[k]} / L" for k in range(3) if k != axis}
+        names = {f"{'xyz'[k]} [m]" for k in range(3) if k != axis}
         tab.wait(lambda names=names: named_axes(tab) == names, f"{names} are named")
 
 
 def named_axes(tab) -> set[str]:
     labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
     texts = [label.text for label in labels if label is not None]
-    return {text for text in texts if text.endswith("/ L")}
+    return {text for text in texts if text.endswith("[m]")}
 
 
 def along(tab, axis: int) -> float:
@@ -323,7 +323,7 @@ def test_the_window_is_called_softreach(tab):
 @pytest.mark.large
 def test_numbers_are_dark_on_light_and_light_on_dark(tab):
     show(tab, cloud=False, arm=False, mouse="none")
-    name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x / L")
+    name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x [m]")
 
     def around() -> np.ndarray:
         image = pixels(tab)

@@ -54,6 +54,7 @@ from softreach.support.arrays import as_stations, read_only
 from softreach.support.errors import InvalidDesign, InvalidInput, warn
 from softreach.support.files.atomic import writing
 from softreach.support.lazy import lazy
+from softreach.support.units import LengthUnit, as_unit, handy_unit
 
 __all__ = ["Manipulator", "a_manipulator"]
 
@@ -94,7 +95,7 @@ class Manipulator:
     markers: tuple[Marker, ...] = ()
     """Points that go with its sections; they change nothing about the arm."""
     display_unit: str | None = field(default=None, compare=False)
-    """Unit that the command line shows it in, "m", "cm", "mm" or "L"; None for one that is handy.
+    """Unit that it is shown in, "m", "cm", "mm" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
 
     def __post_init__(self) -> None:
@@ -291,14 +292,23 @@ class Manipulator:
             InvalidDesign: The design has no text; see `to_toml`.
         """
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        text = self.to_toml() + design_file.display_text(self.display_unit)
         with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
-            stream.write(text.encode())
+            stream.write(self.file_text.encode())
+
+    @property
+    def file_text(self) -> str:
+        """Text of its file: that of `to_toml`, and the unit that it is shown in."""
+        return self.to_toml() + design_file.display_text(self.display_unit)
 
     @property
     def length(self) -> float:
         """L, from base to tip before activation [m]."""
         return self.profile.length
+
+    @property
+    def length_unit(self) -> LengthUnit:
+        """Unit of lengths that it is shown in: `display_unit`, or one that is handy."""
+        return as_unit(self.display_unit or handy_unit(self.length), self.length)
 
     @property
     def fibers(self) -> tuple[FiberArchitecture, ...]:

@@ -391,7 +391,7 @@ class Calibration:
             )
         )
         head = "\n".join(["# Calibrated from measured poses.", *lines, *numbers])
-        text = f"{head}\n\n{self.arm.to_toml()}{design_file.display_text(self.arm.display_unit)}"
+        text = f"{head}\n\n{self.arm.file_text}"
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
             stream.write(text.encode())

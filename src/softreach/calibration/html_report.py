@@ -11,7 +11,6 @@ from softreach.calibration.report import (
     error_head,
     number_rows,
     remarks,
-    shown_unit,
 )
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
@@ -50,7 +49,7 @@ def write_report(
     check_installed(("matplotlib", "plot"))
     template = page_template("softreach.calibration", "report.html.jinja")
     length = result.arm.length
-    shown = shown_unit(result.arm, None if unit is None else as_unit(unit, length))
+    shown = result.arm.length_unit if unit is None else as_unit(unit, length)
     *notes, verdict = remarks(result, shown)
     page = template.render(
         numbers=list(number_rows(result, shown)),

@@ -10,10 +10,9 @@ from softreach.calibration.errors import Misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.support.errors import counted
 from softreach.support.quantity import columns, quantity
-from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
+from softreach.support.units import LengthUnit, readable_unit
 
 if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
     from softreach.calibration.calibration import Calibration
 
 __all__ = [
@@ -23,7 +22,6 @@ __all__ = [
     "error_rows",
     "number_rows",
     "remarks",
-    "shown_unit",
     "sigma_rows",
     "summary_text",
 ]
@@ -40,12 +38,6 @@ class ErrorRow(NamedTuple):
     errors: Misses
 
 
-def shown_unit(arm: Manipulator, unit: LengthUnit | None = None) -> LengthUnit:
-    """The unit asked for, that of the design, or one that is handy."""
-    name = arm.display_unit or handy_unit(arm.length)
-    return as_unit(name, arm.length) if unit is None else unit
-
-
 def summary_text(result: Calibration, unit: LengthUnit | None = None) -> str:
     """All that a calibration found, in lines.
 
@@ -53,7 +45,7 @@ def summary_text(result: Calibration, unit: LengthUnit | None = None) -> str:
         result: The calibration.
         unit: Of lengths; None for that of the design, or one that is handy.
     """
-    unit = shown_unit(result.arm, unit)
+    unit = unit or result.arm.length_unit
     fitted = len(result.data) - int(result.held.sum())
     markers = ", ".join(result.data.marker_names)
     lines = [

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softreach.arm.design_file import DESIGN_FILE, display_text
+from softreach.arm.design_file import DESIGN_FILE
 from softreach.arm.number import unit_suffix
 from softreach.arm.parameters.shown import with_suffix
 from softreach.optimization.html_report import REPORT, check_libraries
@@ -101,7 +101,7 @@ def _design_text(search: Search, each: Candidate) -> str | None:
         *(f"{key}: {text}" for key, text in search.provenance.items()),
     ]
     head = "\n".join(line if line.startswith("#") else f"# {line}" for line in lines)
-    return f"{head}\n\n{arm.to_toml()}{display_text(arm.display_unit)}"
+    return f"{head}\n\n{arm.file_text}"
 
 
 def write_table(

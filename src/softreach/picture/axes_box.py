@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -135,7 +136,10 @@ def _outer_edge(
 
 
 def axes_box(
-    *points: Array, camera: ArrayLike = (50.0, -80.0, 30.0), focal: float = np.inf
+    *points: Array,
+    camera: ArrayLike = (50.0, -80.0, 30.0),
+    focal: float = np.inf,
+    label: Callable[[str], str] = "{} / L".format,
 ) -> AxesBox:
     """The box around points, shapes (n, 3), without the edges that would run across them.
 
@@ -143,6 +147,7 @@ def axes_box(
         points: What is in the box [L].
         camera: From where it is seen [L].
         focal: As `seen_from` takes it.
+        label: From "x", "y" or "z" to the name of that axis, with its unit.
     """
     low, high = round_box(*points)
     side = seen_from(camera, low, high, focal)
@@ -158,7 +163,7 @@ def axes_box(
             lines.append(np.stack([at, at + away]))
             labels.append((_number(value), at + _NUMBERS_AT * away))
         middle = np.where(np.arange(3) == axis, (low[axis] + high[axis]) / 2, corner)
-        labels.append((f"{'xyz'[axis]} / L", middle + side.names[axis] * away))
+        labels.append((label("xyz"[axis]), middle + side.names[axis] * away))
     return AxesBox(np.array(lines), labels)
 
 

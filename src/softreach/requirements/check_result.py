@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.requirements.findings import Finding, shown_unit
+from softreach.requirements.findings import Finding
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.kinematics import configuration
@@ -120,7 +120,7 @@ class Check:
         missed = sum(not finding.met for finding in self.findings)
         count = len(self.findings)
         verdict = f"missed, {missed} of {count}" if missed else f"met, all {count}"
-        size = shown_unit(self.arm).text(self.arm.length)
+        size = self.arm.length_unit.text(self.arm.length)
         lines = [f"Requirements of an arm of {size}: {verdict}"]
         width = max((len(finding.name) for finding in self.findings), default=0)
         for finding in self.findings:

@@ -17,7 +17,6 @@ from softreach.requirements.parts import LIMIT_UNITS
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.support.arguments import as_instance
 from softreach.support.errors import counted, no_warnings
-from softreach.support.units import LengthUnit, as_unit, handy_unit
 
 if TYPE_CHECKING:
     from softreach.workspace import ReachableSet
@@ -67,11 +66,6 @@ def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding,
     return (*_too_far(arm, needs), *(f for f in design_limits(arm, needs) if not f.met))
 
 
-def shown_unit(arm: Manipulator) -> LengthUnit:
-    """The unit of lengths that a design is shown in."""
-    return as_unit(arm.display_unit or handy_unit(arm.length), arm.length)
-
-
 def longest_reach(arm: Manipulator) -> float:
     """No tip of the arm without loads is farther from its base than this [m]."""
     inner = arm.inner
@@ -84,7 +78,7 @@ def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     unloaded = arm.loads is None and not any(needs.payloads)
     if not (unloaded and needs.targets):
         return
-    longest, unit = longest_reach(arm), shown_unit(arm)
+    longest, unit = longest_reach(arm), arm.length_unit
     for target in needs.targets:
         room = longest + target.within
         if target.places is not None:
@@ -105,7 +99,7 @@ def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
 
 def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:
     """A limit against its value."""
-    unit, symbol = shown_unit(arm), LIMIT_UNITS[name]
+    unit, symbol = arm.length_unit, LIMIT_UNITS[name]
     excess = max(value - most, 0.0) / (most or 1.0)
     excess = excess if excess > _ROUNDING else 0.0
     if name == "actuators":

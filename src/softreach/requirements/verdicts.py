@@ -15,7 +15,6 @@ from softreach.requirements.findings import (
     design_limits,
     limit_finding,
     places_text,
-    shown_unit,
 )
 from softreach.requirements.parts import Keep
 from softreach.requirements.poses import PoseRules, worst_pose
@@ -44,7 +43,7 @@ def _under(payload: float | None) -> str:
 
 
 def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding]:
-    length, unit = made.arm.length, shown_unit(made.arm)
+    length, unit = made.arm.length, made.arm.length_unit
     for index, target in enumerate(made.requirements.targets):
         if target.places is None:
             continue
@@ -116,7 +115,7 @@ def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Ite
 
 
 def _kept_at_targets(made: Check, keep: Keep, value: Array, error: Array, excess: Array) -> Finding:
-    unit = shown_unit(made.arm)
+    unit = made.arm.length_unit
     if not value.size:
         return Finding(keep.name, keep.kind, True, 0.0, "counted in what is covered")
     load, place = np.unravel_index(int(value.argmax()), value.shape)
@@ -136,7 +135,7 @@ def _kept_always(made: Check, keep: Keep, rules: Sequence[PoseRules]) -> Finding
         value, excess, error = (float(column[0, 0]) for column in judged)
         worst.append((value, error, excess, where))
     value, error, excess, where = max(worst)
-    return _kept(keep, value, error, excess, where, shown_unit(made.arm))
+    return _kept(keep, value, error, excess, where, made.arm.length_unit)
 
 
 def _kept(

@@ -11,9 +11,11 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.clouds import FAINT
-from softreach.support.quantity import quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from softreach.arm.manipulator import Manipulator
     from softreach.studio.reach import Reach, Size
     from softreach.studio.session import Session
 
@@ -22,12 +24,12 @@ UNREACHABILITY = (
     "1 − V / V of the hull"
 )
 _SIZES = {
-    "volume": "V [L³]: volume of all places that the tip reaches, its error beside it; L: length",
-    "area": "Area [L²] of all places that the tip reaches, its error beside it; L: length",
-    "length": "Length [L] of the curve that the tip reaches, its error beside it",
+    "volume": "Volume of all places that the tip reaches, its error beside it",
+    "area": "Area of all places that the tip reaches, its error beside it",
+    "length": "Length of the curve that the tip reaches, its error beside it",
     "point": "All activations are held: the tip is at one place",
 }
-_FINEST = 1e-6
+_FINEST = 1e-6  # [L^power]: the error of a size that is told at least
 _GAP = "\N{EN SPACE} "
 _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
@@ -37,9 +39,26 @@ _POSTURES = {
 }
 
 
-def size_text(size: Size) -> str:
-    """Size with its error, to the first digit of that; six digits after the point are enough."""
-    return f"{size.name} {quantity(size.value, size.unit, max(size.error, _FINEST))}"
+def size_text(size: Size, arm: Manipulator) -> str:
+    """Size with its error in the unit of the arm, to the first digit of the error."""
+    if size.power == 0:
+        return size.name
+    error = max(size.error, _FINEST * arm.length**size.power)
+    return f"{size.name} {arm.length_unit.text(size.value, size.power, error)}"
+
+
+def length_text(length: float, arm: Manipulator, digits: str = ".3g") -> str:
+    """A length [L] in the unit of the arm."""
+    unit = arm.length_unit
+    return f"{length * arm.length / unit.size:{digits}} {unit.name}"
+
+
+def place_text(place: Iterable[float], arm: Manipulator, decimals: int = 4) -> str:
+    """A place [L] in the unit of the arm, to so many digits of L after the point."""
+    unit = arm.length_unit
+    scale = arm.length / unit.size
+    digits = max(0, decimals - math.floor(math.log10(scale * (1 + 1e-9))))
+    return f"({', '.join(f'{scale * x + 0.0:.{digits}f}' for x in place)}) {unit.name}"
 
 
 def reach_text(reach: Reach, share: str = "") -> list[Part]:
@@ -51,7 +70,7 @@ def reach_text(reach: Reach, share: str = "") -> list[Part]:
     """
     parts: list[Part] = []
     if reach.size is not None:
-        parts += [Term(size_text(reach.size), _SIZES[reach.size.name]), f"{share} · "]
+        parts += [Term(size_text(reach.size, reach.arm), _SIZES[reach.size.name]), f"{share} · "]
     if not math.isnan(reach.unreachability):
         parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
     if reach.lost_share:
@@ -91,16 +110,18 @@ def loaded_share(session: Session) -> str:
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    return f" under loads, {share} of {free.size.value:.4f} {free.size.unit} without"
+    whole = free.arm.length_unit.of(free.size.value, free.size.power)
+    unit = free.arm.length_unit.symbol(free.size.power)
+    return f" under loads, {share} of {whole:.4g} {unit} without"
 
 
 def tip_text(session: Session) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
     parts: list[Part] = []
     if session.tip is not None:
-        place = ", ".join(f"{x:.6f}" for x in session.tip)
+        place = place_text(session.tip, session.state.design, 6)
         pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(session.scene.pointing, 3))
-        parts.append(f"tip at ({place}) L, pointing along ({pointing})")
+        parts.append(f"tip at {place}, pointing along ({pointing})")
     if session.posture is not None:
         parts.append(f"{' · ' if parts else ''}{_POSTURES[session.posture]}")
     return parts

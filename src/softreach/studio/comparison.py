@@ -152,17 +152,16 @@ def _digits(value: float, error: Value, sign: str, usual: str) -> str:
 
 
 def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
-    """Volume, area or length, whatever each has, and UNR."""
+    """Volume, area or length, whatever each has, in the unit of the first design, and UNR."""
     numbers = [candidate.numbers for candidate in candidates]
-    kinds = dict.fromkeys((each.size.name, each.size.unit) for each in numbers if each is not None)
-    columns = []
-    for name, unit in kinds or {("volume", "L³"): None}:
+    kinds = dict.fromkeys((each.size.name, each.size.power) for each in numbers if each is not None)
+    unit, columns = candidates[0].design.length_unit, []
+    for name, power in kinds or {("volume", 3): None}:
         sizes = [each.size if each and each.size.name == name else None for each in numbers]
-        title = f"{name} [{unit}]" if unit else name
-        values = [None if size is None else size.value for size in sizes]
-        columns.append(
-            _Column(title, values, [None if size is None else size.error for size in sizes])
-        )
+        title, scale = (unit.label(name, power), unit.scale(power)) if power else (name, 1.0)
+        values = [None if size is None else size.value / scale for size in sizes]
+        errors = [None if size is None else size.error / scale for size in sizes]
+        columns.append(_Column(title, values, errors))
     shares = [None if each is None else _finite(100 * each.unreachability) for each in numbers]
     if any(share is not None for share in shares):
         columns.append(_Column(_UNR, shares, [None] * len(shares)))

@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import Any
 
 from softreach.requirements import Box, Check, Finding, Keep, Requirements, Target
-from softreach.requirements.findings import shown_unit
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 from softreach.support.units import LengthUnit
 
@@ -153,7 +152,7 @@ def reach_text(check: Check, finding: Finding) -> str:
     needs = check.requirements
     index = next(k for k, target in enumerate(needs.targets) if target.name == finding.name)
     own = check.target_of == index
-    gap, unit = float(check.gaps[:, own].max()) - needs.targets[index].within, shown_unit(check.arm)
+    gap, unit = float(check.gaps[:, own].max()) - needs.targets[index].within, check.arm.length_unit
     reached = int(check.reached[:, own].all(axis=0).sum())
     many = f"{reached} of {int(own.sum())} places, " if own.sum() > 1 else ""
     if finding.met:

@@ -85,7 +85,7 @@ def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
 
 
 def _html_caption(state: StudioState, reach: Reach, key: str) -> str:
-    numbers, file = markup.inline(*reach_text(reach)), markup.inline(state.design.to_toml())
+    numbers, file = markup.inline(*reach_text(reach)), markup.inline(state.design.file_text)
     design = f"<details><summary>design</summary><pre>{file}</pre></details>"
     marks = markup.paragraph(*legend_text(reach, free=False))
     paper, ink = _INK[state.appearance.dark]

@@ -70,12 +70,14 @@ class Quality:
 
 
 class Size(NamedTuple):
-    """Size of a reachable set, in L."""
+    """Size of a reachable set."""
 
     name: str
     value: float
+    """[m^power]."""
     error: float
-    unit: str
+    power: int
+    """3 for a volume, 2 for an area, 1 for a length, 0 for a point."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,27 +106,23 @@ class Reach:
 
     @property
     def volume(self) -> float:
-        """Volume [L³]; 0 for all but solids, NaN while it is not known."""
-        return math.nan if self.exact is None else self.exact.volume / self.arm.length**3
+        """Volume [m³]; 0 for all but solids, NaN while it is not known."""
+        return math.nan if self.exact is None else self.exact.volume
 
     @property
     def size(self) -> Size | None:
         """Volume, area or length of what can be reached; None while it is not known."""
-        length, exact = self.arm.length, self.exact
-        match exact:
+        match exact := self.exact:
             case None:
                 return None
             case ReachableSolid():
-                return Size(
-                    "volume", exact.volume / length**3, exact.volume_error / length**3, "L³"
-                )
+                return Size("volume", exact.volume, exact.volume_error, 3)
             case ReachableSurface():
-                return Size("area", exact.area / length**2, exact.area_error / length**2, "L²")
+                return Size("area", exact.area, exact.area_error, 2)
             case ReachableCurve():
-                error = exact.curve_length_error / length
-                return Size("length", exact.curve_length / length, error, "L")
+                return Size("length", exact.curve_length, exact.curve_length_error, 1)
             case _:
-                return Size("point", 0.0, 0.0, "")
+                return Size("point", 0.0, 0.0, 0)
 
     @property
     def unreachability(self) -> float:
@@ -201,9 +199,9 @@ class Reach:
 
     @property
     def alpha_volume(self) -> float | None:
-        """Volume of the α-shape [L³], if it is known; nothing is computed."""
+        """Volume of the α-shape [m³], if it is known; nothing is computed."""
         hull: Hull | None = vars(self).get("alpha_shape")
-        return None if hull is None else hull.volume / self.arm.length**3
+        return None if hull is None else hull.volume
 
 
 def shown_samples(reach: Reach, level: int) -> Rows:

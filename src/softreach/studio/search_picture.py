@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.optimization.problem import Candidate, Problem
-from softreach.requirements.findings import shown_unit
 from softreach.studio.plots.plot import blank_figure, pixels
 from softreach.support.units import readable_unit
 
@@ -111,7 +110,7 @@ def _objectives(
     problem: Problem, every: tuple[Candidate, ...], arm: Manipulator
 ) -> tuple[list[Array], list[str]]:
     """Values of each objective in the unit that is shown, NaN where there is none; labels."""
-    lengths, columns, labels = shown_unit(arm), [], []
+    lengths, columns, labels = arm.length_unit, [], []
     for k, goal in enumerate(problem.goals):
         values = np.array([c.objectives[k].value if c.is_feasible else math.nan for c in every])
         largest = float(np.nanmax(np.abs(values)))

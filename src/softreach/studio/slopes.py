@@ -16,6 +16,7 @@ from softreach.studio.work import Budget, OverBudget, StaleCheck
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.parallel import undivided
 from softreach.support.quantity import quantity
+from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSolid
 from softreach.workspace.gradient import gradient_of
 
@@ -32,7 +33,7 @@ class Slope(NamedTuple):
     """∂V/∂p for one slider."""
 
     value: float
-    """[L³] per unit of the slider."""
+    """[m³] per unit of the slider."""
     error: float
     """Its error, likewise."""
 
@@ -42,7 +43,7 @@ class VolumeSlopes(NamedTuple):
 
     arm: Manipulator
     volume: float
-    """[L³]."""
+    """[m³]."""
     slopes: Mapping[str, Slope]
     """By names of parameters; none where there is no volume, or loads tear the set."""
 
@@ -60,7 +61,7 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
     if not isinstance(solid, ReachableSolid) or solid.lost_share or not solid.volume > 0:
         return found  # what remains are differences between neighbors, which take minutes
     scale = {
-        slider.name: slider.scale / arm.length**3
+        slider.name: slider.scale
         for slider in slider_parameters(arm)
         if not known[slider.name].whole
     }
@@ -120,7 +121,7 @@ def slope_bars(
         name: markup.bar(
             change / most,
             _change_text(change, found.slopes[name], found.volume, sliders[name][1]),
-            _meaning(found.slopes[name], *sliders[name], old=old),
+            _meaning(found.slopes[name], *sliders[name], found.arm.length_unit, old=old),
             faded=old,
         )
         for name, change in changes.items()
@@ -133,13 +134,16 @@ def _change_text(change: float, slope: Slope, volume: float, ends: float) -> str
     return f"+{text}" if change > 0 else text
 
 
-def _meaning(slope: Slope, slider: ShownParameter, ends: float, *, old: bool) -> str:
-    unit = unit_in(slider.label)
-    per = f"L³ per {unit}" if unit else "L³"
+def _meaning(
+    slope: Slope, slider: ShownParameter, ends: float, lengths: LengthUnit, *, old: bool
+) -> str:
+    unit, volumes = unit_in(slider.label), lengths.symbol(3)
+    per = f"{volumes} per {unit}" if unit else volumes
     step = f"{PART * ends:.3g} {unit}".rstrip()
     before = "of the design before; " if old else ""
     error = slope.error if math.isfinite(slope.error) else math.nan
+    value, error = slope.value / lengths.scale(3), error / lengths.scale(3)
     return (
         f"{before}change of V over one hundredth of this slider, {step}; "
-        f"∂V/∂({slider.name}) = {quantity(slope.value, per, error)}"
+        f"∂V/∂({slider.name}) = {quantity(value, per, error)}"
     )

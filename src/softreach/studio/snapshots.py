@@ -21,6 +21,7 @@ REFERENCE = "reference"
 """Name of a design that an older state keeps without a snapshot."""
 _LONGEST_NAME = 60
 _MOST = 100
+_POWERS = {"L³": 3, "L²": 2, "L": 1, "": 0}
 
 
 class Numbers(NamedTuple):
@@ -82,11 +83,12 @@ class Snapshot:
             values = json.loads(text)
             if values["softreach_snapshot"] != VERSION:
                 raise InvalidInput("snapshot", f"version {values['softreach_snapshot']}", allowed)
+            state = StudioState.from_json(values["state"])
             return cls(
                 name=values["name"],
                 taken=float(values["taken"]),
-                numbers=_numbers(values["numbers"]),
-                state=StudioState.from_json(values["state"]),
+                numbers=_numbers(values["numbers"], state.design.length),
+                state=state,
             )
         except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
             if type(error).__module__.startswith("softreach"):
@@ -181,7 +183,7 @@ def numbers_of(reach: Reach | None, state: StudioState) -> Numbers | None:
     return Numbers(reach.size, reach.unreachability)
 
 
-def _numbers(values: Any) -> Numbers | None:
+def _numbers(values: Any, length: float) -> Numbers | None:
     if values is None:
         return None
     size = values["size"]
@@ -189,7 +191,11 @@ def _numbers(values: Any) -> Numbers | None:
     if not (math.isfinite(value) and math.isfinite(error)):
         raise ValueError("numbers that are not finite")
     share = math.nan if unr is None else float(unr)
-    return Numbers(Size(str(size["name"]), value, error, str(size["unit"])), share)
+    power, scale = size.get("power"), 1.0
+    if power is None:  # an older one, in L
+        power = _POWERS[size["unit"]]
+        scale = length**power
+    return Numbers(Size(str(size["name"]), value * scale, error * scale, int(power)), share)
 
 
 def _or_none(value: float) -> float | None:

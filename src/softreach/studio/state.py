@@ -45,9 +45,10 @@ def design_of_text(text: str, source: str) -> Manipulator:
     """
     arm = Manipulator.from_toml(text, source)
     try:
-        return rod_of(arm).arm
+        rod_of(arm)
     except InvalidDesign as error:
         raise in_file_terms(error, source) from None
+    return arm
 
 
 def solvable_rod(arm: Manipulator) -> TipMap:
@@ -254,8 +255,8 @@ class StudioState:
         values["appearance"] = asdict(self.appearance)
         values["camera"] = self.camera and asdict(self.camera)
         values["path"] = self.path and asdict(self.path)
-        values["design"] = self.design.to_toml()
-        values["reference"] = self.reference and self.reference.to_toml()
+        values["design"] = self.design.file_text
+        values["reference"] = self.reference and self.reference.file_text
         return json.dumps({"softreach_studio": VERSION, **values}, indent=1, ensure_ascii=False)
 
     @classmethod

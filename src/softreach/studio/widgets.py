@@ -148,6 +148,10 @@ class TypedField:
                 self._message.warn("")
         self._follow()
 
+    def rename(self, label: str, kind: TextKind, value: Any) -> None:
+        """Show another value of another kind."""
+        self._text.label, self._kind, self.value = label, kind, value
+
     def on_update(self, callback: Callable[[Any], object]) -> None:
         """Call back with the event when a person has applied a value."""
         self._callbacks.append(callback)

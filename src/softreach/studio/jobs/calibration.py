@@ -19,7 +19,6 @@ from softreach.calibration.report import (
     error_head,
     number_rows,
     remarks,
-    shown_unit,
 )
 from softreach.studio import markup
 from softreach.studio.jobs.reach import FollowCamera
@@ -134,7 +133,7 @@ class FitArm(AskedJob):
 
 
 def _summary(result: Calibration) -> str:
-    unit = shown_unit(result.arm)
+    unit = result.arm.length_unit
     numbers, errors = number_rows(result, unit), error_cells(result, unit)
     lines = [*remarks(result, unit)]
     if not result.fit.converged:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
+from softreach.studio.captions import length_text
 from softreach.studio.plots.plot import (
     Picture,
     PicturePlot,
@@ -83,7 +84,7 @@ def histogram_picture(
         ax.set_xlabel(_label(reach.arm, k), labelpad=1)
     figure.supylabel("share of the samples [%]", fontsize=10)
     return Picture(
-        reach.arm, pixels(figure, dark=dark), _described(len(activation), cut, solutions)
+        reach.arm, pixels(figure, dark=dark), _described(reach.arm, len(activation), cut, solutions)
     )
 
 
@@ -110,8 +111,12 @@ def _label(arm: Manipulator, bundle: int) -> str:
     return f"{symbol} {name}" + (f" [{unit}]" if unit != "1" else "")
 
 
-def _described(samples: int, cut: Slice, solutions: Array | None) -> str:
-    where = "" if cut.axis == "none" else f" within the slice {cut.axis} = {cut.center:g} L"
+def _described(arm: Manipulator, samples: int, cut: Slice, solutions: Array | None) -> str:
+    where = (
+        ""
+        if cut.axis == "none"
+        else f" within the slice {cut.axis} = {length_text(cut.center, arm)}"
+    )
     marks = " Triangles are solutions of the inverse problem." if solutions is not None else ""
     return f"{samples:,} samples{where}; the line is the present activation.{marks}"
 

@@ -106,13 +106,15 @@ class Curve(NamedTuple):
 class Chart:
     """Curves over a common axis, drawn by the page itself; nothing before the first `show`."""
 
-    def __init__(self, gui: GuiApi, container: Any, y: str, *, logarithmic: bool = False) -> None:
+    def __init__(
+        self, gui: GuiApi, container: Any, y: str = "", *, logarithmic: bool = False
+    ) -> None:
         """Take the place of a chart.
 
         Args:
             gui: Of the tab.
             container: Folder or tab that it goes into.
-            y: Label of the vertical axis, with its unit.
+            y: Label of the vertical axis, with its unit, unless `show` has it.
             logarithmic: Whether the horizontal axis is.
         """
         self._gui, self._container, self._y = gui, container, y
@@ -129,6 +131,7 @@ class Chart:
         curves: Sequence[Curve],
         values: Sequence[Array],
         here: float | None = None,
+        y: str = "",
     ) -> None:
         """Draw curves; those of the same names over the same axis are moved, others made anew.
 
@@ -138,11 +141,12 @@ class Chart:
             curves: Their names and looks.
             values: Of each, shape (n,).
             here: Where a vertical line is, on the horizontal axis; None for none.
+            y: Label of the vertical axis, with its unit, if it may change.
         """
         data = (np.asarray(x, float), *(np.asarray(each, float) for each in values))
         if here is not None:
             data = _marked(data, here)
-        made_of = label, here is None, *curves
+        made_of = label, y, here is None, *curves
         if made_of == self._made_of:
             self._widget.data = data
             return
@@ -154,7 +158,7 @@ class Chart:
                 data,
                 ({"label": label}, *map(_series, curves), *([] if here is None else [_HERE])),
                 scales=self._scales,
-                axes=(_axis(label), _axis(self._y) | {"size": 56}),
+                axes=(_axis(label), _axis(y or self._y) | {"size": 56}),
                 height=_HEIGHT,
             )
 

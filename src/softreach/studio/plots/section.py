@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.slice import plot_slice
+from softreach.studio.captions import length_text
 from softreach.studio.multiplicity import counts_at
 from softreach.studio.plots.plot import (
     Picture,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from softreach.arm.manipulator import Manipulator
     from softreach.studio.session import Session
 
 
@@ -103,7 +105,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
 def section_picture(
     reach: Reach, cut: Slice, check: StaleCheck = lambda: None, *, dark: bool = False
 ) -> Picture:
-    """Draw the section, in L; without a slice that across y through the base.
+    """Draw the section, in the unit of the arm; without a slice that across y through the base.
 
     Args:
         reach: Of the design.
@@ -124,11 +126,13 @@ def section_picture(
     ax = figure.subplots()
     view = _VIEWS[plane.axis]
     if grid is not None:
-        plot_slice(grid, ax=ax, view=view, at=plane.center * reach.arm.length)
-    _draw_boundary(ax, curves, view)
-    where = f"{plane.axis} = {plane.center:.3g} L"
+        at, unit = plane.center * reach.arm.length, reach.arm.length_unit
+        plot_slice(grid, ax=ax, view=view, at=at, unit=unit)
+    _draw_boundary(ax, curves, view, reach.arm)
+    where = f"{plane.axis} = {length_text(plane.center, reach.arm)}"
     ax.set_title(f"section {where}")
-    return Picture(reach.arm, pixels(figure, dark=dark), _described(curves, plane, where))
+    described = _described(curves, plane, where, reach.arm)
+    return Picture(reach.arm, pixels(figure, dark=dark), described)
 
 
 def enclosed_area(curves: list[Array], axis: int) -> float:
@@ -159,11 +163,13 @@ def _plane(cut: Slice, reach: Reach) -> Slice:
     return Slice(axis="y", center=base) if cut.axis == "none" else cut
 
 
-def _draw_boundary(ax: Axes, curves: list[Array], view: View) -> None:
+def _draw_boundary(ax: Axes, curves: list[Array], view: View, arm: Manipulator) -> None:
     across, up = ("xyz".index(name) for name in cast(str, plane_of(view)))
+    unit = arm.length_unit
+    curves = [unit.of(curve * arm.length) for curve in curves]
     for curve in curves:
         ax.plot(curve[:, across], curve[:, up], color=_BOUNDARY, lw=1.4, zorder=4)
-    ax.set(xlabel=f"{'xyz'[across]} / L", ylabel=f"{'xyz'[up]} / L", aspect="equal")
+    ax.set(xlabel=unit.label("xyz"[across]), ylabel=unit.label("xyz"[up]), aspect="equal")
     if curves:
         points = np.concatenate(curves)
         low, high = points.min(axis=0), points.max(axis=0)
@@ -173,13 +179,14 @@ def _draw_boundary(ax: Axes, curves: list[Array], view: View) -> None:
         ax.set_ylim(low[up] - room, high[up] + room)
 
 
-def _described(curves: list[Array], plane: Slice, where: str) -> str:
+def _described(curves: list[Array], plane: Slice, where: str, arm: Manipulator) -> str:
     if not curves:
         return f"Nothing is reached at {where}."
     area = enclosed_area(curves, "xyz".index(plane.axis))
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     closed = all(np.array_equal(curve[0], curve[-1]) for curve in curves)
-    return f"{where}: {parts}, {area:.4f} L²" if closed else f"{where}: {len(curves)} curves"
+    shown = f"{arm.length_unit.of(area * arm.length**2, 2):.4g} {arm.length_unit.symbol(2)}"
+    return f"{where}: {parts}, {shown}" if closed else f"{where}: {len(curves)} curves"
 
 
 class SectionPlot(PicturePlot):

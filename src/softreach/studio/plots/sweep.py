@@ -39,7 +39,7 @@ class Sweep(NamedTuple):
     value: Array
     """In the unit that is shown, ascending."""
     volume: Array
-    """[L³]."""
+    """[m³]."""
     refused: tuple[float, ...] = ()
     """Values that make no design, or one that takes too long."""
     complete: bool = False
@@ -117,14 +117,14 @@ def _volume(
     quality: Quality,
     check: StaleCheck,
 ) -> float | None:
-    """In L³; None for no design, or one that takes too much time or memory."""
+    """[m³]; None for no design, or one that takes too much time or memory."""
     try:
         design = changed(arm, {parameter.name: value * parameter.scale})
         solvable_rod(design)
         exact = exact_set(design, quality.coarse_accuracy, quality.tol, check, _SECONDS)
     except (SoftreachError, OverBudget, MemoryError):
         return None
-    return exact.volume / design.length**3
+    return exact.volume
 
 
 class SweepPlot(Plot):
@@ -136,7 +136,7 @@ class SweepPlot(Plot):
     depends_on = ("design", "appearance.plots.parameter")
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
-        self._chart = Chart(gui, folder, "V / L³")
+        self._chart = Chart(gui, folder)
 
     @classmethod
     def add_settings(cls, fields: Fields) -> None:
@@ -166,11 +166,16 @@ class SweepPlot(Plot):
 
     def show(self, result: Sweep) -> str:
         """Draw the volumes that are known so far."""
-        volumes = result.volume[result.value == result.parameter.shown]
+        unit = result.arm.length_unit
+        known, here_at = unit.of(result.volume, 3), result.value == result.parameter.shown
         if len(result.value) > 1:
             label, here = result.parameter.label, result.parameter.shown
-            self._chart.show(label, result.value, (_VOLUME,), (result.volume,), here)
-        parts = [f"here V = {v:.4f} L³ at {result.parameter.shown:g}" for v in volumes]
+            y = unit.label("V", 3)
+            self._chart.show(label, result.value, (_VOLUME,), (known,), here, y=y)
+        parts = [
+            f"here V = {volume:.4g} {unit.symbol(3)} at {result.parameter.shown:g}"
+            for volume in known[here_at]
+        ]
         if result.refused:
             parts.append(f"{len(result.refused)} values make no design or take too long")
         return " · ".join([*parts, *([] if result.complete else ["computing ..."])])

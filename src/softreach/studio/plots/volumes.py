@@ -32,16 +32,18 @@ _HULL = Curve("convex hull", "#868e96", dashed=True)
 
 
 class VolumeCurve(NamedTuple):
-    """V(α), in L."""
+    """V(α)."""
 
     arm: Manipulator
     samples: int
     radius: Array
+    """[L]."""
     volume: Array
+    """[m³]."""
     exact: float
-    """Volume of the reachable set; NaN while it is not known."""
+    """Volume of the reachable set [m³]; NaN while it is not known."""
     convex: float
-    """Of its convex hull."""
+    """Of its convex hull [m³]."""
 
 
 def volume_curve_of(reach: Reach, level: int) -> VolumeCurve:
@@ -50,9 +52,9 @@ def volume_curve_of(reach: Reach, level: int) -> VolumeCurve:
     rows = rows[reach.status[rows] == TipStatus.STABLE]
     length, exact = reach.arm.length, reach.exact
     with all_cores:
-        volumes = volume_curve(reach.cloud.tip.values[rows], _RADII * length) / length**3
+        volumes = volume_curve(reach.cloud.tip.values[rows], _RADII * length)
     solid = isinstance(exact, ReachableSolid)
-    convex = exact.convex_volume / length**3 if solid else math.nan
+    convex = exact.convex_volume if solid else math.nan
     return VolumeCurve(reach.arm, len(rows), _RADII, volumes, reach.volume, convex)
 
 
@@ -66,7 +68,7 @@ class VolumeCurvePlot(Plot):
     sources = frozenset({"reach"})
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
-        self._chart = Chart(gui, folder, "V / L³", logarithmic=True)
+        self._chart = Chart(gui, folder, logarithmic=True)
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[VolumeCurve]:
@@ -83,6 +85,8 @@ class VolumeCurvePlot(Plot):
         if np.isfinite(result.exact) and np.isfinite(result.convex):
             curves += [_EXACT, _HULL]
             values += [np.full_like(result.radius, each) for each in (result.exact, result.convex)]
-        self._chart.show("α / L", result.radius, curves, values)
-        at = float(np.interp(0.05, result.radius, result.volume))
-        return f"V(0.05 L) = {at:.4f} L³ of {result.samples:,} samples"
+        unit = result.arm.length_unit
+        shown = [unit.of(each, 3) for each in values]
+        self._chart.show("α / L", result.radius, curves, shown, y=unit.label("V", 3))
+        at = float(np.interp(0.05, result.radius, shown[0]))
+        return f"V(0.05 L) = {at:.4g} {unit.symbol(3)} of {result.samples:,} samples"

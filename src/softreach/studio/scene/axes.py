@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.picture.axes_box import axes_box, round_box, seen_from
+from softreach.picture.axes_box import Side, axes_box, round_box, seen_from
+from softreach.support.units import in_lengths
 
 if TYPE_CHECKING:
     from viser import SceneApi
+
+    from softreach.arm.manipulator import Manipulator
 
 Array = NDArray[np.float64]
 
@@ -23,25 +26,35 @@ class NumberedBox:
     def __init__(self, api: SceneApi) -> None:
         """Draw into a scene, around an arm for the time being."""
         self._api = api
-        self.corners = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
-        """The lowest and the highest [L]."""
+        self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+        self._unit, self._scale = in_lengths(1.0), 1.0  # of the numbers, and L in it
         self._camera: Array = np.array([50.0, -80.0, 30.0])
         self._focal = np.inf
 
-    def draw(self, *points: Array, shown: bool) -> None:
-        """Surround points [L], shapes (n, 3)."""
-        self.corners = round_box(*points)
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """The lowest and the highest [L]."""
+        low, high = self._box
+        return low / self._scale, high / self._scale
+
+    def draw(self, *points: Array, arm: Manipulator, shown: bool) -> None:
+        """Surround points [L], shapes (n, 3), with numbers in the unit of the arm."""
+        self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
+        self._box = round_box(*(self._scale * each for each in points))
         self._remove()
         if shown:
             self._draw()
 
     def turn(self, camera: Array, focal: float = np.inf) -> None:
         """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
-        before = seen_from(self._camera, *self.corners, self._focal)
+        before = self._side()
         self._camera, self._focal = camera, focal
-        if self._is_drawn and seen_from(camera, *self.corners, focal) != before:
+        if self._is_drawn and self._side() != before:
             self._remove()
             self._draw()
+
+    def _side(self) -> Side:
+        return seen_from(self._scale * self._camera, *self._box, self._focal)
 
     @property
     def _is_drawn(self) -> bool:
@@ -52,12 +65,15 @@ class NumberedBox:
             self._api.remove_by_name("/axes")
 
     def _draw(self) -> None:
-        low, high = self.corners
-        box = axes_box(low[None], high[None], camera=self._camera, focal=self._focal)
-        lines = box.lines.astype(np.float32)
+        low, high = self._box
+        camera = self._scale * self._camera
+        box = axes_box(
+            low[None], high[None], camera=camera, focal=self._focal, label=self._unit.label
+        )
+        lines = (box.lines / self._scale).astype(np.float32)
         self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
         for k, (text, at) in enumerate(box.labels):
-            add_label(self._api, f"/axes/label {k}", text, at)
+            add_label(self._api, f"/axes/label {k}", text, at / self._scale)
 
 
 def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:

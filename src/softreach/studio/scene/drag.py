@@ -83,9 +83,9 @@ class DragBall:
             ball.opacity = opacity
         halo.visible = True
 
-    def show_lag(self, wanted: Array | None, tip: Array | None, gap: float = 0.0) -> None:
-        """A line from the tip to where it is dragged to [L], and how long it is; None for none."""
-        if wanted is None or tip is None or gap == 0.0:
+    def show_lag(self, wanted: Array | None, tip: Array | None, gap: str = "") -> None:
+        """A line from the tip to where it is dragged to [L], and how long it is; "" for none."""
+        if wanted is None or tip is None or not gap:
             for node in self._lag or ():
                 node.visible = False
             return
@@ -94,7 +94,7 @@ class DragBall:
         pointer, line, label = self._lag
         pointer.position, label.position = wanted, wanted
         line.points = np.stack([tip, wanted])[None].astype(np.float32)
-        label.text = f"{gap:.3f} L short"
+        label.text = f"{gap} short"
         for node in self._lag:
             node.visible = True
 

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.requirements.findings import shown_unit
-
 if TYPE_CHECKING:
     from viser import SceneApi
 
@@ -57,7 +55,7 @@ def _draw_places(api: SceneApi, check: Check) -> None:
     places, met = check.places / length, check.reached.all(axis=0)
     worst = check.gaps.argmax(axis=0)  # of the payloads
     gaps, nearest = check.gaps[worst, rows], check.nearest[worst, rows] / length
-    unit = shown_unit(check.arm)
+    unit = check.arm.length_unit
     if met.any():
         api.add_point_cloud(
             f"{_PATH}/reached",

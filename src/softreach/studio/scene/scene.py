@@ -169,7 +169,8 @@ class Scene:
         if look.arm and not (bent or arm.drives or arm.markers):
             self._draw_shape(arm, shape, "/arm", arm.length)
         around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
-        self.axes.draw(around, shape["position"].values / arm.length, shown=look.axes)
+        straight = shape["position"].values / arm.length
+        self.axes.draw(around, straight, arm=arm, shown=look.axes)
 
     def _draw_shape(self, arm: Manipulator, shape: Any, path: str, length: float) -> Array:
         if np.isnan(shape["position"].values).any():
@@ -279,7 +280,7 @@ class Scene:
         clouds = [reach] if free is None or not look.free else [reach, free]
         around = (cloud_points(source, 14) for source in clouds)
         straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
-        self.axes.draw(*around, straight / reach.arm.length, shown=look.axes)
+        self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm, shown=look.axes)
 
     def draw_trail(self, tips: Array) -> None:
         """A line through the places where the tip has been [L], shape (n, 3)."""

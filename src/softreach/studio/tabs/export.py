@@ -99,7 +99,7 @@ class ExportPanel:
         self._address.show(markup.link(address, "This state in a new tab", _ABOUT_LINK))
 
     def _save_design(self) -> None:
-        self._send("design.toml", self._session.state.design.to_toml().encode())
+        self._send("design.toml", self._session.state.design.file_text.encode())
 
     def _save_cloud(self, suffix: str) -> None:
         self._write(f"cloud{suffix}", lambda: cloud_file(self._reach(), suffix))

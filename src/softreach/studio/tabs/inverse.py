@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
+from softreach.studio.captions import length_text, place_text
 from softreach.studio.expressions import vector_kind
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.state import MOUSE, StudioState, rod_of
-from softreach.studio.widgets import Line, TypedField, show_where
+from softreach.studio.widgets import Line, TextKind, TypedField, show_where
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
     from softreach.inverse import Solution
     from softreach.studio.session import Session
+    from softreach.support.units import LengthUnit
 
 _DRAG_HINT = (
     "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
@@ -58,9 +60,8 @@ class DragPanel:
             self._text.say(*([_DRAG_HINT] if look.handle else []))
             self._ball.show_lag(None, None)
             return
-        gap = drag.dragged.gap / arm.length
-        short = f"This branch ends {gap:.3f} L short of the pointer."
-        self._text.say(short if gap else _DRAG_HINT)
+        gap = length_text(drag.dragged.gap / arm.length, arm) if drag.dragged.gap else ""
+        self._text.say(f"This branch ends {gap} short of the pointer." if gap else _DRAG_HINT)
         self._ball.show_lag(drag.wanted, drag.dragged.tip / arm.length, gap)
 
 
@@ -73,9 +74,12 @@ class InversePanel:
         self._buttons: list[tuple[Any, Any]] = []
         with tab, gui.add_folder("reach a place"):
             self._text = Line(gui, _HINT)
-            kind = vector_kind("L", lambda: session.state.design.length)
-            hint = "Where the tip should go [L]"
-            self._target = TypedField(gui, "target / L", _straight_tip(session), hint, kind)
+            arm = session.state.design
+            self._unit = arm.length_unit
+            tip = self._unit.of(arm.base.to_world([0.0, 0.0, arm.length]))
+            label, kind = self._target_kind()
+            hint = "Where the tip should go"
+            self._target = TypedField(gui, label, tuple(tip.tolist()), hint, kind)
             self._folder = gui.add_folder("activations that reach it", visible=False)
             self._clear = self._fields.button(
                 "Clear the target",
@@ -90,6 +94,7 @@ class InversePanel:
         """List the solutions, and mark the one that the arm is in."""
         self._fields.show(session)
         show_where(session.state.target is not None, self._clear)
+        self._follow_unit(session.state.design.length_unit)
         if session.answer is not self._answer:
             self._answer = session.answer
             self._list(session.answer)
@@ -98,6 +103,17 @@ class InversePanel:
             button.color = "green" if is_here else None
             button.label = f"\N{CHECK MARK} {text}" if is_here else text
 
+    def _target_kind(self) -> tuple[str, TextKind]:
+        length = lambda: self._session.state.design.length  # noqa: E731
+        return self._unit.label("target"), vector_kind(self._unit.name, length)
+
+    def _follow_unit(self, unit: LengthUnit) -> None:
+        """The same place in the unit that the design is shown in."""
+        if unit != self._unit:
+            place = unit.of(self._unit.size * np.array(self._target.value))
+            self._unit = unit
+            self._target.rename(*self._target_kind(), tuple(place.tolist()))
+
     def _list(self, answer: Solution | None) -> None:
         for _, button in self._buttons:
             button.remove()
@@ -105,7 +121,7 @@ class InversePanel:
         self._text.say(_HINT)
         if answer is not None:
             arm = self._session.state.design
-            self._target.value = tuple((answer.target / arm.length).tolist())
+            self._target.value = tuple(self._unit.of(answer.target).tolist())
             self._text.say(_answer_text(answer, arm))
             with self._folder:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
@@ -138,8 +154,7 @@ class InversePanel:
         self._session.update(lambda state: state.replace(activation=target))
 
     def _solve_typed(self) -> None:
-        length = self._session.state.design.length
-        self._session.job(SolveInverse).aim(length * np.asarray(self._target.value))
+        self._session.job(SolveInverse).aim(self._unit.size * np.asarray(self._target.value))
 
     def _button(self, activation: Any) -> Any:
         button = self._gui.add_button(_listed(activation), hint="Moves the arm to this solution")
@@ -151,12 +166,6 @@ def _listed(activation: Any) -> str:
     return ", ".join(f"{value:.4g}" for value in activation)
 
 
-def _straight_tip(session: Session) -> tuple[float, ...]:
-    """Position of the tip of the straight arm [L]."""
-    arm = session.state.design
-    return tuple((arm.base.to_world([0.0, 0.0, arm.length]) / arm.length).tolist())
-
-
 def _is_near(activation: Any, state: StudioState) -> bool:
     scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
     return bool((np.abs(activation - state.activation) <= _NEAR * scales).all())
@@ -164,19 +173,15 @@ def _is_near(activation: Any, state: StudioState) -> bool:
 
 def _answer_text(answer: Solution, arm: Manipulator) -> str:
     """Result of a solution in words."""
-    place = _place(answer.target / arm.length)
+    place, length = place_text(answer.target / arm.length, arm), arm.length
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
-        near = _place(answer.nearest / arm.length)
-        return f"{place} is {certain}. Nearest: {near}, {answer.gap / arm.length:.4g} L away."
+        near, gap = place_text(answer.nearest / length, arm), length_text(answer.gap / length, arm)
+        return f"{place} is {certain}. Nearest: {near}, {gap} away."
     count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
     names = ", ".join(arm.input_names)
     return (
-        f"{count} {place} to {answer.residuals.max() / arm.length:.1e} L. "
+        f"{count} {place} to {length_text(answer.residuals.max() / length, arm, '.1e')}. "
         f"Press one ({names}) to move the arm there, or click its shape; the one with a check mark "
         "is where it is."
     )
-
-
-def _place(point: Any) -> str:
-    return "({:.4f}, {:.4f}, {:.4f}) L".format(*point)

@@ -10,6 +10,7 @@ import numpy as np
 from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
+from softreach.studio.captions import length_text
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.jobs.path import (
     PATH_SHAPES,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from viser import GuiApi, UploadedFile
 
+    from softreach.arm.manipulator import Manipulator
     from softreach.studio.session import Session
 
 _HINT = "The tip follows a path as far as its branch of solutions goes."
@@ -121,7 +123,7 @@ class PathPanel:
         """Show the result of following."""
         count = int((track.status == PathStatus.FOLLOWED).sum())
         arm = self._session.state.design
-        self._text.say(end_text(track, arm.length))
+        self._text.say(end_text(track, arm))
         self._walk.visible = count > 0
         if count == 0:
             return
@@ -198,24 +200,24 @@ class PathPanel:
             self._session.client.send_file_download("path.csv", content, save_immediately=True)
 
 
-def end_text(track: xr.Dataset, length: float) -> str:
+def end_text(track: xr.Dataset, arm: Manipulator) -> str:
     """End of a path that is followed, and the reason for it, in words.
 
     Args:
         track: Result of `track_path`.
-        length: L [m].
+        arm: The design.
     """
     count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
-    end, way = track.attrs["end"], float(track.end_length) / length
+    end, way = track.attrs["end"], length_text(float(track.end_length) / arm.length, arm, ".4g")
     if end == "no_start":
         return "The first point is not reached: out of reach, or not from this activation."
     followed = f"{count} of {points} points are followed"
     reasons = {
-        "": f"All {points} points are followed: {way:.4g} L of path.",
-        "fold": f"{followed}, {way:.4g} L of path: there the branch turns back (a fold).",
-        "unstable": f"{followed}, {way:.4g} L of path: there the arm loses its stability.",
+        "": f"All {points} points are followed: {way} of path.",
+        "fold": f"{followed}, {way} of path: there the branch turns back (a fold).",
+        "unstable": f"{followed}, {way} of path: there the arm loses its stability.",
         "bound": (
-            f"{followed}, {way:.4g} L of path: there {track.attrs['end_bundle']} is at its "
+            f"{followed}, {way} of path: there {track.attrs['end_bundle']} is at its "
             f"{track.attrs['end_bound']} bound."
         ),
     }

@@ -11,7 +11,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.optimization import OBJECTIVES, Candidate
 from softreach.optimization.objectives import Goal
 from softreach.requirements import Check, Finding, Requirements
-from softreach.requirements.findings import shown_unit
 from softreach.studio import markup
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.jobs.search import CheckNeeds, DrawSearch, SearchDesigns, SearchRun
@@ -178,7 +177,7 @@ class SearchPanel:
 
     @property
     def _unit(self) -> LengthUnit:
-        return shown_unit(self._session.state.design)
+        return self._session.state.design.length_unit
 
     def _explain(self) -> None:
         """Say what the field holds."""
@@ -398,5 +397,5 @@ def _table(run: SearchRun, candidate: Candidate, arm: Manipulator) -> str:
 
 
 def _value_text(goal: Goal, value: Any, arm: Manipulator) -> str:
-    unit, size = readable_unit(goal.objective.unit, abs(value.value), shown_unit(arm))
+    unit, size = readable_unit(goal.objective.unit, abs(value.value), arm.length_unit)
     return quantity(value.value / size, unit, value.error / size)

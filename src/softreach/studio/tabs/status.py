@@ -101,10 +101,10 @@ def _numbers_text(session: Session) -> list[Part]:
     if reach is None:
         return [session.refusal or work]
     hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
-    share = loaded_share(session)
+    share, unit = loaded_share(session), reach.arm.length_unit
     parts = [
         *reach_text(reach, share),
-        *([f" · α-shape {hull:.4f} L³"] if hull is not None else []),
+        *([f" · α-shape {hull / unit.scale(3):.4g} {unit.symbol(3)}"] if hull is not None else []),
     ]
     if reach.arm != session.state.design:
         parts = [Strong("of the design before: "), *parts]

@@ -28,7 +28,7 @@ _TOGGLES = {
     "free": ("reach without loads", "Faint, around that of the loaded arm"),
     "ghosts": ("other solutions", "The arm in every activation that reaches the target"),
     "trail": ("trail of the tip", "Where it has been"),
-    "axes": ("axes", "x, y and z in the world [L]"),
+    "axes": ("axes", "x, y and z in the world"),
     "lit": ("shading", "Points and surfaces are shaded as in a light"),
     "dark": ("dark page", "Light on dark"),
 }
