@@ -128,7 +128,7 @@ def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
     np.testing.assert_allclose(
         list(shares.values()), [change / most for change in changes.values()], atol=1e-3
     )
-    assert "-1.00 ± 0.01 %" in bars["taper"]  # of V for 0.07 of its 7 degrees
+    assert "\N{MINUS SIGN}1.00 ± 0.01 %" in bars["taper"]  # of V for 0.07 of its 7 degrees
     assert "∂V/∂(taper) = -0.100 ± 0.001 m³ per deg" in bars["taper"]
     assert "0.07 deg" in bars["taper"]
     assert "+1.686 ± 0.001 %" in bars["extent"]

@@ -131,7 +131,7 @@ def slope_bars(
 def _change_text(change: float, slope: Slope, volume: float, ends: float) -> str:
     error = 100 * PART * ends / volume * slope.error
     text = quantity(change, "%", max(error, _FINEST))
-    return f"+{text}" if change > 0 else text
+    return f"+{text}" if change > 0 else text.replace("-", "\N{MINUS SIGN}")
 
 
 def _meaning(
