@@ -48,6 +48,13 @@ FLASH = """
 """Notes whether a panel was seen before ours."""
 
 
+SCROLLED_UP = """
+    for (const area of document.querySelectorAll(".mantine-ScrollArea-viewport")) {
+        area.scrollTop = 0;
+    }
+"""
+
+
 class Tab:
     """One page and its session."""
 
@@ -89,6 +96,7 @@ class Tab:
         self.session.end_step()
         self.settle()
         self.open("Design")
+        self.page.evaluate(SCROLLED_UP)
 
     def close(self) -> None:
         self.settle()  # viser warns of what is drawn for a tab that is gone

@@ -78,7 +78,7 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     assert 0.7 < share < 0.85
     tab.page.get_by_text(
         f"{size_text(loaded.size, loaded.arm)} under loads, "
-        f"{100 * share:.0f} % of {free.volume:.4g} m³ without"
+        f"{100 * share:.0f} % of {1e6 * free.volume:.4g} mL without"
     ).wait_for()
     assert tab.drawn("/free")
     tab.page.get_by_text("every sample rests in a stable equilibrium").wait_for()
