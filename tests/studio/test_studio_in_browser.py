@@ -110,7 +110,7 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     tab.settle()
     assert len(tab.session.answer) == 0
     tab.page.get_by_text("out of reach").wait_for()
-    tab.page.get_by_text("L away").wait_for()
+    tab.page.get_by_text("m away").wait_for()
 
 
 def test_the_caption_of_a_saved_page_stands_below_its_scene(tab, tmp_path):
