@@ -178,9 +178,9 @@ def print_roofline(n: int) -> None:
         f"{planes:.0f} of a plane (counted for {COUNTED:,}), {work:,.0f} operations, in "
         f"{1e6 * whole:.2f} µs of one core: {1e-9 * work / whole:.1f} GFLOP/s. These tests alone, "
         f"of {CACHED} points, run at {1e-9 * work / alone:.1f} GFLOP/s: {alone / whole:.0%} of the "
-        f"time are arithmetic. Of {FEW:,} points, which caches hold, it takes {1e6 * near:.2f}: "
-        f"{max(0.0, 1 - near / whole):.0%} are waiting for memory. The rest are walks, branches "
-        "that no core foresees, and the making of cells."
+        f"time are arithmetic. Of {FEW:,} points, which caches hold, it takes {1e6 * near:.2f} µs: "
+        f"{max(0.0, 1 - near / whole):.0%} at most are waiting for memory. The rest are walks, "
+        "branches that no core foresees, and the making of cells."
     )
 
 
