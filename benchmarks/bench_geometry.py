@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +22,9 @@ import pytest
 from benchmarks.memory import peak_bytes, reset_peak
 
 ALPHA = 0.03
+COUNTED = 4_000  # points of which tests are counted, by Python
+CACHED = 64  # points that tests alone are of
+FEW = 10_000  # points whose triangulation caches hold
 
 
 def arm_cloud(n: int) -> np.ndarray:
@@ -151,6 +157,81 @@ def main(n: int = 400_000, repeat: int = 3, names: tuple[str, ...] = tuple(ROUTE
         row = f"{run['volume']:.6f} | {run['wall']:.2f} | {run['cpu']:.2f} | "
         row += f"{run['memory'] / 1e9:.2f} | {slowest / run['cpu']:.1f}"
         print(f"| {ROUTES[name][0]} | {row} |", flush=True)
+    print_roofline(n)
+
+
+def print_roofline(n: int) -> None:
+    """Print how much of the triangulation its arithmetic takes, and how much memory does."""
+    from softreach.kernels.points.bowyer_watson import triangulate
+
+    (flops, spheres), (plane_flops, planes) = tests_of_a_point()
+    work = spheres * flops + planes * plane_flops
+    whole, near = (
+        cpu_seconds(partial(triangulate, insertable(size), lambda: False)) / size
+        for size in (n, FEW)
+    )
+    rounds = np.rint(np.array([spheres, planes]) * n / CACHED).astype(int).tolist()
+    points = np.random.default_rng(0).random((CACHED, 3))
+    alone = cpu_seconds(partial(tests_alone(), points, *rounds)) / n
+    print(
+        f"\nA point that enters the triangulation takes {spheres:.0f} tests of a sphere and "
+        f"{planes:.0f} of a plane (counted for {COUNTED:,}), {work:,.0f} operations, in "
+        f"{1e6 * whole:.2f} µs of one core: {1e-9 * work / whole:.1f} GFLOP/s. These tests alone, "
+        f"of {CACHED} points, run at {1e-9 * work / alone:.1f} GFLOP/s: {alone / whole:.0%} of the "
+        f"time are arithmetic. Of {FEW:,} points, which caches hold, it takes {1e6 * near:.2f} µs: "
+        f"{max(0.0, 1 - near / whole):.0%} at most are waiting for memory. The rest are walks, "
+        "branches that no core foresees, and the making of cells."
+    )
+
+
+def insertable(n: int) -> np.ndarray:
+    """Points of a cloud as they enter a triangulation."""
+    from softreach.geometry.surface import unit_scale
+    from softreach.kernels.points.spatial_sort import insertion_order
+
+    points = unit_scale(arm_cloud(n))[0]
+    return points[insertion_order(points)]
+
+
+def tests_of_a_point() -> list[tuple[int, float]]:
+    """Operations and number of tests of spheres and planes, counted without the compiler."""
+    with tempfile.TemporaryDirectory() as folder:
+        np.save(f"{folder}/points.npy", insertable(COUNTED))
+        command = [sys.executable, "-m", "benchmarks.flops", f"{folder}/points.npy"]
+        environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+        done = subprocess.run(command, env=environment, check=True, capture_output=True)
+    found = json.loads(done.stdout)
+    return [found["insphere_filter"], found["orient_filter"]]
+
+
+def tests_alone() -> Callable[[np.ndarray, int, int], float]:
+    """A kernel of tests of spheres and planes through some points, so often of each."""
+    from softreach.kernels.compiler import strict
+    from softreach.kernels.points.predicates import insphere_filter, orient_filter
+
+    @strict
+    def tests(points, spheres, planes):
+        total, n = 0.0, len(points)
+        for k in range(spheres):
+            for i in range(n):
+                a, b, c, d = (i + k) % n, (i + 1) % n, (i + 2) % n, (i + 3) % n
+                total += insphere_filter(points, a, b, c, d, (i + 4) % n)
+        for k in range(planes):
+            for i in range(n):
+                total += orient_filter(points, (i + k) % n, (i + 1) % n, (i + 2) % n, (i + 3) % n)
+        return total
+
+    return tests
+
+
+def cpu_seconds(run: Callable[[], object]) -> float:
+    """CPU time of the faster of two runs, after one that compiles or loads [s]."""
+    times = []
+    for _ in range(3):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times[1:])
 
 
 if __name__ == "__main__":

@@ -16,8 +16,11 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from benchmarks.memory import peak_bytes, reset_peak
 from softreach.support.errors import SoftreachError
@@ -27,6 +30,7 @@ CLI = ROOT / "src" / "softreach" / "cli"
 
 _LONG = 1.0, 10.0  # seconds, warm and cold, above which a wait is explained
 _TURNS = 2
+_GROWN = 1, 4, 16  # times the least n
 _KEPT = "arm.toml", "trunk.zarr"  # what commands make for others
 
 FILES = {
@@ -86,7 +90,7 @@ class Wait(NamedTuple):
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the tables."""
     print("## What a user waits for\n")
     print("### Commands, by the example of their help\n")
     print(
@@ -103,6 +107,66 @@ def main() -> None:
     print("|---|--:|--:|--:|--:|---|")
     for line in _function_rows():
         print(line, flush=True)
+    print_growth()
+
+
+def print_growth() -> None:
+    """Print how the times of what depends on a size grow with it."""
+    print("\n### Growth with n\n")
+    print("CPU time, warm, the best of two; slope: of log time over log n, by least squares. It is")
+    print("below 1 where a part does not depend on n, as the axes of pictures.\n")
+    print(f"| what | n | {' | '.join(f'{k} n [s]' for k in _GROWN)} | slope |")
+    print("|---|--:|--:|--:|--:|--:|")
+    for name, least, made in _growths():
+        sizes = [least * k for k in _GROWN]
+        times = [_cpu(made(n)) for n in sizes]
+        slope = np.polyfit(np.log(sizes), np.log(times), 1)[0]
+        shown = " | ".join(f"{seconds:.3g}" for seconds in times)
+        print(f"| {name} | {least:,} | {shown} | {slope:.2f} |", flush=True)
+
+
+def _growths() -> Iterator[tuple[str, int, Callable[[int], Callable[[], object]]]]:
+    """What is computed, its least n, and what makes the work for any n."""
+    import softreach as sr
+    from softreach.plot.style import pyplot
+
+    arm = sr.designs.minimal_trunk()
+
+    def tips(n: int) -> np.ndarray:
+        return sr.compute_cloud(arm, n).tip.values
+
+    def drawn(n: int) -> Callable[[], object]:
+        cloud = sr.compute_cloud(arm, n)
+        return lambda: pyplot().close(sr.plot.plot_views(cloud, arm))
+
+    yield "cloud of n tips", 100_000, lambda n: partial(sr.compute_cloud, arm, n)
+    yield (
+        "α-shape of n tips, α = 3.7 n^(-1/3) L",
+        25_000,
+        lambda n: partial(sr.concave_hull, tips(n), 3.7 * n ** (-1 / 3)),
+    )
+    yield (
+        "exact set, to an error of 1/n of the volume",
+        200,
+        lambda n: partial(sr.reachable_set, arm, accuracy=1 / n),
+    )
+    yield "every branch of n targets", 1_000, lambda n: partial(sr.solve_inverse, arm, tips(n))
+    yield (
+        "activation distance of 10,000 of n tips, fixed radius",
+        50_000,
+        lambda n: partial(sr.activation_distance, sr.compute_cloud(arm, n), 1 / 60, queries=10_000),
+    )
+    yield "four views of n tips", 250_000, drawn
+
+
+def _cpu(run: Callable[[], object]) -> float:
+    """CPU seconds of the faster of two calls."""
+    times = []
+    for _ in range(2):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times)
 
 
 def _examples() -> Iterator[tuple[str, list[str]]]:

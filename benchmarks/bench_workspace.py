@@ -11,6 +11,8 @@ import math
 import time
 import warnings
 from collections.abc import Callable
+from functools import partial
+from itertools import count
 from multiprocessing import get_context
 
 import pytest
@@ -18,7 +20,9 @@ import pytest
 import softreach as sr
 from benchmarks.memory import peak_bytes, reset_peak
 from benchmarks.tasks import family_arm
+from softreach.arm.parameters import changed, parameters
 from softreach.rod.rods import tip_map
+from softreach.support.parallel import undivided
 from softreach.workspace import reachable_set
 
 ALPHA = 0.03
@@ -26,6 +30,8 @@ NARROW = (
     *(("trunk", (-0.9, -0.3)), ("trunk", (-1.6, -0.3)), ("trunk", (-5 / 3, 0.0))),
     *(("laboratory arm", (-3.0, -1.0)), ("laboratory arm", (-2.0, 0.0))),
 )
+DERIVED = (*NARROW, ("redundant trunk", None), ("six bundles", None))
+PARAMETERS = 4, 10
 MANY = (
     *(("trunk", 1e-2), ("trunk", 3e-3), ("five", 1e-2), ("five", 3e-3)),
     *(("six", 1e-2), ("six", 3e-3), ("twelve", 5e-2), ("twelve", 1e-2)),
@@ -101,10 +107,18 @@ def main(n: int = 400_000, repeat: int = 5) -> None:
     for name, (wall, volume) in results.items():
         shown = f"{volume:.5f}" if volume is not None else ""
         print(f"| {name} | {shown} | {wall:.3f} | {wall / one:.1f} | 1/{whole / wall:.1f} |")
-    print("\n| design, bounds | route | V [L³] | error | CPU [ms] | raster | 4 derivatives |")
-    print("|---|---|--:|--:|--:|--:|--:|")
+    print("\n| design, bounds | route | V [L³] | error | CPU [ms] | raster |")
+    print("|---|---|--:|--:|--:|--:|")
     for name, bounds in NARROW:
         print(route_row(name, bounds, repeat))
+    print(
+        "\nDerivatives of the volume by the first parameters of a design that is new each time, its"
+    )
+    print(f"set included: CPU time on one thread, the fastest of {repeat}.\n")
+    print("| design, bounds | route | 4 parameters [ms] | 10 parameters [ms] | wanted [ms] |")
+    print("|---|---|--:|--:|--:|")
+    for name, bounds in DERIVED:
+        print(derivatives_row(name, bounds, repeat))
     print("\n| bundles | accuracy | V [L³] | wall [s] | peak memory beyond the library's [MB] |")
     print("|--:|--:|--:|--:|--:|")
     for name, accuracy in MANY:
@@ -112,24 +126,56 @@ def main(n: int = 400_000, repeat: int = 5) -> None:
 
 
 def route_row(name: str, bounds: tuple[float, float], repeat: int) -> str:
-    """How long the route takes that is found, the raster alone, and the derivatives."""
+    """How long the route takes that is found, and the raster alone."""
     from softreach.workspace.reach import rasterized_set
 
-    arm = {"trunk": sr.designs.minimal_trunk, "laboratory arm": sr.designs.lce_arm}[name]()
-    rod = tip_map(arm.with_bounds(bounds))
+    arm = bounded_arm(name, bounds)
+    rod = tip_map(arm)
     found = reachable_set(rod)
     work: tuple[Callable[[], object], ...] = (
         lambda: reachable_set(rod),
         lambda: rasterized_set(rod, found.cells, None, 3e-3),
-        lambda: sr.volume_gradient(rod.arm, ["taper", "revolution", "lower", "upper"]),
     )
-    whole, raster, slopes = (1e3 * cpu_seconds(each, repeat) for each in work)
-    cube = arm.length**3
+    whole, raster = (1e3 * cpu_seconds(each, repeat) for each in work)
+    volume, error = (value / arm.length**3 for value in (found.volume, found.volume_error))
     return (
-        f"| {name}, {bounds[0]:g} to {bounds[1]:g} | {getattr(found, 'route', '')} "
-        f"| {found.volume / cube:.9f} | {found.volume_error / cube:.1e} "
-        f"| {whole:.0f} | {raster:.0f} | {slopes:.0f} |"
+        f"| {shown_name(name, bounds)} | {getattr(found, 'route', '')} "
+        f"| {volume:.9f} | {error:.1e} | {whole:.0f} | {raster:.0f} |"
     )
+
+
+def derivatives_row(name: str, bounds: tuple[float, float] | None, repeat: int) -> str:
+    """How long the derivatives of one design take."""
+    arm = bounded_arm(name, bounds)
+    names = [each.name for each in parameters(arm).values() if not each.whole]
+    radius = float(arm.profile.radius(0.0))
+    arms = (changed(arm, {"outer_radius": radius * (1.0 + 1e-4 * k)}) for k in count())
+    times = []
+    with undivided():
+        route = sr.volume_gradient(arm, names[:1]).route
+        for number in PARAMETERS:
+            few = names[:number]
+            times.append(
+                1e3 * cpu_seconds(lambda few=few: sr.volume_gradient(next(arms), few), repeat)
+            )
+    wanted = 100 if route == "flux" else 1000
+    return f"| {shown_name(name, bounds)} | {route} | {times[0]:.0f} | {times[1]:.0f} | {wanted} |"
+
+
+def shown_name(name: str, bounds: tuple[float, float] | None) -> str:
+    """The name of a design, and its bounds unless they are its own."""
+    return name if bounds is None else f"{name}, {bounds[0]:g} to {bounds[1]:g}"
+
+
+def bounded_arm(name: str, bounds: tuple[float, float] | None) -> sr.Manipulator:
+    """A design of the tables between bounds, or at its own."""
+    arm = {
+        "trunk": sr.designs.minimal_trunk,
+        "laboratory arm": sr.designs.lce_arm,
+        "redundant trunk": sr.designs.redundant_trunk,
+        "six bundles": partial(family_arm, "six"),
+    }[name]()
+    return arm if bounds is None else arm.with_bounds(bounds)
 
 
 def cpu_seconds(work: Callable[[], object], repeat: int) -> float:

@@ -1,13 +1,21 @@
-"""How much arithmetic our tip kernel needs, counted by running it on numbers that count themselves.
+"""How much arithmetic kernels need, counted by running them on numbers that count themselves.
 
-Run with NUMBA_DISABLE_JIT=1; prints the floating-point operations of one step of one arm.
+Run with NUMBA_DISABLE_JIT=1 and a number of bundles: prints the floating-point operations of one
+step of one arm. With a file of points instead: prints those of each test of a triangulation, and
+how many tests a point takes.
 """
 
 from __future__ import annotations
 
+import json
 import sys
-from typing import ClassVar
+from collections import Counter
+from collections.abc import Callable
+from typing import Any, ClassVar
 
+import numpy as np
+
+from softreach.kernels.points import bowyer_watson
 from softreach.kernels.rod.magnus import exponent
 from softreach.kernels.rod.twist import act
 
@@ -31,6 +39,12 @@ class Counted:
 
         return operate
 
+    def __abs__(self) -> Counted:
+        return self
+
+    def __gt__(self, other: object) -> bool:
+        return False
+
 
 Counted.__add__ = Counted.__radd__ = Counted.__sub__ = Counted.__rsub__ = Counted._binary(0)
 Counted.__mul__ = Counted.__rmul__ = Counted._binary(1)
@@ -51,5 +65,34 @@ def flops_per_step(bundles: int) -> int:
     return node_values + products + Counted.operations
 
 
+TESTS = {"insphere_filter": 5, "orient_filter": 4}
+"""Tests that a triangulation consists of, and the points of each."""
+
+
+def tests_of_triangulation(points: np.ndarray) -> dict[str, tuple[int, float]]:
+    """Operations of each test, and how many of it one of these points takes on average."""
+    calls, operations = Counter[str](), dict[str, int]()
+    for name, corners in TESTS.items():
+        test = getattr(bowyer_watson, name)
+        Counted.operations = 0
+        test(np.array([[Counted() for _ in range(3)] for _ in range(corners)]), *range(corners))
+        operations[name] = Counted.operations
+        setattr(bowyer_watson, name, _counting(calls, name, test))
+    with np.errstate(over="ignore"):  # a random number wraps around
+        bowyer_watson.triangulate(points, lambda: False)
+    return {name: (operations[name], calls[name] / len(points)) for name in TESTS}
+
+
+def _counting(calls: Counter[str], name: str, test: Callable[..., float]) -> Callable[..., float]:
+    def counted(*arguments: Any) -> float:
+        calls[name] += 1
+        return test(*arguments)
+
+    return counted
+
+
 if __name__ == "__main__":
-    print(flops_per_step(int(sys.argv[1])))
+    if sys.argv[1].isdigit():
+        print(flops_per_step(int(sys.argv[1])))
+    else:
+        print(json.dumps(tests_of_triangulation(np.load(sys.argv[1]))))

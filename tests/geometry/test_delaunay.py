@@ -13,9 +13,10 @@ from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import Delaunay, delaunay
 from softreach.geometry.hull import convex_hull
 from softreach.geometry.surface import unit_scale
+from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.expansions import scratch
 from softreach.kernels.points.predicates import insphere, orient
-from softreach.kernels.points.triangulation import FACES
+from softreach.kernels.points.triangulation import FACES, FEW
 from softreach.support.errors import InvalidInput
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import exact_insphere, exact_orient, rational
@@ -76,6 +77,19 @@ def six_hull_volumes(mesh: Delaunay) -> Fraction:
         x, y, z = (exact[v] for v in mesh.tetrahedra[t][FACES[i]])
         total += sum(x[i] * (y[i - 2] * z[i - 1] - y[i - 1] * z[i - 2]) for i in range(3))
     return total
+
+
+@pytest.mark.parametrize("walls", [FEW - 2, FEW, FEW + 2, 4 * FEW])
+def test_the_last_point_inside_a_sphere_of_points_joins_all_faces_of_their_hull(walls):
+    # n points have 2n - 4 faces, all of them walls of one cavity, however its cells are tied
+    sphere = np.random.default_rng(walls).normal(size=((walls + 4) // 2, 3))
+    points = np.vstack([sphere / np.linalg.norm(sphere, axis=1)[:, None], np.zeros(3)])
+    cells, neighbors, same = triangulate(points, lambda: False)
+    mesh = Delaunay(points=points, tetrahedra=cells, neighbors=neighbors, duplicate_of=same)
+    assert len(cells) == walls
+    assert (cells == len(points) - 1).any(axis=1).all()
+    assert_adjacency(mesh)
+    assert_delaunay(mesh)
 
 
 @pytest.mark.parametrize("points", [random_points(400), arc_tips(700)], ids=["cube", "arm"])

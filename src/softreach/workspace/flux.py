@@ -13,7 +13,6 @@ from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Index
-from softreach.workspace.grid import cube_grid
 
 _TOL = 1e-11  # in L: there are few nodes, so that steps may be short
 _ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
@@ -132,9 +131,10 @@ def gauss_faces(nodes: int) -> FaceNodes:
 
 
 def grid_faces(cells: int) -> Array:
-    """Vertices of a grid of cells^3 boxes that lie on the faces of the unit cube, each once."""
-    cube = cube_grid(cells)
-    return cube[((cube == 0.0) | (cube == 1.0)).any(axis=1)]
+    """Vertices of a grid of cells³ boxes that lie on the faces of the unit cube, each once."""
+    outside = np.ones((cells + 1,) * 3, bool)
+    outside[1:-1, 1:-1, 1:-1] = False
+    return np.argwhere(outside) / cells
 
 
 def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:

@@ -8,7 +8,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.geometry.hull import convex_hull
+from softreach.geometry.hull import convex_faces
+from softreach.geometry.surface import compact_surface, enclosed_volume
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 from softreach.workspace.crossings import Crossings
@@ -166,7 +167,7 @@ def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array
 
 
 def _hull_volume(points: Array) -> float:
-    return convex_hull(points).volume
+    return enclosed_volume(*compact_surface(points, convex_faces(points)))
 
 
 def _corners(image: Image) -> Array:

@@ -36,6 +36,8 @@ from softreach.kernels.points.triangulation import (
     GHOST,
     compact,
     corners,
+    empty_edges,
+    empty_table,
     empty_triangulation,
     enlarged,
     face,
@@ -73,18 +75,18 @@ def triangulate(points, lies_on_curve, early=0, look=None):
     crowded = CROWDED
     w, start, same = scratch(), np.zeros(4, np.int64), np.arange(len(points))
     mesh = empty_triangulation(8 * len(points) + 64)
-    table = np.empty((2, 2048), np.int64)
+    edges = empty_edges(len(points))
     at, used, free, last = 0, 0, DEAD, 0
     for stop in (early, len(points)) if 0 < early < len(points) else (len(points),):
         while True:
             at, walls, used, free, last = _insert(
-                points, mesh, start, same, table, w, at, used, free, last, crowded, stop
+                points, mesh, start, same, edges, w, at, used, free, last, crowded, stop
             )
             if at >= stop:
                 break
             if walls > 0:
                 mesh = enlarged(mesh, used, walls)
-                table = np.empty((2, max(2048, 32 * walls)), np.int64)
+                edges = edges._replace(table=empty_table(walls))
             elif lies_on_curve():
                 return mesh.cells[:0], mesh.neighbors[:0], same
             else:
@@ -95,7 +97,7 @@ def triangulate(points, lies_on_curve, early=0, look=None):
 
 
 @strict
-def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded, stop):
+def _insert(points, mesh, start, same, edges, w, at, used, free, last, crowded, stop):
     """Insert points from number `at` up to `stop` while there is room; no cells yet if `at` is 0.
 
     Memory is left to the caller: a kernel that asks for it takes longer to compile.
@@ -122,9 +124,9 @@ def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded, 
             same[p] = twin
             continue
         dug, walls = dig(points, mesh, p, cell, w)
-        if used + walls > len(mesh.mark) or 8 * walls > table.shape[1]:
+        if used + walls > len(mesh.mark) or 8 * walls > edges.table.shape[1]:
             return p, walls, used, free, last
-        used, free, last = fill(mesh, p, dug, walls, used, free, table)
+        used, free, last = fill(mesh, p, dug, walls, used, free, edges)
         made += walls
     return stop, 0, compact(mesh, used) if stop == len(points) else used, free, last
 

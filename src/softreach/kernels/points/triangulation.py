@@ -16,9 +16,12 @@ __all__ = [
     "DEAD",
     "FACES",
     "GHOST",
+    "Edges",
     "Triangulation",
     "compact",
     "corners",
+    "empty_edges",
+    "empty_table",
     "empty_triangulation",
     "enlarged",
     "face",
@@ -28,6 +31,9 @@ __all__ = [
 ]
 
 GHOST, DEAD = np.intp(-1), np.intp(-2)  # typed: a literal compiles its functions once more
+BITS = 6
+SIDE = 1 << BITS
+FEW = 2 * (SIDE - 2)  # walls of a cavity, which then has SIDE vertices at most (Euler)
 # Vertices of the face opposite vertex i, in the order that makes its normal point outwards.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
@@ -44,6 +50,27 @@ class Triangulation(NamedTuple):
     mark: np.ndarray
     dug: np.ndarray
     walls: np.ndarray
+
+
+class Edges(NamedTuple):
+    """Where the cells that fill a cavity find each other along the edges of its walls."""
+
+    number: np.ndarray
+    """p · SIDE + number of each vertex around the cavity of point p, the ghost's first."""
+    cells: np.ndarray
+    """The cell on an edge from one number to another, shape (SIDE, SIDE)."""
+    table: np.ndarray
+    """A hash table of edges, for cavities with more than FEW walls."""
+
+
+def empty_edges(points):
+    """Room for cavities among so many points."""
+    return Edges(np.full(points + 1, -1), np.empty((SIDE, SIDE), np.int32), empty_table())
+
+
+def empty_table(walls=0):
+    """Room for the edges of cavities of four times as many walls, or of 256."""
+    return np.empty((2, max(2048, 32 * walls)), np.int64)
 
 
 def empty_triangulation(size):
@@ -105,36 +132,52 @@ def ghost_slot(cells, t):
 
 @strict
 def slot_of(neighbors, u, t):
-    """Number of t among the neighbors of u."""
-    for i in range(3):
-        if neighbors[u, i] == t:
-            return i
-    return 3
+    """Number of t among the neighbors of u, without a branch, which no core would foresee."""
+    first, second, third = neighbors[u, 0] == t, neighbors[u, 1] == t, neighbors[u, 2] == t
+    return 3 - 3 * first - 2 * second - third
 
 
 @strict
-def fill(mesh, p, n_dug, n_walls, used, free, table):
+def fill(mesh, p, n_dug, n_walls, used, free, edges):
     """Join p to every wall; return slots used, the head of the freed slots, and the last cell."""
-    size = 1
-    while size < 4 * n_walls:
-        size *= 2
-    for k in range(size):
-        table[0, k] = -1
-    t = 0
+    size = cleared(edges.table, n_walls) if n_walls > FEW else 0
+    known, t = 0, 0
     for k in range(n_walls):
-        if free != DEAD:
-            t, free = free, np.intp(mesh.neighbors[free, 0])
-        else:
-            t, used = used, used + 1
-            mesh.mark[t] = -1
+        t, used, free = new_slot(mesh, used, free)
         join(mesh, mesh.walls[k] >> 2, mesh.walls[k] & 3, p, t)
-        for i in range(3):
-            link(mesh, t, i, table, size)
+        if size == 0:
+            mesh.walls[k], known = note(mesh, t, p, edges, known)
+        else:
+            for i in range(3):
+                link(mesh, t, i, edges.table, size)
+    if size == 0:
+        for k in range(n_walls):
+            tie(mesh, mesh.walls[k], edges.cells)
     for k in range(n_dug):
         t_dug = np.intp(mesh.dug[k])
         bury(mesh, t_dug, free)
         free = t_dug
     return used, free, t
+
+
+@strict
+def cleared(table, n_walls):
+    """Clear as much of a hash table as the edges of so many walls need; return how much."""
+    size = 1
+    while size < 4 * n_walls:
+        size *= 2
+    for k in range(size):
+        table[0, k] = -1
+    return size
+
+
+@strict
+def new_slot(mesh, used, free):
+    """A slot for a cell, slots used, and the head of the freed slots."""
+    if free != DEAD:
+        return free, used, np.intp(mesh.neighbors[free, 0])
+    mesh.mark[used] = -1
+    return used, used + 1, free
 
 
 @strict
@@ -156,10 +199,43 @@ def bury(mesh, t, free):
 
 
 @strict
+def note(mesh, t, p, edges, known):
+    """Enter new cell t of point p under the three edges of its wall.
+
+    Returns:
+        The cell and the numbers of its vertices in one, and how many have a number.
+    """
+    a, known = numbered(edges.number, mesh.cells[t, 0], p, known)
+    b, known = numbered(edges.number, mesh.cells[t, 1], p, known)
+    c, known = numbered(edges.number, mesh.cells[t, 2], p, known)
+    edges.cells[b, c] = edges.cells[c, a] = edges.cells[a, b] = t
+    return np.int64(t) << 3 * BITS | a << 2 * BITS | b << BITS | c, known
+
+
+@strict
+def numbered(number, v, p, known):
+    """Number of vertex v around the cavity of p, the next one if it has none."""
+    at = number[v + 1] - p * SIDE
+    if at >= 0:
+        return at, known
+    number[v + 1] = p * SIDE + known
+    return known, known + 1
+
+
+@strict
+def tie(mesh, noted, cells):
+    """Tie the faces at the edges of a wall to the cells that came to their other sides."""
+    t, last = noted >> 3 * BITS, SIDE - 1
+    a, b, c = noted >> 2 * BITS & last, noted >> BITS & last, noted & last
+    mesh.neighbors[t, 0], mesh.neighbors[t, 1] = cells[c, b], cells[a, c]
+    mesh.neighbors[t, 2] = cells[b, a]
+
+
+@strict
 def link(mesh, t, i, table, size):
     """Tie face i of new cell t to the new cell on the same edge of the cavity, once both exist.
 
-    The two walls that meet in an edge find each other in a small hash table keyed by that edge.
+    The two walls that meet in an edge find each other in a hash table keyed by that edge.
     """
     a = np.int64(mesh.cells[t, (i + 1) % 3]) + 1
     b = np.int64(mesh.cells[t, (i + 2) % 3]) + 1
