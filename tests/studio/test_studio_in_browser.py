@@ -139,7 +139,7 @@ def test_surfaces_are_drawn_and_cut(tab):
     tab.page.get_by_label("α-shape (0.05 L)").check()
     tab.wait(lambda: tab.drawn("/surface") and tab.drawn("/alpha-shape"), "both are drawn")
     tab.settle()
-    tab.page.get_by_text(f"α-shape {tab.session.reach.alpha_volume:.4f}").wait_for()
+    tab.page.get_by_text(f"α-shape {tab.session.reach.alpha_volume:.4g}").wait_for()
     cut = Slice(axis="y", center=0.0, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut))
     tab.settle()
