@@ -6,13 +6,12 @@ A workspace is one array of rows of LANES numbers, so that the compiler can prov
 from __future__ import annotations
 
 from softreach.kernels.compiler import inline, pasted
-from softreach.kernels.lanes import copy, get, get_four, put, put_four, turn_at
+from softreach.kernels.lanes import LANES, copy, get, get_four, put, put_four, turn_at
 from softreach.kernels.loaded.column_step import column_step, state_step
 from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.load_continuation import HEAD, LOAD
 from softreach.kernels.loaded.unloaded_frames import NODE_ROWS, STEP_ROWS
 from softreach.kernels.quaternion import turned
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import plus, times
 
 __all__ = [
@@ -97,10 +96,10 @@ def _drives(w, change, i):
 
 
 @pasted
-def step_state(w, scalars, used):
+def step_state(w, scalars):
     """Step the states, and keep those at the stages."""
     c = _all_constants(scalars)
-    for i in range(used):
+    for i in range(LANES):
         s, at = state_step(_nodes(w, c, i), get_four(w, STATE, i))
         put_four(w, STATE, i, s)
         put_four(w, STAGES, i, at[0])
@@ -117,8 +116,8 @@ def step_state(w, scalars, used):
 
 
 @pasted
-def _step_column(w, c, change, used):
-    for i in range(used):
+def _step_column(w, c, change):
+    for i in range(LANES):
         n, v = _nodes(w, c, i), _drives(w, change, i)
         places = (
             (n[0], get_four(w, STAGES, i), v[0]),
@@ -141,7 +140,7 @@ def _step_column(w, c, change, used):
 
 
 @inline
-def _drive(w, lanes, unloaded, bends, change, j, used):
+def _drive(w, lanes, unloaded, bends, change, j):
     """Turn of the unloaded arm over a step by an activation: δω̂ of theory (73) at its five nodes.
 
     Args:
@@ -151,10 +150,9 @@ def _drive(w, lanes, unloaded, bends, change, j, used):
         bends: U at the nodes (node, 3, bundle).
         change: dη dZ at the nodes (node,).
         j: Bundle.
-        used: Lanes that are stepped.
     """
     for n in range(5):
-        for i in range(used):
+        for i in range(LANES):
             x, y, z = 0.0, 0.0, 0.0
             for b in range(bends.shape[2]):
                 x += bends[n, 0, b] * lanes[b, i]
@@ -171,7 +169,7 @@ def _drive(w, lanes, unloaded, bends, change, j, used):
 
 
 @pasted
-def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bundles, used):
+def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bundles):
     """Step the first `count` tangents: three of rotations, `bundles` of activations, the others."""
     c = _all_constants(scalars)
     for n in range(count):
@@ -182,9 +180,9 @@ def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bu
                 (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j]),
                 (lengths[5, j], lengths[6, j], lengths[7, j], lengths[8, j], lengths[9, j]),
             )
-            _drive(w, lanes, unloaded, bends, lengths[:, j], j, used)
+            _drive(w, lanes, unloaded, bends, lengths[:, j], j)
         elif n == 0 or j == bundles:
             w[DRIVE : DRIVE + 15 * LANES] = 0.0
         copy(w, COLUMN, columns[n], 0, COLUMN_ROWS * LANES)
-        _step_column(w, c, change, used)
+        _step_column(w, c, change)
         copy(columns[n], 0, w, COLUMN, COLUMN_ROWS * LANES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline, pasted
-from softreach.kernels.lanes import copy, get, get_four, put, put_four, turn_at
+from softreach.kernels.lanes import LANES, copy, get, get_four, put, put_four, turn_at
 from softreach.kernels.loaded.frame_step import (
     COLUMN_ROWS,
     FOLLOWING,
@@ -18,7 +18,6 @@ from softreach.kernels.loaded.frame_step import (
 from softreach.kernels.loaded.load_continuation import LOAD, MARGIN, TRIAL
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS
 from softreach.kernels.quaternion import turned
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import combination, cross, dot, plus, times
 
 __all__ = ["TRACE", "adjugate_rows", "rotation", "walk"]
@@ -143,7 +142,7 @@ def _watch(w, columns, i):
 
 
 @pasted
-def walk(w, columns, count, lanes, unloaded, tables, bundles, trace, used):
+def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
     """From tip to base, with the first `count` tangents.
 
     Args:
@@ -155,7 +154,6 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace, used):
         tables: (pieces, lengths, scalars, bends, jumps).
         bundles: Columns of activations.
         trace: Filled with the sections between steps; or empty.
-        used: Lanes that are stepped; the others are idle.
     """
     _, lengths, scalars, bends, jumps = tables
     _begin(w, columns, count, 3 + bundles)
@@ -165,12 +163,12 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace, used):
         copy(w, REST, unloaded[k], 0, STEP_ROWS * LANES)
         if k == 0 and trace.shape[0] > 0:
             _keep(w, unloaded[k], STEP_ROWS * LANES, trace[:, 0])
-        step_state(w, scalars[k], used)
+        step_state(w, scalars[k])
         step_columns(
-            w, columns, count, lanes, unloaded[k], scalars[k], lengths[k], bends[k], bundles, used
+            w, columns, count, lanes, unloaded[k], scalars[k], lengths[k], bends[k], bundles
         )
         if count > 0:
-            for i in range(used):
+            for i in range(LANES):
                 _watch(w, columns, i)
         if trace.shape[0] > 0:
             _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])
