@@ -16,7 +16,7 @@ from softreach.kernels.branches.chord import by_inverse, chord_with, keep_invers
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.lanes import LANES, copy, get, load_all, put, turn_at
 from softreach.kernels.loaded.direction_walk import unit
-from softreach.kernels.loaded.frame_step import COLUMN_ROWS, PLANE, SIZE, STATE, TARGET
+from softreach.kernels.loaded.frame_step import AXIAL, COLUMN_ROWS, PLANE, SIZE, STATE, TARGET
 from softreach.kernels.loaded.frame_walk import TRACE, adjugate_rows, walk
 from softreach.kernels.loaded.load_continuation import (
     BEFORE,
@@ -40,10 +40,6 @@ from softreach.kernels.quaternion import back, turned
 from softreach.kernels.vector import cross, dot, minus, plus, times
 
 __all__ = ["TRACE", "solve"]
-
-
-AXIAL = SIZE  # whether no load turns with the world about its first axis
-WHOLE = SIZE + 1
 
 
 @inline
@@ -182,7 +178,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, ends, slopes, compli
     """
     increment, widest, _, tiny, axial = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
-    work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
+    work, w = np.zeros(REST_WORK), np.zeros(SIZE)
     w[AXIAL] = axial
     steps = max(coarse[1].shape[0], fine[1].shape[0])
     unloaded = np.zeros((steps, (STEP_ROWS + TURN_ROWS) * LANES))

@@ -6,7 +6,9 @@ import math
 
 from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.lanes import LANES, copy, get, get_four, put, put_four, turn_at
+from softreach.kernels.loaded.direction_walk import tangents
 from softreach.kernels.loaded.frame_step import (
+    AXIAL,
     COLUMN_ROWS,
     FOLLOWING,
     PLANE,
@@ -88,13 +90,40 @@ def _begin(w, columns, count, unit_at):
         put(w, FOLLOWING, i, zero)
     for n in range(count):
         columns[n, : COLUMN_ROWS * LANES] = 0.0
-        row = n if n < 3 else 9 + n - unit_at
-        if n < 3 or n >= unit_at:
+        if n >= unit_at:
+            row = 9 + n - unit_at
             columns[n, row * LANES : (row + 1) * LANES] = 1.0
     if count > 0:
         for i in range(LANES):
             w[MARGIN + i] = 1.0
+            axes = _turned_about(w, i)
+            for n in range(3):
+                put(columns[n], 0, i, axes[n])
             _put_rotations(w, columns, i)
+
+
+@inline
+def _turned_about(w, i):
+    """Axes of the rotations of the tip: any three, but G first where all loads are along it."""
+    g = get(w, TRIAL, i)
+    if w[AXIAL] > 0.0:
+        t1, t2 = tangents(g)
+        return g, t1, t2
+    return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@inline
+def _straighten(w, columns):
+    """Make the tangents of rotations those of turns about x, y, z, if they are of others."""
+    if w[AXIAL] == 0.0:
+        return
+    for i in range(LANES):
+        g, s, t = _turned_about(w, i)
+        for at in (0, 3 * LANES, 6 * LANES):
+            values = get(columns[0], at, i), get(columns[1], at, i), get(columns[2], at, i)
+            for n in range(3):
+                put(columns[n], at, i, combination((g[n], s[n], t[n]), values))
+        _put_rotations(w, columns, i)
 
 
 @inline
@@ -172,6 +201,8 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
                 _watch(w, columns, i)
         if trace.shape[0] > 0:
             _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])
+    if count > 0:
+        _straighten(w, columns)
 
 
 @inline
