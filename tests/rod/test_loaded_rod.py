@@ -247,11 +247,45 @@ def test_strains_are_how_frames_change_along_the_arm():
     np.testing.assert_allclose(dd, expected, atol=1e-6)
 
 
-def test_tips_do_not_depend_on_the_other_activations():
-    found = loaded(Loads(gravity=SIDE), 1e-6)
-    many = np.random.default_rng(1).uniform(-5 / 3, 0, (300, 3))
-    alone = np.concatenate([found.tips(many[k : k + 1]) for k in (0, 150, 299)])
-    np.testing.assert_allclose(alone, found.tips(many)[[0, 150, 299]], atol=1e-8)
+def upright():
+    """A trunk of three like fibers, of which equal ones leave it straight, as it cannot stand."""
+    fibers = [
+        TRUNK.actuators[0].replace(name=f"fiber {k}", offset=2 * math.pi * k / 3) for k in range(3)
+    ]
+    return rubber(TRUNK.replace(actuators=tuple(fibers)), Loads(gravity=UP), young=2e5)
+
+
+MANY = -5 / 3 * np.random.default_rng(1).random((100, 3))
+EQUAL = np.linspace(-5 / 3, 0.0, 20)[:, None] + np.zeros(3)
+STABLE, UNSTABLE, NONE, UNDECIDED = TipStatus
+AMONG = {
+    "along one direction": (rubber(TRUNK, KINDS["payload with a lever"]), MANY, {STABLE}),
+    "across it": (rubber(TRUNK, KINDS["tip force"]), MANY, {STABLE}),
+    "upright": (
+        upright(),
+        np.concatenate([EQUAL, EQUAL + 1e-5 * MANY[:20], MANY]),
+        {STABLE, UNSTABLE, UNDECIDED},
+    ),
+    "without an equilibrium": (
+        designs.lce_arm().replace(loads=Loads(gravity=SIDE, payload=0.01)),
+        [-1.1, -3.6, -1.3] + 0.15 * MANY,
+        {STABLE, NONE},
+    ),
+}
+
+
+@pytest.mark.parametrize(("arm", "gamma", "statuses"), AMONG.values(), ids=AMONG)
+def test_a_rod_alone_has_the_equilibrium_that_it_has_among_others(arm, gamma, statuses):
+    """To the last bit, in any place of a block: among those are rods that take longest."""
+    rod = LoadedRod(arm, 1e-6)
+    together, compliance = rod.equilibria(gamma), rod.compliance(gamma)
+    assert set(together.status) == statuses
+    each = [np.flatnonzero(together.status == status)[[0, -1]] for status in statuses]
+    for row in {5, 31, 32, *np.concatenate(each)}:
+        alone = gamma[row : row + 1]
+        for one, other in zip(rod.equilibria(alone), together.of([row]), strict=True):
+            np.testing.assert_array_equal(one, other)
+        np.testing.assert_array_equal(rod.compliance(alone), compliance[row : row + 1])
 
 
 def test_shapes_do_not_depend_on_the_blocks_they_are_found_in(monkeypatch):

@@ -1,11 +1,18 @@
-"""Rows of LANES numbers: component after component, samples side by side."""
+"""Rows of LANES numbers: component after component, rods under loads side by side."""
 
 from __future__ import annotations
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.rod.tips import LANES, load
+from softreach.kernels.rod.tips import load
 
-__all__ = ["copy", "get", "get_four", "load_all", "put", "put_four", "turn_at"]
+__all__ = ["LANES", "copy", "get", "get_four", "load_all", "put", "put_four", "turn_at"]
+
+LANES = 32
+"""Rods side by side: whole blocks only, so that a rod's result never depends on its neighbors.
+
+A block of rods under loads is searched until the last of them is found, and what one step of it
+needs should stay in the nearest cache: fewer than the tips of free rods take.
+"""
 
 
 @inline

@@ -16,7 +16,7 @@ from softreach.support.arrays import Array, Index
 
 _TOL = 1e-11  # in L: there are few nodes, so that steps may be short
 _ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
-_LOADED_RASTER_TOL = 1e-8  # both: of many breakpoints all count at 1e-9, in fifty times the steps
+_LOADED_TOL = 1e-8  # both, as always under loads: of many breakpoints all count at 1e-9
 _NODES = (8, 12, 16, 24, 32)
 _CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
 
@@ -37,9 +37,10 @@ def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0)
     Returns:
         Value and error are NaN if a node has no stable equilibrium.
     """
-    if not enough or rod.supports_unstable:
-        rough = _LOADED_RASTER_TOL if rod.supports_unstable else _ROUGH_TOL
-        rod = refined(rod, flux_tol(rod) if nodes is None else rough)
+    if rod.supports_unstable:
+        rod = refined(rod, _LOADED_TOL)
+    elif not enough:
+        rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
     counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
     flux, change = _flux(rod, counts[0]), np.inf
     for count in counts[1:]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.lanes import get, put
+from softreach.kernels.lanes import LANES, get, put
 from softreach.kernels.loaded.load_continuation import BEFORE, DONE, FOUND, INVERSE, LEFT, STEP
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import dot, minus, times
 
 __all__ = ["by_inverse", "chord_with", "keep_inverse"]
@@ -51,7 +50,7 @@ def _correct(w, i, y):
 
 
 def chord_with(missing, move):
-    """A function that takes a chord step in every lane, and counts those that are not there yet.
+    """A function that takes a chord step in every lane found, and counts those not there yet.
 
     A lane has arrived when neither the step nor what is missing at the base is longer than the
     least one [rad²]: where a load is heavy, a small turn of the tip turns the base far. It stays
@@ -78,9 +77,9 @@ def chord_with(missing, move):
     def chord_all(w, turn, least):
         waiting = 0
         for i in range(LANES):
-            if turn == 0 or w[LEFT + i] > least:
+            if w[DONE + i] == FOUND and (turn == 0 or w[LEFT + i] > least):
                 step(w, i, turn, least)
-            waiting += w[DONE + i] == FOUND and w[LEFT + i] > least
+                waiting += w[LEFT + i] > least
         return waiting
 
     return chord_all

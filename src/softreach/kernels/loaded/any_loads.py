@@ -14,9 +14,9 @@ import numpy as np
 
 from softreach.kernels.branches.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.lanes import copy, get, load_all, put, turn_at
+from softreach.kernels.lanes import LANES, copy, get, load_all, put, turn_at
 from softreach.kernels.loaded.direction_walk import unit
-from softreach.kernels.loaded.frame_step import COLUMN_ROWS, PLANE, SIZE, STATE, TARGET
+from softreach.kernels.loaded.frame_step import AXIAL, COLUMN_ROWS, PLANE, SIZE, STATE, TARGET
 from softreach.kernels.loaded.frame_walk import TRACE, adjugate_rows, walk
 from softreach.kernels.loaded.load_continuation import (
     BEFORE,
@@ -30,7 +30,6 @@ from softreach.kernels.loaded.load_continuation import (
     PAST,
     STEP,
     TRIAL,
-    UNSURE,
     advance_with,
     start,
 )
@@ -38,15 +37,9 @@ from softreach.kernels.loaded.tip_response import corrected_tip, respond
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, TURN_ROWS, rest_frames
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.quaternion import back, turned
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import cross, dot, minus, plus, times
 
 __all__ = ["TRACE", "solve"]
-
-
-AXIAL = SIZE  # whether no load turns with the world about its first axis
-WHOLE = SIZE + 1
-_TOGETHER = 32  # a block of fewer rods steps whole groups of so many lanes, for vectors and bits
 
 
 @inline
@@ -185,7 +178,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, ends, slopes, compli
     """
     increment, widest, _, tiny, axial = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
-    work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
+    work, w = np.zeros(REST_WORK), np.zeros(SIZE)
     w[AXIAL] = axial
     steps = max(coarse[1].shape[0], fine[1].shape[0])
     unloaded = np.zeros((steps, (STEP_ROWS + TURN_ROWS) * LANES))
@@ -194,7 +187,6 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, ends, slopes, compli
     columns = np.zeros((3 + bundles + units, COLUMN_ROWS * LANES))
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
-        used = min(LANES, -(-count // _TOGETHER) * _TOGETHER)
         load_all(lanes, gamma, first, count)
         walks, turn, tables, tangents = 0, -1, coarse, columns.shape[0]
         while True:
@@ -203,9 +195,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, ends, slopes, compli
                 _aim(w, work, axes)
             if walks == 0:
                 _set_out(w, work, guesses, first, count, increment, widest)
-                for i in range(used, LANES):
-                    w[DONE + i] = UNSURE
-            walk(w, columns, tangents, lanes, unloaded, tables, bundles, trace[first:], used)
+            walk(w, columns, tangents, lanes, unloaded, tables, bundles, trace[first:])
             walks += 1
             waiting = _improve(w, turn, limits)
             turn += turn >= 0

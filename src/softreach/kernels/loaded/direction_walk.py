@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline, pasted
-from softreach.kernels.lanes import get, put
+from softreach.kernels.lanes import LANES, get, put
 from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.load_continuation import HEAD, LOAD, MARGIN, TRIAL
 from softreach.kernels.loaded.step import tangent_step, tip_step
 from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import cross, dot, minus, times
 
 __all__ = ["PLANE", "SIZE", "A", "B", "X", "Y", "tangents", "unit", "walk_tangents", "walk_tip"]

@@ -6,16 +6,16 @@ A workspace is one array of rows of LANES numbers, so that the compiler can prov
 from __future__ import annotations
 
 from softreach.kernels.compiler import inline, pasted
-from softreach.kernels.lanes import copy, get, get_four, put, put_four, turn_at
+from softreach.kernels.lanes import LANES, copy, get, get_four, put, put_four, turn_at
 from softreach.kernels.loaded.column_step import column_step, state_step
 from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.load_continuation import HEAD, LOAD
 from softreach.kernels.loaded.unloaded_frames import NODE_ROWS, STEP_ROWS
 from softreach.kernels.quaternion import turned
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import plus, times
 
 __all__ = [
+    "AXIAL",
     "COLUMN_ROWS",
     "FOLLOWING",
     "PLANE",
@@ -33,10 +33,14 @@ FOLLOWING = HEAD + 12 * LANES  # the force that follows the tip, along G, H, K
 TARGET = HEAD + 15 * LANES  # G, H that the base must see
 PLANE = HEAD + 21 * LANES  # rotations by the first three columns, along G, H, K
 DRIVE = HEAD + 30 * LANES  # turn of the unloaded arm per unit of an activation at five nodes
-COLUMN = HEAD + 45 * LANES  # the tangent in hand
-REST = HEAD + 57 * LANES  # the unloaded arm at the nodes of a step
+BEND = HEAD + 45 * LANES  # Uγ at five nodes
+COLUMN = HEAD + 60 * LANES  # the tangent in hand
+REST = HEAD + 72 * LANES  # the unloaded arm at the nodes of a step
 STAGES = REST + STEP_ROWS * LANES  # states at the stages of a step
-SIZE = STAGES + 132 * LANES
+AXIAL = (
+    STAGES + 132 * LANES
+)  # one number: whether no load turns with the world about its first axis
+SIZE = AXIAL + 1
 COLUMN_ROWS = 12
 """Rows of a tangent: θ, δM, δy, and the change of force u."""
 
@@ -97,10 +101,10 @@ def _drives(w, change, i):
 
 
 @pasted
-def step_state(w, scalars, used):
+def step_state(w, scalars):
     """Step the states, and keep those at the stages."""
     c = _all_constants(scalars)
-    for i in range(used):
+    for i in range(LANES):
         s, at = state_step(_nodes(w, c, i), get_four(w, STATE, i))
         put_four(w, STATE, i, s)
         put_four(w, STAGES, i, at[0])
@@ -117,8 +121,8 @@ def step_state(w, scalars, used):
 
 
 @pasted
-def _step_column(w, c, change, used):
-    for i in range(used):
+def _step_column(w, c, change):
+    for i in range(LANES):
         n, v = _nodes(w, c, i), _drives(w, change, i)
         places = (
             (n[0], get_four(w, STAGES, i), v[0]),
@@ -141,40 +145,48 @@ def _step_column(w, c, change, used):
 
 
 @inline
-def _drive(w, lanes, unloaded, bends, change, j, used):
+def _bend(w, lanes, bends):
+    """Put Uγ at the nodes of a step into BEND; U at the nodes is (node, 3, bundle)."""
+    w[BEND : BEND + 15 * LANES] = 0.0
+    for n in range(5):
+        at = BEND + 3 * n * LANES
+        for b in range(bends.shape[2]):
+            u = bends[n, 0, b], bends[n, 1, b], bends[n, 2, b]
+            for i in range(LANES):
+                put(w, at, i, plus(get(w, at, i), times(lanes[b, i], u)))
+
+
+@inline
+def _drive(w, unloaded, bends, change, j):
     """Turn of the unloaded arm over a step by an activation: δω̂ of theory (73) at its five nodes.
 
     Args:
         w: Workspace.
-        lanes: Activations.
         unloaded: Unloaded arm at the nodes.
         bends: U at the nodes (node, 3, bundle).
         change: dη dZ at the nodes (node,).
         j: Bundle.
-        used: Lanes that are stepped.
     """
     for n in range(5):
-        for i in range(used):
-            x, y, z = 0.0, 0.0, 0.0
-            for b in range(bends.shape[2]):
-                x += bends[n, 0, b] * lanes[b, i]
-                y += bends[n, 1, b] * lanes[b, i]
-                z += bends[n, 2, b] * lanes[b, i]
-            length, c = unloaded[NODE_ROWS * n * LANES + i], change[n]
-            bend = (
-                c * x + length * bends[n, 0, j],
-                c * y + length * bends[n, 1, j],
-                c * z + length * bends[n, 2, j],
-            )
+        c, u = change[n], (bends[n, 0, j], bends[n, 1, j], bends[n, 2, j])
+        for i in range(LANES):
+            length, (x, y, z) = unloaded[NODE_ROWS * n * LANES + i], get(w, BEND + 3 * n * LANES, i)
+            bend = c * x + length * u[0], c * y + length * u[1], c * z + length * u[2]
             q = turn_at(unloaded, (STEP_ROWS + 4 * n) * LANES, i)
             put(w, DRIVE + 3 * n * LANES, i, turned(q, bend))
 
 
 @pasted
-def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bundles, used):
-    """Step the first `count` tangents: three of rotations, `bundles` of activations, the others."""
+def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bundles):
+    """Step the first `count` tangents: three of rotations, `bundles` of activations, the others.
+
+    Under axial loads the first rotation is about G itself, and stays so: its tangent is G.
+    """
     c = _all_constants(scalars)
-    for n in range(count):
+    if bundles > 0:
+        _bend(w, lanes, bends)
+    first = 1 if w[AXIAL] > 0.0 else 0
+    for n in range(first, count):
         j, none = n - 3, (0.0, 0.0, 0.0, 0.0, 0.0)
         change = (none, none)
         if 0 <= j < bundles:
@@ -182,9 +194,11 @@ def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bu
                 (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j]),
                 (lengths[5, j], lengths[6, j], lengths[7, j], lengths[8, j], lengths[9, j]),
             )
-            _drive(w, lanes, unloaded, bends, lengths[:, j], j, used)
-        elif n == 0 or j == bundles:
+            _drive(w, unloaded, bends, lengths[:, j], j)
+        elif n == first or j == bundles:
             w[DRIVE : DRIVE + 15 * LANES] = 0.0
         copy(w, COLUMN, columns[n], 0, COLUMN_ROWS * LANES)
-        _step_column(w, c, change, used)
+        _step_column(w, c, change)
         copy(columns[n], 0, w, COLUMN, COLUMN_ROWS * LANES)
+    if 0 < first < count:
+        copy(columns[0], 0, w, STATE, 3 * LANES)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline, pasted
-from softreach.kernels.lanes import copy, get, get_four, put, put_four, turn_at
+from softreach.kernels.lanes import LANES, copy, get, get_four, put, put_four, turn_at
+from softreach.kernels.loaded.direction_walk import tangents
 from softreach.kernels.loaded.frame_step import (
+    AXIAL,
     COLUMN_ROWS,
     FOLLOWING,
     PLANE,
@@ -18,7 +20,6 @@ from softreach.kernels.loaded.frame_step import (
 from softreach.kernels.loaded.load_continuation import LOAD, MARGIN, TRIAL
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS
 from softreach.kernels.quaternion import turned
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import combination, cross, dot, plus, times
 
 __all__ = ["TRACE", "adjugate_rows", "rotation", "walk"]
@@ -89,13 +90,40 @@ def _begin(w, columns, count, unit_at):
         put(w, FOLLOWING, i, zero)
     for n in range(count):
         columns[n, : COLUMN_ROWS * LANES] = 0.0
-        row = n if n < 3 else 9 + n - unit_at
-        if n < 3 or n >= unit_at:
+        if n >= unit_at:
+            row = 9 + n - unit_at
             columns[n, row * LANES : (row + 1) * LANES] = 1.0
     if count > 0:
         for i in range(LANES):
             w[MARGIN + i] = 1.0
+            axes = _turned_about(w, i)
+            for n in range(3):
+                put(columns[n], 0, i, axes[n])
             _put_rotations(w, columns, i)
+
+
+@inline
+def _turned_about(w, i):
+    """Axes of the rotations of the tip: any three, but G first where all loads are along it."""
+    g = get(w, TRIAL, i)
+    if w[AXIAL] > 0.0:
+        t1, t2 = tangents(g)
+        return g, t1, t2
+    return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@inline
+def _straighten(w, columns):
+    """Make the tangents of rotations those of turns about x, y, z, if they are of others."""
+    if w[AXIAL] == 0.0:
+        return
+    for i in range(LANES):
+        g, s, t = _turned_about(w, i)
+        for at in (0, 3 * LANES, 6 * LANES):
+            values = get(columns[0], at, i), get(columns[1], at, i), get(columns[2], at, i)
+            for n in range(3):
+                put(columns[n], at, i, combination((g[n], s[n], t[n]), values))
+        _put_rotations(w, columns, i)
 
 
 @inline
@@ -143,7 +171,7 @@ def _watch(w, columns, i):
 
 
 @pasted
-def walk(w, columns, count, lanes, unloaded, tables, bundles, trace, used):
+def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
     """From tip to base, with the first `count` tangents.
 
     Args:
@@ -155,7 +183,6 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace, used):
         tables: (pieces, lengths, scalars, bends, jumps).
         bundles: Columns of activations.
         trace: Filled with the sections between steps; or empty.
-        used: Lanes that are stepped; the others are idle.
     """
     _, lengths, scalars, bends, jumps = tables
     _begin(w, columns, count, 3 + bundles)
@@ -165,15 +192,17 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace, used):
         copy(w, REST, unloaded[k], 0, STEP_ROWS * LANES)
         if k == 0 and trace.shape[0] > 0:
             _keep(w, unloaded[k], STEP_ROWS * LANES, trace[:, 0])
-        step_state(w, scalars[k], used)
+        step_state(w, scalars[k])
         step_columns(
-            w, columns, count, lanes, unloaded[k], scalars[k], lengths[k], bends[k], bundles, used
+            w, columns, count, lanes, unloaded[k], scalars[k], lengths[k], bends[k], bundles
         )
         if count > 0:
-            for i in range(used):
+            for i in range(LANES):
                 _watch(w, columns, i)
         if trace.shape[0] > 0:
             _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])
+    if count > 0:
+        _straighten(w, columns)
 
 
 @inline

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.lanes import copy, get
-from softreach.kernels.rod.tips import LANES
+from softreach.kernels.lanes import LANES, copy, get
 from softreach.kernels.vector import dot
 
 __all__ = [
@@ -26,7 +25,6 @@ __all__ = [
     "PAST",
     "STEP",
     "TRIAL",
-    "UNSURE",
     "advance_with",
     "start",
 ]

@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.kernels.branches.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.lanes import get, load_all, put, turn_at
+from softreach.kernels.lanes import LANES, get, load_all, put, turn_at
 from softreach.kernels.loaded.direction_walk import (
     SIZE,
     A,
@@ -44,7 +44,6 @@ from softreach.kernels.loaded.load_continuation import (
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, rest_frames
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.quaternion import back, turned
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import combination, cross, dot, minus, plus, times
 
 __all__ = ["base_directions", "solve"]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from softreach.kernels.branches.chord import by_inverse
 from softreach.kernels.compiler import inline
-from softreach.kernels.lanes import get, turn_at
+from softreach.kernels.lanes import LANES, get, turn_at
 from softreach.kernels.loaded.frame_step import STATE
 from softreach.kernels.loaded.frame_walk import rotation
 from softreach.kernels.loaded.load_continuation import STEP, TRIAL
 from softreach.kernels.loaded.unloaded_frames import TURN
 from softreach.kernels.quaternion import back, turned
-from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import combination, cross, dot, plus, times
 
 __all__ = ["corrected_tip", "respond"]

@@ -13,8 +13,8 @@ import math
 import numpy as np
 
 from softreach.kernels.compiler import inline, pasted
+from softreach.kernels.lanes import LANES
 from softreach.kernels.loaded.explicit_rk8 import NODES
-from softreach.kernels.rod.tips import LANES, TIP, node_values, nodes_at
 from softreach.kernels.vector import cross
 
 __all__ = ["NODE_ROWS", "STEP_ROWS", "TURN", "TURN_ROWS", "WORK", "pack_lengths", "rest_frames"]
@@ -27,8 +27,9 @@ NODE_ROWS = 5
 STEP_ROWS = NODE_ROWS * len(NODES)
 # Where asked for, the turn so far at each node follows, as quaternions.
 TURN_ROWS = 4 * len(NODES)
-# The workspace: node values of a piece between nodes, then the turn so far as a quaternion.
-TURN = TIP
+# The workspace: η dZ, u1, u2, u3 of the Gauss nodes of a piece between nodes, base first, then the
+# turn so far as a quaternion.
+TURN = 12 * LANES
 WORK = TURN + 4 * LANES
 
 
@@ -60,14 +61,15 @@ def rest_frames(work, lanes, pieces, lengths, steps):
         work[TURN + 3 * LANES + i] = 0.0
     for k in range(steps.shape[0]):
         for node in range(5):
-            at = NODE_ROWS * node * LANES
-            _fill_lengths(steps[k, at:], lanes, lengths[k, node])
-            _fill_lengths(steps[k, at + 4 * LANES :], lanes, lengths[k, 5 + node])
+            at = steps[k, NODE_ROWS * node * LANES :]
+            _fill_lengths(at, lanes, lengths[k, node], lengths[k, 5 + node])
         _fill_tangents(steps[k], work)
         if steps.shape[1] > STEP_ROWS * LANES:
             _keep_turn(steps[k, STEP_ROWS * LANES :], work)
         for piece in range(4):
-            node_values(work, lanes, pieces, 4 * k + piece)
+            for node in range(3):
+                at = work[4 * node * LANES :]
+                _fill_bends(at, lanes, pieces[4 * k + piece, 4 * node :])
             _turn(work)
             _fill_tangents(steps[k, NODE_ROWS * (piece + 1) * LANES :], work)
             if steps.shape[1] > STEP_ROWS * LANES:
@@ -81,15 +83,65 @@ def _keep_turn(values, work):
 
 
 @inline
-def _fill_lengths(values, lanes, weights):
-    constant = weights[-1]
+def _four(weights, j):
+    return weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
+
+
+@inline
+def _activations(lanes, j, i):
+    return lanes[j, i], lanes[j + 1, i], lanes[j + 2, i], lanes[j + 3, i]
+
+
+@inline
+def _of_four(weights, g):
+    return (weights[0] * g[0] + weights[1] * g[1]) + (weights[2] * g[2] + weights[3] * g[3])
+
+
+@inline
+def _fill_lengths(values, lanes, growth, length):
+    """η dZ and ζ̂ dZ of one node, into the first row and the fifth."""
+    a, b, p, q = growth[-1], length[-1], _four(growth, 0), _four(length, 0)
     for i in range(LANES):
-        values[i] = constant
-    for j in range(0, lanes.shape[0], 4):
-        a, b, c, d = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
-        g0, g1, g2, g3 = lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3]
+        g = _activations(lanes, 0, i)
+        values[i], values[4 * LANES + i] = a + _of_four(p, g), b + _of_four(q, g)
+    for j in range(4, lanes.shape[0], 4):
+        p, q = _four(growth, j), _four(length, j)
         for i in range(LANES):
-            values[i] += (a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
+            g = _activations(lanes, j, i)
+            values[i] += _of_four(p, g)
+            values[4 * LANES + i] += _of_four(q, g)
+
+
+@inline
+def _fill_bends(values, lanes, table):
+    """η dZ, u1, u2, u3 of one Gauss node."""
+    p, q, r, s = _four(table[0], 0), _four(table[1], 0), _four(table[2], 0), _four(table[3], 0)
+    a, b, c, d = table[0, -1], table[1, -1], table[2, -1], table[3, -1]
+    for i in range(LANES):
+        g = _activations(lanes, 0, i)
+        values[i] = a + _of_four(p, g)
+        values[LANES + i] = b + _of_four(q, g)
+        values[2 * LANES + i] = c + _of_four(r, g)
+        values[3 * LANES + i] = d + _of_four(s, g)
+    for j in range(4, lanes.shape[0], 4):
+        p, q, r, s = _four(table[0], j), _four(table[1], j), _four(table[2], j), _four(table[3], j)
+        for i in range(LANES):
+            g = _activations(lanes, j, i)
+            values[i] += _of_four(p, g)
+            values[LANES + i] += _of_four(q, g)
+            values[2 * LANES + i] += _of_four(r, g)
+            values[3 * LANES + i] += _of_four(s, g)
+
+
+@inline
+def _bend(work, at, i):
+    """η u dZ at one Gauss node."""
+    growth = work[at + i]
+    return (
+        growth * work[at + LANES + i],
+        growth * work[at + 2 * LANES + i],
+        growth * work[at + 3 * LANES + i],
+    )
 
 
 @inline
@@ -106,8 +158,8 @@ def _fill_tangents(values, work):
 def _turn(work):
     """Multiply the turn of every lane by that of one piece, q exp(-Ω/2)."""
     for i in range(LANES):
-        base, middle, tip = nodes_at(work, i)
-        h = _half_exponent(base[:3], middle[:3], tip[:3])
+        base, middle, tip = _bend(work, 0, i), _bend(work, 4 * LANES, i), _bend(work, 8 * LANES, i)
+        h = _half_exponent(base, middle, tip)
         t = h[0] * h[0] + h[1] * h[1] + h[2] * h[2]
         c, s = _cosine(t), -_sine(t)
         x, y, z = s * h[0], s * h[1], s * h[2]

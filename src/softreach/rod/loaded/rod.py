@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.loads import Loads
 from softreach.arm.tables import tables
-from softreach.kernels.rod.tips import LANES
+from softreach.kernels.lanes import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod, linear_strains, per_length
 from softreach.rod.loaded.phase import check_phase

@@ -105,10 +105,13 @@ def base_directions(
 
 def with_across(directions: Array) -> Array:
     """Directions (n, 3) with some unit vector normal to each: frames for `shoot`, (n, 6)."""
-    other = np.eye(3)[np.abs(directions).argmin(axis=1)]
-    across = np.cross(directions, other)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return np.concatenate([directions, across], axis=1)
+    rows, least = np.arange(len(directions)), np.abs(directions).argmin(axis=1)
+    i, j = (least + 1) % 3, (least + 2) % 3
+    a, b = directions[rows, i], directions[rows, j]
+    size = np.sqrt(a * a + b * b)
+    frames = np.zeros((len(directions), 6))
+    frames[:, :3], frames[rows, 3 + i], frames[rows, 3 + j] = directions, b / size, -a / size
+    return frames
 
 
 def _columns(gamma: Array) -> Array:

@@ -251,9 +251,13 @@ class Solver:
 
     def _near(self, gamma: Array, known: Equilibria, table: StepTables, **outputs: bool) -> Walked:
         """The last walk again, from known equilibria, with whatever more is asked for."""
-        frames = with_across(known.frame) if self.tables.one_direction else known.frame
+        lost, frame = ~has_tip(known.status), known.frame
+        if lost.any():  # none waits for what is not there: a known one is walked in its place
+            rows = np.where(lost, lost.argmin(), np.arange(len(gamma)))
+            gamma, frame = gamma[rows], frame[rows]
+        frames = with_across(frame) if self.tables.one_direction else frame
         walked = self._walk(gamma, frames, table, NEAR, **outputs)
-        lost = ~has_tip(known.status) | (walked.shots.state != _FOUND)
+        lost |= walked.shots.state != _FOUND
         for values in (walked.shots.tips, walked.slopes, walked.compliance):
             if len(values):
                 values[lost] = np.nan
