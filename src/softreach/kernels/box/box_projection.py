@@ -44,18 +44,19 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):  # noq
     side = np.zeros(center.shape[1], np.int8)
     for n in range(center.shape[0]):
         y = multiplier[n, 0], multiplier[n, 1], multiplier[n, 2]
-        known = y[0] != 0.0 or y[1] != 0.0 or y[2] != 0.0
-        guessed = not known
+        guessed, sure, near = y[0] == 0.0 and y[1] == 0.0 and y[2] == 0.0, False, True
         if guessed:
-            y = _unbounded(problems, n)
-        best, error, gram, _ = dual(problems, n, y, out, side)
-        for _ in range(_MOST_ITERATIONS):
+            y, sure = _unbounded(problems, n)
+            side[:] = 0
+        best, error, gram, changed = dual(problems, n, y, out, side)
+        within = sure and not changed  # all bounds
+        for _ in range(0 if within else _MOST_ITERATIONS):
             step, ascent, sure = newton(gram, error)
             rises = ascent > _CONVERGED * (max(best, 0.0) + 1e-30)
-            if not rises and not known:
+            if not rises and not near:
                 break
-            # Newton's last step from afar ends far below the tolerance.
-            known = known and rises
+            # Newton's last step from afar ends far below the tolerance, where it may begin.
+            near = near and rises
             before, y = y, moved(y, 1.0, step)
             value, slope_there, gram_there, changed = dual(problems, n, y, out, side)
             if rises and value < best + 0.1 * ascent:
@@ -77,7 +78,7 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):  # noq
 
 @inline
 def _unbounded(problems, n):
-    """Where the dual function would be largest without bounds."""
+    """Where the dual function would be largest without bounds, and whether that is sure."""
     center, slope, wanted, softness, _, _ = problems
     e0, e1, e2, s = -wanted[n, 0], -wanted[n, 1], -wanted[n, 2], softness[n]
     g00, g10, g11, g20, g21, g22 = s, 0.0, s, 0.0, 0.0, s
@@ -92,7 +93,8 @@ def _unbounded(problems, n):
         g20 += a * c
         g21 += b * c
         g22 += c * c
-    return newton((g00, g10, g11, g20, g21, g22), (e0, e1, e2))[0]
+    step, _, sure = newton((g00, g10, g11, g20, g21, g22), (e0, e1, e2))
+    return step, sure
 
 
 @inline
