@@ -191,9 +191,10 @@ def _carry(column, begin, scratch, table, k, j):
     for lane in range(_TOGETHER):
         i = begin + lane
         point = column[i], column[LANES + i], column[2 * LANES + i]
-        column[i] = _coordinate(scratch, 0, lane, point, bends)
-        column[LANES + i] = _coordinate(scratch, 1, lane, point, bends)
-        column[2 * LANES + i] = _coordinate(scratch, 2, lane, point, bends)
+        x, y, z = _TURN + lane, _TURN + 3 * _TOGETHER + lane, _TURN + 6 * _TOGETHER + lane
+        column[i] = _coordinate(scratch, x, lane, point, bends)
+        column[LANES + i] = _coordinate(scratch, y, _AXIS + lane, point, bends)
+        column[2 * LANES + i] = _coordinate(scratch, z, 2 * _AXIS + lane, point, bends)
 
 
 @inline
@@ -212,10 +213,8 @@ def _stretch(column, begin, scratch, table, k, j):
 
 
 @inline
-def _coordinate(scratch, axis, lane, point, t):
+def _coordinate(scratch, turn, base, point, t):
     """A row of R with the derivative of the point, and the sum over a column of the table."""
-    turn = _TURN + 3 * axis * _TOGETHER + lane
-    base = axis * _AXIS + lane
     middle, tip = base + 4 * _TOGETHER, base + 8 * _TOGETHER
     return (
         scratch[turn] * point[0]
