@@ -61,3 +61,14 @@ def test_the_projection_is_the_nearest_point_that_scipy_finds():
         )
         assert nearest.success
         np.testing.assert_allclose(point, nearest.x, atol=1e-6)
+
+
+@pytest.mark.parametrize("bundles", [4, 12])
+def test_the_projection_does_not_depend_on_where_it_begins(bundles):
+    # From nothing known, and from multipliers that are nearly right.
+    given = problems(bundles, 5000, softness=1e-6)
+    point, multiplier = projected(*given)
+    nearly = multiplier * (1.0 + 1e-7 * np.random.default_rng(0).normal(size=multiplier.shape))
+    again = np.empty_like(point)
+    project(*given, again, nearly)
+    np.testing.assert_allclose(again, point, atol=1e-10 * (1 + np.abs(multiplier).max()))

@@ -14,7 +14,7 @@ from softreach import kernels
 from softreach.kernels.parts import KernelDispatcher
 
 ROD = {"tips._tips"}
-SLOPES = ROD | {"jacobian._jacobians"}
+SLOPES = ROD | {"slopes._slopes"}
 HULL = {
     "spatial_sort._sort_keys",
     "bowyer_watson._insert",

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
@@ -248,12 +247,9 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     """The activation to stay near to, and seeds near the target that change little."""
     owners = [np.arange(len(request.targets))]
     starts = [prepared.rod.box.clip(request.near)]
-    marks = prepared.seeds, prepared.face_seeds
     # Moved ones lie in the right basin where the seeds are dense, the others where they are few.
-    for moves, seeds in product((True, False), marks):
-        owner, start = seeds.near(
-            request.targets, request.near, _CANDIDATES, _STARTS, _APART, moves=moves
-        )
+    for seeds in (prepared.seeds, prepared.face_seeds):
+        owner, start = seeds.near(request.targets, request.near, _CANDIDATES, _STARTS, _APART)
         owners.append(owner)
         starts.append(start)
     return np.concatenate(owners), np.concatenate(starts)

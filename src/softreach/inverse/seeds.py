@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.kernels.branches.spread import choose_apart, choose_in_bins
+from softreach.kernels.branches.spread import MOST_IN_BINS, choose_apart, choose_in_bins
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.sampling import sample_cube
 from softreach.support import parallel
@@ -29,8 +29,7 @@ _SEED = 0
 _CANDIDATES = 24
 _STARTS = 3
 _IN_BIN, _BINS = 4, 512  # seeds in a bin, roughly, and the most bins along an axis
-_MOST_IN_BINS = 1024  # seeds that are looked at for one target
-_BLOCK = 1024
+_BLOCK = 256
 _DAMPING = 1e-5  # of a Gram matrix, part of its trace
 _APART = 0.15  # of the ranges: two starts lead to different minima
 
@@ -59,66 +58,68 @@ class Seeds:
         return KDTree(self.tip)
 
     @lazy
-    def _bins(self) -> tuple[tuple[np.ndarray, ...], Index, _Grid]:
+    def _bins(self) -> tuple[np.ndarray, Index, _Grid]:
         """Seeds bin by bin of their tips, the first row of each bin, and the bins."""
         corner, extent = self.tip.min(axis=0), np.ptp(self.tip, axis=0)
         extent = np.maximum(extent, 1e-3 * extent.max() + 1e-300)
         width = float(np.cbrt(extent.prod() * _IN_BIN / len(self.tip)))
         width = max(width, float(extent.max()) / _BINS)
         nx, ny, nz = (int(n) for n in extent // width + 1)
-        x, y, z = ((self.tip - corner) // width).astype(np.int64).T
-        bins = (x * ny + y) * nz + z
-        first = np.zeros(nx * ny * nz + 1, np.int64)
-        first[1:] = np.bincount(bins, minlength=nx * ny * nz).cumsum()
+        place = (self.tip - corner) / width
+        bins, count = _bins_of(place, (nx, ny, nz)), nx * ny * nz
+        first = np.zeros(count + 1, np.int64)
+        first[1:] = np.bincount(bins, minlength=count).cumsum()
         order = bins.argsort(kind="stable")
-        exact = self._coarse.tips_and_slopes(self.gamma[order])[1] * self.scales
-        slope = exact.astype(np.float32)
-        gram = np.einsum("nij,nkj->nik", slope, slope, dtype=float)
+        gamma, place = self.gamma[order], place[order]
+        slope = self._coarse.tips_and_slopes(gamma)[1] * (self.scales / width)
+        gram = np.einsum("nij,nkj->nik", slope, slope)
         size = np.trace(gram, axis1=1, axis2=2)[:, None, None]
         # Slack tendons move no tip, so that nothing is moved to a target there.
         inverse = np.linalg.inv(gram + np.where(size == 0.0, 1.0, _DAMPING * size) * np.eye(3))
-        sorted_seeds = self.gamma[order], self.tip[order], slope, inverse
-        return sorted_seeds, first, (corner, width, (nx, ny, nz))
+        half = inverse[:, *np.tril_indices(3)]
+        columns = np.concatenate([gamma, place, slope.reshape(len(gamma), -1), half], axis=1)
+        return columns.astype(np.float32), first, (corner, width, (nx, ny, nz))
 
     def near(
-        self,
-        targets: Array,
-        near: Array,
-        count: int,
-        most: int,
-        least_distance: float,
-        *,
-        moves: bool,
+        self, targets: Array, near: Array, count: int, most: int, least_distance: float
     ) -> tuple[Index, Array]:
         """Seeds with tips near each target, those nearest to an activation, that lie apart.
+
+        Chosen twice: after each is moved to where its linearized tip meets the target, and as they
+        are.
 
         Args:
             targets: Shape (t, 3) [m].
             near: An activation for each target, shape (t, m).
             count: Seeds to look at, at least.
-            most: Largest number for one target.
-            least_distance: Between any two, in ranges.
-            moves: True to move each to where its linearized tip meets the target, before they are
-                compared.
+            most: Largest number for one target, of either kind.
+            least_distance: Between any two of one kind, in ranges.
 
         Returns:
             Number of the target and activation of each start, sorted by target.
         """
-        seeds, first, grid = self._bins
-        targets, near = targets.copy(), near.copy()  # kernels are compiled for no read-only ones
-        starts = np.empty((len(targets), most, near.shape[1]))
+        seeds, first, (corner, width, shape) = self._bins
+        places, m = (targets - corner) / width, near.shape[1]
+        # Targets that follow each other look at the same seeds.
+        order = _bins_of(places, shape).argsort(kind="stable")
+        places, near = places[order], near[order]
+        starts = np.empty((len(targets), 2, most, m))
         limits = self._coarse.box
         box = limits.low.copy(), limits.high.copy(), limits.scales.copy()
 
         def task(block: slice) -> None:
-            of_seeds = np.empty(_MOST_IN_BINS), np.empty(_MOST_IN_BINS, np.int64)
-            room = *of_seeds, np.empty(near.shape[1])
-            wanted = near[block], box, count, least_distance, moves
-            choose_in_bins(seeds, first, grid, targets[block], *wanted, room, starts[block])
+            keys = np.empty((2, MOST_IN_BINS))
+            # Longer than a power of two, as columns would share places in the cache.
+            ends = np.empty((2, m, MOST_IN_BINS + 8))
+            numbers = (keys, keys.view(np.int64)), np.empty(MOST_IN_BINS)
+            room = np.empty(MOST_IN_BINS, np.int64), ends, *numbers
+            wanted = near[block], box, count, least_distance, room
+            choose_in_bins(seeds, first, shape, places[block], *wanted, starts[block])
 
         parallel.run(partial(task, block) for block in parallel.blocks(len(targets), _BLOCK))
-        owner, slot = np.nonzero(~np.isnan(starts[:, :, 0]))
-        return owner, starts[owner, slot]
+        starts[order] = starts.copy()
+        owner, kind, slot = np.nonzero(~np.isnan(starts[..., 0]))
+        return owner, starts[owner, kind, slot]
 
     def nearest(self, targets: Array, count: int = _CANDIDATES) -> Array:
         """Activations whose tips are nearest to each target, nearest first, (t, count, m)."""
@@ -142,6 +143,13 @@ class Seeds:
         chosen = np.zeros(candidates.shape[:2], bool)
         choose_apart(candidates, self.scales, most, least_distance, chosen)
         return np.nonzero(chosen)[0], candidates[chosen]
+
+
+def _bins_of(places: Array, shape: tuple[int, int, int]) -> Index:
+    """Number of the bin of each place (n, 3) in widths, or of the bin nearest to it."""
+    _, ny, nz = shape
+    bins = np.clip(places, 0.0, np.array(shape) - 1.0).astype(np.int64)
+    return bins @ np.array([ny * nz, nz, 1])
 
 
 def seeds(rod: TipMap, coarse: TipMap) -> Seeds:

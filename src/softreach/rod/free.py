@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.tables import Tables, ends_over, tables
 from softreach.kernels.rod import frames, jacobian
+from softreach.kernels.rod import slopes as derivatives
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.arm_rod import ArmRod
@@ -81,13 +82,14 @@ class FreeRod(ArmRod):
         directions: Array | None = None,
     ) -> None:
         """Put tips, and what else is asked for, into place: theory (25) and (31)."""
-        derivatives = slopes if twists is None else twists
-        if derivatives is None:
-            rod.tips(self._table, gamma, tips)
+        if twists is not None:
+            jacobian.jacobians(self._table, gamma, tips, twists)
+            if slopes is not None:
+                position_slopes(tips, twists, slopes)
+        elif slopes is not None:
+            derivatives.slopes(self._table, gamma, tips, slopes)
         else:
-            jacobian.jacobians(self._table, gamma, tips, derivatives)
-        if slopes is not None and twists is not None:
-            position_slopes(tips, twists, slopes)
+            rod.tips(self._table, gamma, tips)
         if status is not None:
             status[:] = TipStatus.STABLE
         if directions is not None:

@@ -2,8 +2,10 @@
 
 min ½ |x - c|² + |A x - b|²/(2 s) for low <= x <= high has the dual unknown y of three numbers only,
 however many variables there are: x = clip(c - Aᵀy) with A x - b = s y. The dual function is
-concave and piecewise quadratic; Newton's method with a line search maximizes it. Where hardly a
-variable is between its bounds, Newton's step is as long as 1/s: the search along it is exact.
+concave and piecewise quadratic; Newton's method with a line search maximizes it, from where the
+maximum would be without bounds, and ends with a step inside one piece. Where hardly a variable is
+between its bounds, Newton's step is as long as 1/s: it begins at 0, and the search along it is
+exact.
 """
 
 from __future__ import annotations
@@ -14,12 +16,13 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["climbs", "dual", "newton", "project"]
+__all__ = ["climbs", "dual", "moved", "newton", "project", "softened"]
 
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-13  # of the largest terms
 _SHORTEST_NEWTON = 0.2  # part of a step below which its best part is looked for
 _MOST_BRACKETS = 100
+_SURE = 1e-8  # pivot of a Gram matrix, part of its trace, from which Newton's step is exact
 _FLAT = 0.1  # part of the slope at the start of a step at which its end is good enough
 
 
@@ -37,62 +40,97 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):  # noq
         out: x, shape (n, m).
         multiplier: y to begin with, 0 where nothing is known, and then y, shape (n, 3).
     """
-    y, error, step, trial = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    gram = np.zeros((3, 3))
+    problems = center, slope, wanted, softness, low, high
+    side = np.zeros(center.shape[1], np.int8)
     for n in range(center.shape[0]):
-        known = False
-        for i in range(3):
-            y[i] = multiplier[n, i]
-            known = known or y[i] != 0.0
-        best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
-        for _ in range(_MOST_ITERATIONS):
-            ascent = newton(gram, error, step)
-            ends = center, slope, wanted, softness, low, high, n, y, step, trial
-            if not ascent > _CONVERGED * (abs(best) + 1e-30):
-                if not known:
+        y = multiplier[n, 0], multiplier[n, 1], multiplier[n, 2]
+        guessed, sure, near = y[0] == 0.0 and y[1] == 0.0 and y[2] == 0.0, False, True
+        if guessed:
+            y, sure = _unbounded(problems, n)
+            side[:] = 0
+        best, error, gram, changed = dual(problems, n, y, out, side)
+        within = sure and not changed  # all bounds
+        for _ in range(0 if within else _MOST_ITERATIONS):
+            step, ascent, sure = newton(gram, error)
+            rises = ascent > _CONVERGED * (max(best, 0.0) + 1e-30)
+            if not rises and not near:
+                break
+            # Newton's last step from afar ends far below the tolerance, where it may begin.
+            near = near and rises
+            before, y = y, moved(y, 1.0, step)
+            value, slope_there, gram_there, changed = dual(problems, n, y, out, side)
+            if rises and value < best + 0.1 * ascent:
+                size = climbs(problems, n, before, step, best, ascent, 0.5, _SHORTEST_NEWTON)
+                if size == 0.0 and guessed:
+                    y, guessed = (0.0, 0.0, 0.0), False
+                else:
+                    if size == 0.0:
+                        size = _top(problems, n, before, step, error, ascent)
+                    y = moved(before, size, step)
+                value, slope_there, gram_there, _ = dual(problems, n, y, out, side)
+                if y[0] == before[0] and y[1] == before[1] and y[2] == before[2]:
                     break
-                # Newton's last step from afar ends far below the tolerance.
-                known = False
-                for i in range(3):
-                    trial[i] = y[i] + step[i]
-            elif not climbs(ends, best, ascent, _SHORTEST_NEWTON):
-                # As arguments: arrays in a tuple that is unpacked elsewhere too are counted.
-                moves = _tops(center, slope, softness, low, high, n, y, step, trial, error, ascent)
-                if not moves:
-                    break
-            y[:] = trial
-            best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
-        for i in range(3):
-            multiplier[n, i] = y[i]
+            elif sure and not changed:
+                break  # where the maximum of this piece of the dual function is
+            best, error, gram = value, slope_there, gram_there
+        multiplier[n, 0], multiplier[n, 1], multiplier[n, 2] = y
 
 
 @inline
-def climbs(ends, best, ascent, shortest):
-    """Shorten a step until the dual function grows as it should; whether it does in time."""
-    center, slope, wanted, softness, low, high, n, y, step, trial = ends
-    size = 1.0
+def _unbounded(problems, n):
+    """Where the dual function would be largest without bounds, and whether that is sure."""
+    center, slope, wanted, softness, _, _ = problems
+    e0, e1, e2, s = -wanted[n, 0], -wanted[n, 1], -wanted[n, 2], softness[n]
+    g00, g10, g11, g20, g21, g22 = s, 0.0, s, 0.0, 0.0, s
+    for j in range(center.shape[1]):
+        a, b, c, x = slope[n, 0, j], slope[n, 1, j], slope[n, 2, j], center[n, j]
+        e0 += a * x
+        e1 += b * x
+        e2 += c * x
+        g00 += a * a
+        g10 += a * b
+        g11 += b * b
+        g20 += a * c
+        g21 += b * c
+        g22 += c * c
+    step, _, sure = newton((g00, g10, g11, g20, g21, g22), (e0, e1, e2))
+    return step, sure
+
+
+@inline
+def moved(y, size, step):
+    """y + size · step."""
+    return y[0] + size * step[0], y[1] + size * step[1], y[2] + size * step[2]
+
+
+@inline
+def climbs(problems, n, y, step, best, ascent, size, shortest):
+    """The part of a step, from `size` down, by which the dual function grows as it should.
+
+    0 if that is `shortest` at most.
+    """
     while size > shortest:
-        for i in range(3):
-            trial[i] = y[i] + size * step[i]
-        value = _value(center, slope, wanted, softness, low, high, n, trial)
+        value = _value(problems, n, moved(y, size, step))
         if value >= best + 0.1 * size * ascent:
-            return True
+            return size
         size *= 0.5
-    return False
+    return 0.0
 
 
 @inline
-def _tops(center, slope, softness, low, high, n, y, step, trial, error, ascent):
-    """Write the best end on the way of a step; False if that is where it begins.
+def _top(problems, n, y, step, error, ascent):
+    """The part of a step at whose end the dual function is largest.
 
     Along it the slope of the dual function falls piecewise linearly: Newton's method from either
     side of its zero, kept between the two.
     """
+    center, slope, _, softness, low, high = problems
     square = step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
     constant = error[0] * step[0] + error[1] * step[1] + error[2] * step[2]
     for j in range(center.shape[1]):
         along = _along(slope, n, j, step)
-        constant -= along * _clipped(center, slope, low, high, n, j, y)
+        x = min(max(center[n, j] - _along(slope, n, j, y), low[n, j]), high[n, j])
+        constant -= along * x
     first, last, size, before = 0.0, 1.0, 0.5, 1e300
     for _ in range(_MOST_BRACKETS):
         rise, fall = constant - size * softness[n] * square, softness[n] * square
@@ -114,11 +152,7 @@ def _tops(center, slope, softness, low, high, n, y, step, trial, error, ascent):
         if abs(ahead - size) <= 1e-15 * size:
             break
         size = ahead
-    moved = False
-    for i in range(3):
-        trial[i] = y[i] + size * step[i]
-        moved = moved or trial[i] != y[i]
-    return moved
+    return size
 
 
 @inline
@@ -127,67 +161,91 @@ def _along(slope, n, j, y):
 
 
 @inline
-def _clipped(center, slope, low, high, n, j, y):
-    x = center[n, j] - slope[n, 0, j] * y[0] - slope[n, 1, j] * y[1] - slope[n, 2, j] * y[2]
-    return min(max(x, low[n, j]), high[n, j])
-
-
-@inline
-def _value(center, slope, wanted, softness, low, high, n, y):
+def _value(problems, n, y):
     """The dual function."""
-    value = 0.0
-    for i in range(3):
-        value -= y[i] * wanted[n, i] + 0.5 * softness[n] * y[i] * y[i]
+    center, slope, wanted, softness, low, high = problems
+    value = _quadratic(wanted, softness, n, y)
     for j in range(center.shape[1]):
-        x = _clipped(center, slope, low, high, n, j, y)
+        along = _along(slope, n, j, y)
+        x = min(max(center[n, j] - along, low[n, j]), high[n, j])
         change = x - center[n, j]
-        along = slope[n, 0, j] * y[0] + slope[n, 1, j] * y[1] + slope[n, 2, j] * y[2]
         value += 0.5 * change * change + along * x
     return value
 
 
 @inline
-def dual(center, slope, wanted, softness, low, high, n, y, out, error, gram):
-    """The dual function with its gradient, minus its Hessian, and x."""
-    value = 0.0
-    for i in range(3):
-        value -= y[i] * wanted[n, i] + 0.5 * softness[n] * y[i] * y[i]
-        error[i] = -wanted[n, i] - softness[n] * y[i]
-        for k in range(3):
-            gram[i, k] = softness[n] if i == k else 0.0
-    for j in range(center.shape[1]):
-        a, b, c = slope[n, 0, j], slope[n, 1, j], slope[n, 2, j]
-        unbounded = center[n, j] - a * y[0] - b * y[1] - c * y[2]
-        x = min(max(unbounded, low[n, j]), high[n, j])
-        out[n, j] = x
-        change = x - center[n, j]
-        value += 0.5 * change * change + (a * y[0] + b * y[1] + c * y[2]) * x
-        error[0] += a * x
-        error[1] += b * x
-        error[2] += c * x
-        if low[n, j] <= unbounded <= high[n, j]:  # at rest on a bound a variable may leave it
-            gram[0, 0] += a * a
-            gram[1, 0] += a * b
-            gram[1, 1] += b * b
-            gram[2, 0] += a * c
-            gram[2, 1] += b * c
-            gram[2, 2] += c * c
-    return value
+def _quadratic(wanted, softness, n, y):
+    """What all pieces of the dual function share."""
+    square = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
+    return -(
+        y[0] * wanted[n, 0] + y[1] * wanted[n, 1] + y[2] * wanted[n, 2] + 0.5 * softness[n] * square
+    )
 
 
 @inline
-def newton(gram, error, step):
-    """Solve for the step by Cholesky; return its slope of ascent."""
-    l00 = math.sqrt(gram[0, 0])
-    l10, l20 = gram[1, 0] / l00, gram[2, 0] / l00
-    least = 1e-15 * (gram[0, 0] + gram[1, 1] + gram[2, 2])
-    l11 = math.sqrt(max(gram[1, 1] - l10 * l10, least))
-    l21 = (gram[2, 1] - l20 * l10) / l11
-    l22 = math.sqrt(max(gram[2, 2] - l20 * l20 - l21 * l21, least))
-    z0 = error[0] / l00
-    z1 = (error[1] - l10 * z0) / l11
-    z2 = (error[2] - l20 * z0 - l21 * z1) / l22
-    step[2] = z2 / l22
-    step[1] = (z1 - l21 * step[2]) / l11
-    step[0] = (z0 - l10 * step[1] - l20 * step[2]) / l00
-    return z0 * z0 + z1 * z1 + z2 * z2
+def dual(problems, n, y, out, side):
+    """The dual function, its gradient and minus its Hessian at y; x is written.
+
+    Returns:
+        Value; gradient; the lower half of minus the Hessian, row by row; and whether a variable is
+        at another side of the box than `side` says: -1 at the lower one, 1 at the upper one, 0
+        between them; it is written too.
+    """
+    center, slope, wanted, softness, low, high = problems
+    value, changed, s = _quadratic(wanted, softness, n, y), False, softness[n]
+    e0, e1, e2 = -wanted[n, 0] - s * y[0], -wanted[n, 1] - s * y[1], -wanted[n, 2] - s * y[2]
+    g00, g10, g11, g20, g21, g22 = s, 0.0, s, 0.0, 0.0, s
+    for j in range(center.shape[1]):
+        a, b, c = slope[n, 0, j], slope[n, 1, j], slope[n, 2, j]
+        along = a * y[0] + b * y[1] + c * y[2]
+        unbounded = center[n, j] - along
+        x = min(max(unbounded, low[n, j]), high[n, j])
+        out[n, j] = x
+        change = x - center[n, j]
+        value += 0.5 * change * change + along * x
+        e0 += a * x
+        e1 += b * x
+        e2 += c * x
+        at = (unbounded > high[n, j]) - (unbounded < low[n, j])
+        changed |= at != side[j]
+        side[j] = at
+        # A branch would be taken at random. At rest on a bound too a variable may leave it.
+        free = 1.0 if at == 0 else 0.0
+        u, v, w = free * a, free * b, free * c
+        g00 += u * a
+        g10 += u * b
+        g11 += v * b
+        g20 += u * c
+        g21 += v * c
+        g22 += w * c
+    return value, (e0, e1, e2), (g00, g10, g11, g20, g21, g22), changed
+
+
+@inline
+def softened(gram, more):
+    """Minus the Hessian with a larger softness."""
+    g00, g10, g11, g20, g21, g22 = gram
+    return g00 + more, g10, g11 + more, g20, g21, g22 + more
+
+
+@inline
+def newton(gram, error):
+    """The step, by Cholesky without roots, and the slope of the dual function along it."""
+    g00, g10, g11, g20, g21, g22 = gram
+    size = g00 + g11 + g22
+    least = 1e-15 * size
+    i0 = 1.0 / g00
+    l10, l20 = g10 * i0, g20 * i0
+    d1 = max(g11 - l10 * g10, least)
+    i1 = 1.0 / d1
+    rest = g21 - l20 * g10
+    l21 = rest * i1
+    d2 = max(g22 - l20 * g20 - l21 * rest, least)
+    i2 = 1.0 / d2
+    z0 = error[0]
+    z1 = error[1] - l10 * z0
+    z2 = error[2] - l20 * z0 - l21 * z1
+    ascent = z0 * z0 * i0 + z1 * z1 * i1 + z2 * z2 * i2
+    z2 *= i2
+    z1 = z1 * i1 - l21 * z2
+    return (z0 * i0 - l10 * z1 - l20 * z2, z1, z2), ascent, min(g00, d1, d2) > _SURE * size

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from softreach.kernels.box.box_projection import climbs, dual, newton
+from softreach.kernels.box.box_projection import climbs, dual, moved, newton, softened
 from softreach.kernels.compiler import inline, kernel
 
 __all__ = ["change_bounds"]
@@ -36,27 +36,32 @@ def change_bounds(center, slope, wanted, error, low, high, enough, out):
         enough: Bounds at which a search ends, shape (n,).
         out: Result, shape (n,).
     """
-    y, miss, step, trial = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    gram, x = np.zeros((3, 3)), np.empty_like(center)
+    x, side = np.empty_like(center), np.zeros(center.shape[1], np.int8)
     softness = np.empty(center.shape[0])
+    problems = center, slope, wanted, softness, low, high
     for n in range(center.shape[0]):
         goal, most = 0.5 * enough[n] ** 2, 0.0
         softness[n] = error[n] / _usual_size(center, slope, low, high, n)
-        y[:] = 0.0
+        y = 0.0, 0.0, 0.0
         for _ in range(_MOST_ITERATIONS):
-            best = dual(center, slope, wanted, softness, low, high, n, y, x, miss, gram)
+            best, miss, gram, _ = dual(problems, n, y, x, side)
             size = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
             most = max(most, best + 0.5 * softness[n] * size * size - error[n] * size)
             if most >= goal or _meets(center, x, n, miss, softness, y, error, goal):
                 break
-            best += _soften(
-                softness, n, error[n] / size if size > 0.0 else softness[n], y, miss, gram
-            )
-            ascent = newton(gram, miss, step)
-            ends = center, slope, wanted, softness, low, high, n, y, step, trial
-            if not ascent > _CONVERGED * goal or not climbs(ends, best, ascent, _SHORTEST):
+            # The softness changes, and with it what depends on it.
+            now = error[n] / size if size > 0.0 else softness[n]
+            less = softness[n] - now
+            softness[n] = now
+            best += 0.5 * less * size * size
+            miss = moved(miss, less, y)
+            step, ascent, _ = newton(softened(gram, -less), miss)
+            if not ascent > _CONVERGED * goal:
                 break
-            y[:] = trial
+            size = climbs(problems, n, y, step, best, ascent, 1.0, _SHORTEST)
+            if size == 0.0:
+                break
+            y = moved(y, size, step)
         out[n] = math.sqrt(2.0 * most)
 
 
@@ -80,14 +85,3 @@ def _meets(center, x, n, miss, softness, y, error, goal):
     for j in range(center.shape[1]):
         change += (x[n, j] - center[n, j]) ** 2
     return square <= error[n] ** 2 and 0.5 * change < goal
-
-
-@inline
-def _soften(softness, n, now, y, miss, gram):
-    """Change the softness with what depends on it; how much the dual function grows by that."""
-    less = softness[n] - now
-    softness[n] = now
-    for i in range(3):
-        miss[i] += less * y[i]
-        gram[i, i] -= less
-    return 0.5 * less * (y[0] * y[0] + y[1] * y[1] + y[2] * y[2])

@@ -6,11 +6,14 @@ import math
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["choose_apart", "choose_in_bins"]
+__all__ = ["MOST_IN_BINS", "choose_apart", "choose_in_bins"]
 
+MOST_IN_BINS = 1024
+"""Seeds that are looked at for one target, a power of two."""
 _MET = 0.1  # part of the squared way to a target that may be left
 _LONG = 0.4  # step, in ranges, of which the linear map says little
 _FAR = 1e6
+_GONE = (1 << 63) - 1  # key of what counts no more
 
 
 @kernel
@@ -41,122 +44,142 @@ def choose_apart(points, scales, most, least_distance, chosen):
 
 
 @kernel
-def choose_in_bins(  # noqa: C901
-    seeds, first, grid, targets, near, box, wanted, least_distance, moves, room, starts
-):
+def choose_in_bins(seeds, first, shape, targets, near, box, wanted, least_distance, room, starts):
     """Choose starts from seeds with tips near each target: those nearest to an activation.
 
-    Looks at the bin of the target and its neighbors, in ever wider shells until there are enough.
+    Looks at the bin of the target and its neighbors, in ever wider shells until there are enough,
+    and chooses twice: from seeds moved to where their linearized tip meets the target, as far as
+    the bounds allow, where those that come there without a long way are before those that do not;
+    and from seeds as they are.
 
     Args:
-        seeds: Bin by bin: activations (n, m), tips [m] (n, 3), slopes in ranges [m] (n, 3, m) and
-            the inverses of their Gram matrices (n, 3, 3).
+        seeds: Bin by bin, in columns: activation, tip, slopes in ranges by axis, and the lower half
+            of the inverse of their Gram matrix, shape (n, 4 m + 9). Lengths are in widths of a bin,
+            from the corner of the first.
         first: The first row of each bin, and n, shape (bins + 1,).
-        grid: Corner of the first bin [m], shape (3,); width of the bins [m]; their numbers along x,
-            y and z.
-        targets: Shape (t, 3) [m].
+        shape: Numbers of bins along x, y and z.
+        targets: In widths, shape (t, 3).
         near: Activations to which the chosen are nearest, shape (t, m).
         box: Lower and upper bounds and ranges, shape (m,) each.
         wanted: Seeds to look at, at least.
         least_distance: The largest component of the distance between two chosen is to exceed it.
-        moves: Whether each seed is moved to where its linearized tip meets the target, as far as
-            the bounds allow; those that come there without a long way are before those that do not.
-        room: Scratch for keys and rows of seeds, shape (most,) each, and an activation; of more
-            seeds, some are left out.
-        starts: Chosen activations, NaN for none, shape (t, chosen, m).
+        room: Scratch for rows, shape (most,), of which some are left out if there are more; for
+            activations, those moved first, shape (2, m, most); for their keys, shape (2, most), as
+            numbers and as the integers that are ordered as these; for distances, shape (most,).
+        starts: Chosen activations, those moved first, NaN for none, shape (t, 2, chosen, m).
     """
-    corner, width, (nx, ny, nz) = grid
-    scales = box[2]
-    keys, heap, moved = room
-    widest = max(nx, ny, nz)
+    rows, ends, (keys, ordered), away = room
     for t in range(targets.shape[0]):
-        x = int(min(max((targets[t, 0] - corner[0]) / width, 0.0), nx - 1.0))
-        y = int(min(max((targets[t, 1] - corner[1]) / width, 0.0), ny - 1.0))
-        z = int(min(max((targets[t, 2] - corner[2]) / width, 0.0), nz - 1.0))
-        reach, total = 0, 0
-        while reach == 0 or (total < wanted and reach < widest):
-            reach, total = reach + 1, 0
-            for i in range(max(x - reach, 0), min(x + reach + 1, nx)):
-                for j in range(max(y - reach, 0), min(y + reach + 1, ny)):
-                    line = (i * ny + j) * nz
-                    below, above = max(z - reach, 0), min(z + reach + 1, nz)
-                    total += first[line + above] - first[line + below]
-        stride, skip, count = 1 + total // len(keys), 0, 0
+        count = _looked_at(first, shape, targets[t], wanted, rows)
+        for i in range(count):
+            _moved(seeds[rows[i]], i, targets[t], near[t], box, ends, keys)
+        for kind in range(2):
+            _choose(ordered[kind], ends[kind], count, box[2], least_distance, away, starts[t, kind])
+
+
+@inline
+def _looked_at(first, shape, target, wanted, rows):
+    """Write the rows of the seeds in bins around a target, or of some of them; their number."""
+    nx, ny, nz = shape
+    x = int(min(max(target[0], 0.0), nx - 1.0))
+    y = int(min(max(target[1], 0.0), ny - 1.0))
+    z = int(min(max(target[2], 0.0), nz - 1.0))
+    reach, total, widest = 0, 0, max(nx, ny, nz)
+    while reach == 0 or (total < wanted and reach < widest):
+        reach, total = reach + 1, 0
         for i in range(max(x - reach, 0), min(x + reach + 1, nx)):
             for j in range(max(y - reach, 0), min(y + reach + 1, ny)):
                 line = (i * ny + j) * nz
                 below, above = max(z - reach, 0), min(z + reach + 1, nz)
-                for row in range(first[line + below], first[line + above]):
-                    skip += 1
-                    if skip < stride:
-                        continue
-                    skip = 0
-                    keys[count] = _moved(seeds, row, targets, near, t, box, moves, moved)
-                    heap[count] = row
-                    count += 1
-        for start in range(count // 2 - 1, -1, -1):
-            _sift(keys, heap, start, count)
-        chosen = 0
-        starts[t] = math.nan
-        while count > 0 and chosen < starts.shape[1]:
-            row, apart = heap[0], True
-            count -= 1
-            keys[0], heap[0] = keys[count], heap[count]
-            _sift(keys, heap, 0, count)
-            _moved(seeds, row, targets, near, t, box, moves, moved)
-            for slot in range(chosen):
-                if apart:
-                    distance = 0.0
-                    for k in range(len(moved)):
-                        distance = max(distance, abs(moved[k] - starts[t, slot, k]) / scales[k])
-                    apart = distance > least_distance
-            if apart:
-                starts[t, chosen] = moved
-                chosen += 1
+                total += first[line + above] - first[line + below]
+    stride, count = 1 + total // len(rows), 0
+    ahead = stride - 1  # rows to pass by
+    for i in range(max(x - reach, 0), min(x + reach + 1, nx)):
+        for j in range(max(y - reach, 0), min(y + reach + 1, ny)):
+            line = (i * ny + j) * nz
+            row = first[line + max(z - reach, 0)] + ahead
+            last = first[line + min(z + reach + 1, nz)]
+            while row < last:
+                rows[count] = row
+                count += 1
+                row += stride
+            ahead = row - last
+    return count
 
 
 @inline
-def _moved(seeds, row, targets, near, t, box, moves, moved):
-    """Move a seed if it `moves`; what it is to be sorted by."""
-    gamma, tips, slopes, inverses = seeds
+def _choose(keys, ends, count, scales, least_distance, away, starts):
+    """Choose the ends of least keys that lie apart; keys of those that do not are lost."""
+    for i in range(count):
+        keys[i] = keys[i] & ~(MOST_IN_BINS - 1) | i
+    starts[:] = math.nan
+    chosen = 0
+    while chosen < starts.shape[0]:
+        least = _GONE
+        for i in range(count):
+            least = min(least, keys[i])
+        if least == _GONE:
+            return
+        best = least & (MOST_IN_BINS - 1)
+        keys[best] = _GONE
+        beside = _beside(ends, best, scales, least_distance, starts, chosen)
+        if beside < chosen:
+            _pass_by(keys, ends, count, scales, least_distance, away, starts[beside])
+        else:
+            for k in range(len(scales)):
+                starts[chosen, k] = ends[k, best]
+            chosen += 1
+
+
+@inline
+def _beside(ends, i, scales, least_distance, starts, chosen):
+    """The first of those chosen from which an end does not lie apart; `chosen` if from all."""
+    for slot in range(chosen):
+        distance = 0.0
+        for k in range(len(scales)):
+            distance = max(distance, abs(ends[k, i] - starts[slot, k]) / scales[k])
+        if distance <= least_distance:
+            return slot
+    return chosen
+
+
+@inline
+def _pass_by(keys, ends, count, scales, least_distance, away, start):
+    """Lose the keys of all that lie near to a start: where one does, many do."""
+    for i in range(count):
+        away[i] = 0.0
+    for k in range(len(scales)):
+        at, scale = start[k], 1.0 / scales[k]
+        for i in range(count):
+            away[i] = max(away[i], abs(ends[k, i] - at) * scale)
+    for i in range(count):
+        keys[i] = keys[i] if away[i] > least_distance else _GONE
+
+
+@inline
+def _moved(seed, i, target, near, box, ends, keys):
+    """Write a seed, moved and as it is, to column i, and what they are to be sorted by."""
     low, high, scales = box
-    x, y, z = (
-        targets[t, 0] - tips[row, 0],
-        targets[t, 1] - tips[row, 1],
-        targets[t, 2] - tips[row, 2],
-    )
+    m = len(near)
+    tip, slope, inverse = seed[m : m + 3], seed[m + 3 : 4 * m + 3], seed[4 * m + 3 :]
+    x, y, z = target[0] - tip[0], target[1] - tip[1], target[2] - tip[2]
     square = x * x + y * y + z * z
-    a = inverses[row, 0, 0] * x + inverses[row, 0, 1] * y + inverses[row, 0, 2] * z
-    b = inverses[row, 1, 0] * x + inverses[row, 1, 1] * y + inverses[row, 1, 2] * z
-    c = inverses[row, 2, 0] * x + inverses[row, 2, 1] * y + inverses[row, 2, 2] * z
-    key, step = 0.0, 0.0
-    for k in range(gamma.shape[1]):
-        u, v, w = slopes[row, 0, k], slopes[row, 1, k], slopes[row, 2, k]
-        at = gamma[row, k]
-        end = min(max(at + scales[k] * (u * a + v * b + w * c), low[k]), high[k]) if moves else at
+    a = inverse[0] * x + inverse[1] * y + inverse[3] * z
+    b = inverse[1] * x + inverse[2] * y + inverse[4] * z
+    c = inverse[3] * x + inverse[4] * y + inverse[5] * z
+    key, plain, step = 0.0, 0.0, 0.0
+    for k in range(m):
+        u, v, w = slope[k], slope[m + k], slope[2 * m + k]
+        at = min(max(float(seed[k]), low[k]), high[k])  # rounded
+        end = min(max(at + scales[k] * (u * a + v * b + w * c), low[k]), high[k])
         way = (end - at) / scales[k]
         x -= u * way
         y -= v * way
         z -= w * way
         step = max(step, abs(way))
-        moved[k] = end
-        key += (end - near[t, k]) ** 2
+        ends[0, k, i], ends[1, k, i] = end, at
+        key += (end - near[k]) ** 2
+        plain += (at - near[k]) ** 2
     left = x * x + y * y + z * z
-    return key + (_FAR if moves and (left > _MET * square or step > _LONG) else 0.0)
-
-
-@inline
-def _sift(keys, heap, start, count):
-    """Let an entry of a heap of the least sink to its place."""
-    at = start
-    while True:
-        child = 2 * at + 1
-        if child >= count:
-            return
-        if child + 1 < count and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[at] <= keys[child]:
-            return
-        keys[at], keys[child] = keys[child], keys[at]
-        heap[at], heap[child] = heap[child], heap[at]
-        at = child
+    keys[0, i] = key + (_FAR if left > _MET * square or step > _LONG else 0.0)
+    keys[1, i] = plain

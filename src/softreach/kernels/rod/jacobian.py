@@ -1,4 +1,4 @@
-"""Tip Jacobians of many rods: the exact derivative of `rod.tips`, in the same walk.
+"""Twists of tip frames by activations, of many rods: the exact derivative, in the walk of `tips`.
 
 With g = exp(Ω1) ... exp(ΩK), the spatial twist dg g⁻¹ of the part of the rod beyond a step obeys
 ξ <- dexp(dΩ) + Ad(exp Ω) ξ = ξ + dexp(dΩ + [Ω, ξ]): one column per bundle, theory (29).
@@ -82,10 +82,7 @@ def _walk_column(work, column, table, k, j, groups):
 
 
 def jacobians(table, gamma, tips, out):
-    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations.
-
-    With room for three rows, (n, 3, bundle), the derivatives of the tip positions instead.
-    """
+    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations."""
     columns = np.empty((gamma.shape[1], 6 * LANES))
     _jacobians(table, gamma, *room(table), columns, tips, out)
 
@@ -111,30 +108,10 @@ def _jacobians(table, gamma, work, lanes, columns, tips, out):
 
 @inline
 def _store(work, columns, first, count, tips, out):
-    for i in range(count):
-        tip = work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i]
-        for axis in range(3):
-            tips[first + i, axis] = tip[axis]
-        if out.shape[1] == 3:
-            _store_slopes(columns, i, tip, out, first + i)
-        else:
-            _store_twists(columns, i, out, first + i)
-
-
-@inline
-def _store_twists(columns, i, out, n):
     """Columns hold (ω, v); the Jacobian has its linear rows first."""
-    for j in range(out.shape[2]):
-        for row in range(6):
-            out[n, row, j] = columns[j, (row + 3) % 6 * LANES + i]
-
-
-@inline
-def _store_slopes(columns, i, tip, out, n):
-    """Velocity of the tip: v + ω × r."""
-    for j in range(out.shape[2]):
-        a, b, c = columns[j, i], columns[j, LANES + i], columns[j, 2 * LANES + i]
-        x, y, z = tip
-        out[n, 0, j] = columns[j, 3 * LANES + i] + (b * z - c * y)
-        out[n, 1, j] = columns[j, 4 * LANES + i] + (c * x - a * z)
-        out[n, 2, j] = columns[j, 5 * LANES + i] + (a * y - b * x)
+    for i in range(count):
+        for axis in range(3):
+            tips[first + i, axis] = work[TIP + axis * LANES + i]
+        for j in range(out.shape[2]):
+            for row in range(6):
+                out[first + i, row, j] = columns[j, (row + 3) % 6 * LANES + i]

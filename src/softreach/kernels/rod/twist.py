@@ -12,7 +12,16 @@ import math
 from softreach.kernels.compiler import inline
 from softreach.kernels.vector import cross
 
-__all__ = ["act", "add", "bracket", "dexp", "exp_coefficients", "scaled"]
+__all__ = [
+    "act",
+    "add",
+    "bracket",
+    "cobracket",
+    "dexp",
+    "exp_coefficients",
+    "exp_derivatives",
+    "scaled",
+]
 
 _TERMS = range(8)
 """Terms kept of each series in θ²: exact to rounding for θ <= 1, to 1e-13 for θ <= 1.5."""
@@ -20,6 +29,12 @@ _TERMS = range(8)
 # sin θ/θ, (1 - cos θ)/θ², (θ - sin θ)/θ³ as power series in θ², theory (24).
 _SINC, _COSC, _SINC3 = (
     tuple((-1) ** k / math.factorial(2 * k + shift) for k in _TERMS) for shift in (1, 2, 3)
+)
+
+# Their derivatives by θ over θ, of the last two.
+_COSC_SLOPE, _SINC3_SLOPE = (
+    tuple(-2 * (k + 1) * (-1) ** k / math.factorial(2 * k + shift) for k in _TERMS)
+    for shift in (4, 5)
 )
 
 # Coefficients of ad .. ad⁴ in the left-trivialized differential of exp [Selig2005]: reducing
@@ -52,6 +67,15 @@ def bracket(a, b):
     p, q, r = cross(a[:3], b[3:])
     s, t, u = cross(b[:3], a[3:])
     return x, y, z, p - s, q - t, r - u
+
+
+@inline
+def cobracket(a, c):
+    """The row of numbers for which its product with x is that of c with [a, x]."""
+    x, y, z = cross(c[:3], a[:3])
+    p, q, r = cross(c[3:], a[3:])
+    s, t, u = cross(c[3:], a[:3])
+    return x + p, y + q, z + r, s, t, u
 
 
 @inline
@@ -91,3 +115,40 @@ def dexp(a, x):
     third = bracket(a, second)
     total = add(total, scaled(_series(t, _DEXP3), third))
     return add(total, scaled(_series(t, _DEXP4), bracket(a, third)))
+
+
+@inline
+def exp_derivatives(a):
+    """R of exp(a), and A and B of its differential: dexp(a) (ω, v) = (A ω, B ω + A v).
+
+    A = I + c ŵ + k ŵ² with (w, v) = a, and B its derivative along v, as ad_a is w + εv in dual
+    numbers. Rows of each matrix.
+    """
+    w0, w1, w2, v0, v1, v2 = a
+    t, along = w0 * w0 + w1 * w1 + w2 * w2, w0 * v0 + w1 * v1 + w2 * v2
+    s, c, k = _series(t, _SINC), _series(t, _COSC), _series(t, _SINC3)
+    dc, dk = along * _series(t, _COSC_SLOPE), along * _series(t, _SINC3_SLOPE)
+    turn = _polynomial(1.0 - c * t, s * w0, s * w1, s * w2, c, w0, w1, w2)
+    first = _polynomial(1.0 - k * t, c * w0, c * w1, c * w2, k, w0, w1, w2)
+    # k (v wᵀ + w vᵀ) + dk w wᵀ = x wᵀ + w xᵀ with x = k v + dk w / 2
+    x0, x1, x2 = k * v0 + 0.5 * dk * w0, k * v1 + 0.5 * dk * w1, k * v2 + 0.5 * dk * w2
+    e0, e1, e2 = c * v0 + dc * w0, c * v1 + dc * w1, c * v2 + dc * w2
+    d = -2.0 * k * along - dk * t
+    xy, xz, yz = x0 * w1 + w0 * x1, x0 * w2 + w0 * x2, x1 * w2 + w1 * x2
+    second = (
+        (d + 2.0 * x0 * w0, xy - e2, xz + e1),
+        (xy + e2, d + 2.0 * x1 * w1, yz - e0),
+        (xz - e1, yz + e0, d + 2.0 * x2 * w2),
+    )
+    return turn, first, second
+
+
+@inline
+def _polynomial(d, e0, e1, e2, k, w0, w1, w2):
+    """d I + ê + k w wᵀ."""
+    xy, xz, yz = k * w0 * w1, k * w0 * w2, k * w1 * w2
+    return (
+        (d + k * w0 * w0, xy - e2, xz + e1),
+        (xy + e2, d + k * w1 * w1, yz - e0),
+        (xz - e1, yz + e0, d + k * w2 * w2),
+    )
