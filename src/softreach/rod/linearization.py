@@ -1,14 +1,19 @@
 """Bound of the distance of the tip map of a free rod from its linearization.
 
-A change d of activation changes the twist by κ = ∂(ηu)/∂γ d = η U d + (y·d) u with u = Uγ and
-η = 1 + y·γ, in which y is z of fibers and muscles and 0 of forces, and turns a section by at most
-a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
+A change d of activation changes the twist ηu by κ = η U d + (y·d) u, with η = 1 + y·γ after the
+change and u = Uγ before it; y is z of fibers and muscles and 0 of forces. In the frame of the base
+κ' = Rκ turns what lies beyond a section: the frames after the change are QR with Q' = Q[κ'], Q = 1
+at the base. Two steps of Picard's iteration leave
 
-r''[d, d] = ∫ 2 (z·d) ω × d3 + ζ ω' × d3 + ζ ω × (ω × d3),   |ω'| <= ½ a² + ∫ 2 |y·d| |U d|,
+Q = 1 + [W] + ∫∫ Q [κ'] [κ'] over s < s',  W = ∫ κ',
 
-so that |r''[d, d]| <= ∫ 2 |z·d| a + ζ (3/2 a² + ∫ 2 |y·d| |U d|) with ζ, η and u at their largest
-in the activation box, or in the cell of it where γ + d lies. Here ω' is the change of ω = ∫ R κ,
-whose part ∫ ω × ω' is at most ½ a². The remainder of the linearization is at most half of that.
+whose last part is at most ½ a² with a = ∫ |κ|, as Q turns only. W is linear in d but for
+∫ R (y·d) U d. So r = ∫ ζ Q d3 differs from its linearization by at most
+
+∫ ½ ζ a² + ζ ∫ |y·d| |U d| + |z·d| a
+
+with ζ, η and u at their largest in the activation box, or in the cell of it where γ + d lies.
+(The largest second derivative bounds it by three halves of the first part.)
 
 In a cell ζ and |u| are parts of what they are at most in the box, at every station no more than the
 largest part anywhere along the arm; so is η where it is ζ, and else it stays at its largest. All
@@ -39,10 +44,10 @@ _MOST_KNOWN = 64  # proportions of half widths whose terms are kept
 
 
 class _Terms(NamedTuple):
-    """Terms of the bound where extension and bending are largest: degree two in d."""
+    """Twice the terms of the bound where extension and bending are largest: degree two in d."""
 
     turned_twice: float
-    """∫ 3/2 ζ a² by the first part of κ = η U d + (y·d) u."""
+    """∫ ζ a² by the first part of κ = η U d + (y·d) u."""
     turned_and_stretched: float
     """The same by one of each."""
     stretched_twice: float
@@ -137,13 +142,15 @@ class Linearization:
         growth = self.growth @ half_widths
         first = _integrals(self.most_grown * turned, z)
         second = _integrals(growth * self.bending, z)
-        weight, most = 1.5 * self.longest, turned.max(axis=0)
+        most = turned.max(axis=0)
         inner = self.longest * _integrals(2.0 * growth * most, z)
         # The square of a is convex in d, so that it is largest where all |dj| are.
         return _Terms(
-            turned_twice=float(_integrals(weight * first**2, z)[:, -1].max()),
-            turned_and_stretched=float(_integrals(2.0 * weight * first * second, z)[:, -1].max()),
-            stretched_twice=float(_integrals(weight * second**2, z)[-1]),
+            turned_twice=float(_integrals(self.longest * first**2, z)[:, -1].max()),
+            turned_and_stretched=float(
+                _integrals(2.0 * self.longest * first * second, z)[:, -1].max()
+            ),
+            stretched_twice=float(_integrals(self.longest * second**2, z)[-1]),
             turned=float(_integrals(2.0 * stretch * first.max(axis=0), z)[-1]),
             stretched=float(_integrals(2.0 * stretch * second, z)[-1]),
             mixed=float(_integrals(inner, z)[-1]),
