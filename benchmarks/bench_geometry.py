@@ -164,7 +164,7 @@ def print_roofline(n: int) -> None:
     """Print how much of the triangulation its arithmetic takes, and how much memory does."""
     from softreach.kernels.points.bowyer_watson import triangulate
 
-    (flops, spheres), (plane_flops, planes) = tests_of_a_point()
+    (flops, spheres), (plane_flops, planes) = counted_operations()
     work = spheres * flops + planes * plane_flops
     whole, near = (
         cpu_seconds(partial(triangulate, insertable(size), lambda: False)) / size
@@ -172,7 +172,7 @@ def print_roofline(n: int) -> None:
     )
     rounds = np.rint(np.array([spheres, planes]) * n / CACHED).astype(int).tolist()
     points = np.random.default_rng(0).random((CACHED, 3))
-    alone = cpu_seconds(partial(tests_alone(), points, *rounds)) / n
+    alone = cpu_seconds(partial(kernel_of_tests(), points, *rounds)) / n
     print(
         f"\nA point that enters the triangulation takes {spheres:.0f} tests of a sphere and "
         f"{planes:.0f} of a plane (counted for {COUNTED:,}), {work:,.0f} operations, in "
@@ -193,7 +193,7 @@ def insertable(n: int) -> np.ndarray:
     return points[insertion_order(points)]
 
 
-def tests_of_a_point() -> list[tuple[int, float]]:
+def counted_operations() -> list[tuple[int, float]]:
     """Operations and number of tests of spheres and planes, counted without the compiler."""
     with tempfile.TemporaryDirectory() as folder:
         np.save(f"{folder}/points.npy", insertable(COUNTED))
@@ -204,7 +204,7 @@ def tests_of_a_point() -> list[tuple[int, float]]:
     return [found["insphere_filter"], found["orient_filter"]]
 
 
-def tests_alone() -> Callable[[np.ndarray, int, int], float]:
+def kernel_of_tests() -> Callable[[np.ndarray, int, int], float]:
     """A kernel of tests of spheres and planes through some points, so often of each."""
     from softreach.kernels.compiler import strict
     from softreach.kernels.points.predicates import insphere_filter, orient_filter

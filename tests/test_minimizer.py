@@ -86,8 +86,9 @@ def test_tip_motions_are_tips_slopes_tangents_and_the_turn_of_tangents():
     rod, gamma = tip_map(arm), in_box(arm, 30)
     motions = rod.tip_motions(gamma)
     tips, slopes = rod.tips_and_slopes(gamma)
-    assert np.array_equal(motions.tips, tips)
-    assert np.allclose(motions.slopes, slopes, rtol=0.0, atol=1e-15)
+    rounding = {"rtol": 0.0, "atol": 1e-14}  # two kernels: one with turns, one without
+    assert np.allclose(motions.tips, tips, **rounding)
+    assert np.allclose(motions.slopes, slopes, **rounding)
     d3 = configuration(arm, gamma, [arm.length]).directors.values[:, 0, 2]
     assert np.allclose(motions.directions, d3, atol=1e-6)
     turn = np.cross(motions.rotations, motions.directions[:, :, None], axis=1)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from benchmarks.adversarial_inverse import activations, random_design
 from scipy.optimize import minimize
 
-from softreach.arm import designs
+from softreach.arm import Drive, designs
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse import Status, solve_inverse
+from softreach.inverse import Status, prepared_map, solve_inverse
 from softreach.rod import TipMap, tip_map, tip_positions
 from softreach.support.errors import InvalidInput
 from tests.inverse.test_many_bundles import changes, six_bundles
@@ -102,15 +104,14 @@ def test_no_activation_that_reaches_a_target_changes_less_than_the_bound(design)
 
 
 def test_a_larger_activation_is_never_proved_to_be_least(monkeypatch):
-    from softreach.inverse import prepared_map
-    from softreach.inverse import proofs as least_bound
+    from softreach.inverse import least_proofs as least_bound
 
     arm = designs.redundant_trunk()
     prepared = prepared_map(arm)
     gamma = activations(arm, 6, "interior", seed=3)
     targets, near = tip_positions(arm, gamma), np.zeros_like(gamma)
     least = changes(solve_inverse(prepared, targets))
-    monkeypatch.setattr(least_bound, "_MOST_LEAST_CELLS", 10_000)
+    monkeypatch.setattr(least_bound, "_MOST_CELLS", 10_000)
     bounds = least_bound.change_bounds(
         prepared.rod, prepared.coarse_cells, targets, near, least + 0.01
     )
@@ -175,3 +176,41 @@ def test_the_remainder_of_the_linearization_is_within_the_bounds_of_its_cell_and
         assert (missed <= errors).all()
         assert missed.max() <= rod.linearization_error(half)
         assert errors.max() <= rod.linearization_error(half) * (1 + 1e-12)
+
+
+def pulled_in_pairs() -> Manipulator:
+    """An arm whose inputs each pull some bundles and release others."""
+    arm = random_design(5, 2)
+    first, second, third, *_ = arm.bundle_names
+    drive = Drive(name="a", bounds=(-0.2, 0.3), gains={first: 1.0, second: -0.8, third: 0.3})
+    return arm.replace(drives=(drive,))
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        designs.redundant_trunk,
+        six_bundles,
+        fibers_and_a_tendon,
+        designs.three_chamber_arm,
+        pulled_in_pairs,
+    ],
+)
+def test_what_is_beyond_the_quadratic_part_is_within_the_bound_of_any_box_of_a_cell(design):
+    rod, rng = prepared_map(design()).rod, np.random.default_rng(0)
+    n, m = 500, rod.box.dimension
+    for cells, size in product((1.5, 4, 30), (1.0, 0.3)):
+        half = rod.box.widths / 2 / cells
+        cell = rng.uniform(rod.box.low + half, rod.box.high - half, (n, m))
+        inside = half * rng.uniform(size / 3, size, (n, m))
+        center = cell + (half - inside) * rng.uniform(-1.0, 1.0, (n, m))
+        change = inside * rng.choice([-1.0, 1.0], (n, m))
+        (tips, slopes), seconds = rod.tips_and_slopes(center), np.empty((n, 3, m, m))
+        for j, step in enumerate(1e-4 * np.diag(rod.box.widths)):
+            ahead, behind = (rod.tips_and_slopes(center + s * step)[1] for s in (1, -1))
+            seconds[..., j] = (ahead - behind) / (2 * step[j])
+        quadratic = tips + np.einsum("nij,nj->ni", slopes, change)
+        quadratic += 0.5 * np.einsum("nijk,nj,nk->ni", seconds, change, change)
+        missed = np.linalg.norm(rod.tips(center + change) - quadratic, axis=1)
+        errors = rod.cubic_remainder(cell, half).errors(np.arange(n), inside)
+        assert (missed <= errors + 1e-12 * rod.length).all()

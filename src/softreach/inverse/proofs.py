@@ -1,4 +1,4 @@
-"""Proofs by branch and bound: no activation comes nearer to a target, or changes less.
+"""Proofs by branch and bound that no activation comes nearer to a target.
 
 Cells of the activation box are halved until a bound on each says enough.
 
@@ -14,12 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.kernels.box import change_bounds as dual
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.cell_cover import near_cells
+from softreach.rod.linearization import CubicRemainder
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, rows
+from softreach.support.lazy import lazy
 
 MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
 _COARSE = 70_000  # cells that all targets share
@@ -30,10 +31,6 @@ _MOST_EXCLUSION_CELLS = 20_000  # examined for one target
 _MOST_OF_THREE = 4_000  # the same with three bundles or fewer, where a proof needs far fewer
 _TARGET_BLOCK = 10  # targets at once
 _SOFTNESS = 1e-6  # of the linear problem that says in which direction the target lies
-SLACK = 1e-6  # by which a bound may fall short of the change that it proves to be least
-_AIM = 0.9 * SLACK  # where a search ends: rounding is not to decide
-_MOST_LEAST_CELLS = 100_000  # examined for one target
-_REQUEST_BLOCK = 16  # targets at once
 
 
 def gap_bounds(
@@ -70,39 +67,6 @@ def gap_bounds(
     return np.minimum(bounds, gap)
 
 
-def change_bounds(
-    rod: TipMap, coarse: CoarseCells, targets: Array, near: Array, change: Array
-) -> Array:
-    """A lower bound of |γ - near| over all activations that reach each target.
-
-    Where tips lie within e of their linearization at the center c of a cell, every activation x of
-    the cell that reaches p has |A x - b| <= e with A = J(c) and b = p - r(c) + A c. The least
-    change under this condition alone is bounded from below by its dual of three unknowns,
-    `kernels.change_bounds`.
-
-    Args:
-        rod: The tip map.
-        coarse: Its cells.
-        targets: Shape (t, 3) [m].
-        near: Shape (t, m) [-].
-        change: |γ - near| of the best activation known [-], shape (t,).
-
-    Returns:
-        Shape (t,) [-]: at least `change - SLACK` where that one is proved to be the least.
-    """
-    # No activation within the bounds is nearer than the one nearest to `near`, wherever its tip.
-    bounds = np.linalg.norm(near - rod.box.clip(near), axis=1)
-    if rod.box.dimension <= MOST_BUNDLES and np.isfinite(rod.linearization_error(coarse.half)):
-        enough = np.maximum(change - _AIM, 0.0)
-
-        def prove(rows: slice) -> None:
-            proved = _least_of_block(rod, coarse, targets[rows], near[rows], enough[rows])
-            bounds[rows] = np.maximum(bounds[rows], proved)
-
-        parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _REQUEST_BLOCK))
-    return np.minimum(bounds, change)
-
-
 class Cells(NamedTuple):
     """Cells of equal shape, each of interest for one target."""
 
@@ -133,7 +97,7 @@ class CoarseCells:
     """The box in even cells with what all targets ask of them."""
 
     def __init__(self, rod: TipMap) -> None:
-        box, m = rod.box, rod.box.dimension
+        self._rod, box, m = rod, rod.box, rod.box.dimension
         side = max(1, int(_COARSE ** (1 / max(m, 1)) + 1e-9))
         places = np.indices((side,) * m).reshape(m, side**m).T
         cube = (places + 0.5) / side
@@ -142,6 +106,11 @@ class CoarseCells:
         self.errors = _errors(rod, self.center, self.half)
         self.slopes = slopes * self.half
         self.radii = np.linalg.norm(self.slopes, axis=1).sum(axis=1)
+
+    @lazy
+    def cubic_remainder(self) -> CubicRemainder:
+        """What tips differ from their quadratic part by in any box of a cell."""
+        return self._rod.cubic_remainder(self.center, self.half)
 
     def near(self, target: Array, distance: float) -> Index:
         """Numbers of the cells whose tips may come so near to a target."""
@@ -244,33 +213,3 @@ def _distances(targets: Array, at: Linearized) -> Array:
     linear = np.einsum("ni,ni->n", normal, away)
     linear -= np.abs(np.einsum("ni,nij->nj", normal, slopes)).sum(axis=1)
     return linear - at.errors
-
-
-def _least_of_block(
-    rod: TipMap, coarse: CoarseCells, targets: Array, near: Array, enough: Array
-) -> Array:
-    """Halve the cells of some targets until none may change less, or there are too many."""
-    rows = [_within(coarse, *case) for case in zip(targets, near, enough, strict=True)]
-    owner = np.repeat(np.arange(len(targets)), [len(numbers) for numbers in rows])
-    cells = Cells(owner, coarse.center[np.concatenate(rows)])
-
-    def bound(part: Cells, at: Linearized) -> Array:
-        owner = part.owner
-        return _of_cells(targets[owner], near[owner], enough[owner], part.center, at)
-
-    return least_of_cells(rod, coarse.half, cells, enough, bound, _MOST_LEAST_CELLS)
-
-
-def _within(coarse: CoarseCells, target: Array, near: Array, change: float) -> Index:
-    """Numbers of the cells that may reach a target by less than a change."""
-    rows = coarse.near(target, 0.0)
-    away = np.maximum(np.abs(coarse.center[rows] - near) - coarse.half, 0.0)
-    return rows[np.linalg.norm(away, axis=1) < change]
-
-
-def _of_cells(targets: Array, near: Array, enough: Array, center: Array, at: Linearized) -> Array:
-    """The bound for each cell, `enough` at most, shape (n,)."""
-    wanted = targets - at.tips + np.einsum("nij,nj->ni", at.slopes, center)
-    low, high, bounds = center - at.half, center + at.half, np.empty(len(center))
-    dual.change_bounds(near, at.slopes, wanted, at.errors, low, high, enough, bounds)
-    return bounds

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch
 from softreach.inverse.least_change import least_changes
+from softreach.inverse.least_proofs import SLACK, change_bounds
 from softreach.inverse.nearest import Nearest, nearest, nearest_from
 from softreach.inverse.prepared import PreparedMap, prepared_map
-from softreach.inverse.proofs import SLACK, change_bounds, gap_bounds
+from softreach.inverse.proofs import gap_bounds
 from softreach.inverse.request import (
     Request,
     allowance,

@@ -1,14 +1,30 @@
-"""Bound of the distance of the tip map of a free rod from its linearization.
+"""Bounds of the distance of the tip map of a free rod from its linear and quadratic parts.
 
-A change d of activation changes the twist by κ = ∂(ηu)/∂γ d = η U d + (y·d) u with u = Uγ and
-η = 1 + y·γ, in which y is z of fibers and muscles and 0 of forces, and turns a section by at most
-a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
+A change d of activation changes the twist ηu by κ = η U d + (y·d) u, with η = 1 + y·γ after the
+change and u = Uγ before it; y is z of fibers and muscles and 0 of forces. In the frame of the base
+κ' = Rκ turns what lies beyond a section: the frames after the change are QR with Q' = Q[κ'], Q = 1
+at the base. Two steps of Picard's iteration leave
 
-r''[d, d] = ∫ 2 (z·d) ω × d3 + ζ ω' × d3 + ζ ω × (ω × d3),   |ω'| <= ½ a² + ∫ 2 |y·d| |U d|,
+Q = 1 + [W] + ∫∫ Q [κ'] [κ'] over s < s',  W = ∫ κ',
 
-so that |r''[d, d]| <= ∫ 2 |z·d| a + ζ (3/2 a² + ∫ 2 |y·d| |U d|) with ζ, η and u at their largest
-in the activation box, or in the cell of it where γ + d lies. Here ω' is the change of ω = ∫ R κ,
-whose part ∫ ω × ω' is at most ½ a². The remainder of the linearization is at most half of that.
+whose last part is at most ½ a² with a = ∫ |κ|, as Q turns only. W is linear in d but for
+∫ R (y·d) U d. So r = ∫ ζ Q d3 differs from its linearization by at most
+
+∫ ½ ζ a² + ζ ∫ |y·d| |U d| + |z·d| a
+
+with ζ, η and u at their largest in the activation box, or in the cell of it where γ + d lies.
+(The largest second derivative bounds it by three halves of the first part.)
+
+The next step of the iteration adds ∫∫ [κ'] [κ'] to Q, of which ∫∫ [κ1'] [κ1'] is quadratic in d,
+κ1 being the linear part of κ, and leaves a³/6. With b = ∫ |y·d| |U d| the tip then differs from
+its quadratic part by at most
+
+∫ ζ (a³/6 + a b) + |z·d| (½ a² + b).
+
+There a is bounded by a quadratic form, which is cheap for boxes of any shape: by Schwarz's
+inequality a² <= ∫ w ∫ |κ|²/w with any weight w > 0, and |κ|² <= (1 + θ) η² |U d|² +
+(1 + 1/θ) (y·d)² |u|² with any θ > 0. Along the arm it is a part of what it is at the tip, the same
+for every d.
 
 In a cell ζ and |u| are parts of what they are at most in the box, at every station no more than the
 largest part anywhere along the arm; so is η where it is ζ, and else it stays at its largest. All
@@ -24,25 +40,27 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, tables
+from softreach.kernels.box.cubic_errors import cubic_errors
 from softreach.kernels.rod.relative_strains import relative_strains
 from softreach.rod.activation_box import ActivationBox
 from softreach.support.lazy import lazy
 
-__all__ = ["Linearization"]
+__all__ = ["CubicRemainder", "Linearization"]
 
 Array = NDArray[np.float64]
 
 _STATIONS = 201
 _SAFETY = 1.02  # for quadrature, and for the steps of the map as it is computed
+_LEAST_WEIGHT = 1e-9  # of the largest
 _MOST_SIGNS = 8  # bundles up to which all signs of d are tried
 _MOST_KNOWN = 64  # proportions of half widths whose terms are kept
 
 
 class _Terms(NamedTuple):
-    """Terms of the bound where extension and bending are largest: degree two in d."""
+    """Twice the terms of the bound where extension and bending are largest: degree two in d."""
 
     turned_twice: float
-    """∫ 3/2 ζ a² by the first part of κ = η U d + (y·d) u."""
+    """∫ ζ a² by the first part of κ = η U d + (y·d) u."""
     turned_and_stretched: float
     """The same by one of each."""
     stretched_twice: float
@@ -64,8 +82,50 @@ class _Terms(NamedTuple):
         return 0.5 * _SAFETY * (longest * square + linear)
 
 
+class CubicRemainder(NamedTuple):
+    """Bound of the distance of tips from the quadratic at the center of any box in some cells."""
+
+    longest: Array
+    """Largest ζ in each cell as a part of that in the activation box, shape (n,)."""
+    turned: Array
+    """The same of η or |u|, whichever is larger, shape (n,)."""
+    turns: Array
+    """G: a² is G[d, d] at most at the tip, shape (m, m)."""
+    stretched_turns: Array
+    """B: b is B[|d|, |d|] at most at the tip, shape (m, m)."""
+    stretches: Array
+    """∫ |z| of each bundle [m], shape (m,)."""
+    turned_stretches: Array
+    """The same weighted with ½ a² as a part of what it is at the tip, shape (m,)."""
+    thrice: float
+    """∫ ζ a³/6 [m] where a is 1 at the tip."""
+    once: float
+    """∫ ζ a [m] there."""
+
+    def errors(self, cells: NDArray[np.intp], half_widths: Array) -> Array:
+        """The largest |r(γ + d) - r(γ) - r'(γ) d - ½ r''(γ)[d, d]| [m], shape (k,).
+
+        Args:
+            cells: Number of the cell in which each box lies, shape (k,).
+            half_widths: Of the boxes, shape (k, m).
+        """
+        out = np.empty(len(cells))
+        cubic_errors(half_widths, cells, self.longest, self.turned, tuple(self)[2:], out)
+        return _SAFETY * out
+
+    def along(self, change: Array) -> CubicRemainder:
+        """The same for variables x of which d is `change` x, shape (m, variables)."""
+        size = np.abs(change)
+        return self._replace(
+            turns=change.T @ self.turns @ change,
+            stretched_turns=size.T @ self.stretched_turns @ size,
+            stretches=self.stretches @ size,
+            turned_stretches=self.turned_stretches @ size,
+        )
+
+
 class Linearization:
-    """The bound for one arm, its tables computed once."""
+    """The bounds for one arm, its tables computed once."""
 
     def __init__(self, arm: Manipulator, box: ActivationBox) -> None:
         # Even in S, in which the response of a tapered arm is even.
@@ -76,6 +136,7 @@ class Linearization:
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths
         self.longest = 1.0 + table.extension @ middle + self.stretch @ half
         self.has_forces = table.growth is not table.extension
+        self.widths, self.signed_growth = box.widths, table.growth
         self.growth, self.most_grown = self.stretch, self.longest
         if self.has_forces:
             self.growth = np.abs(table.growth)
@@ -96,15 +157,57 @@ class Linearization:
 
     def errors(self, centers: Array, half_widths: Array) -> Array:
         """The same for |dj| <= half_widths[j] around each center only, shape (n,)."""
+        longest, grown, bending = self._parts(centers, half_widths)
+        square, terms = self._terms(half_widths)
+        return square * np.asarray(terms.sum(longest, grown, bending))
+
+    def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
+        """The bound of what is beyond the quadratic part, for boxes in these cells."""
+        longest, grown, bending = self._parts(centers, half_widths)
+        return CubicRemainder(longest, np.maximum(grown, bending), *self._forms)
+
+    @lazy
+    def _forms(self) -> tuple[Array, Array, Array, Array, float, float]:
+        """All else that is in a `CubicRemainder`."""
+        z, half = self.stations, 0.5 * self.widths
+        free, m = np.flatnonzero(half > 0), len(half)
+        if not len(free):
+            return np.zeros((m, m)), np.zeros((m, m)), np.zeros(m), np.zeros(m), 0.0, 0.0
+        first = self.most_grown * self._turns(half, free).max(axis=0)
+        second = (self.growth @ half) * self.bending
+        weight = first + second
+        weight += _LEAST_WEIGHT * (weight.max() or 1.0)
+        # (1 + θ)/w and (1 + 1/θ)/w, with θ such that the sum is the square of the sum.
+        of_first, of_second = (
+            square**2 / np.maximum(part, _LEAST_WEIGHT * weight)
+            for square, part in ((self.most_grown, first), (self.bending, second))
+        )
+        turns = np.einsum("s,sij,sik->jks", of_first, self.curvature, self.curvature)
+        turns += np.einsum("s,sj,sk->jks", of_second, self.signed_growth, self.signed_growth)
+        turns = (_integrals(turns, z) * _integrals(weight, z)).transpose(2, 0, 1)
+        # What is added makes parts along the arm finite where some change turns nothing.
+        tip = turns[-1] + 1e-6 * (np.trace(turns[-1]) / m or 1.0) * np.eye(m)
+        root = np.linalg.inv(np.linalg.cholesky(tip))
+        part = np.sqrt(np.maximum(np.linalg.eigvalsh(root @ turns @ root.T)[:, -1], 0.0))
+        of_each = self.growth.T[:, None] * self.size.T
+        return (
+            tip,
+            _integrals(of_each, z)[..., -1],
+            _integrals(self.stretch.T, z)[:, -1],
+            _integrals(0.5 * part**2 * self.stretch.T, z)[:, -1],
+            float(_integrals(self.longest * part**3 / 6, z)[-1]),
+            float(_integrals(self.longest * part, z)[-1]),
+        )
+
+    def _parts(self, centers: Array, half_widths: Array) -> tuple[Array, Array, Array]:
+        """Largest ζ, η and |u| in cells, as parts of what they are in the box, shape (n,) each."""
         n = len(centers)
         longest, bending = np.empty(n), np.empty(n)
         offset = (1.0 + self.stretch @ half_widths) / self.longest
         relative_strains(np.ascontiguousarray(centers), offset, *self._relative, longest, bending)
         bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
-        square, terms = self._terms(half_widths)
         longest = np.minimum(longest, 1.0)
-        grown = 1.0 if self.has_forces else longest
-        return square * np.asarray(terms.sum(longest, grown, np.minimum(bending, 1.0)))
+        return longest, np.ones(n) if self.has_forces else longest, np.minimum(bending, 1.0)
 
     @lazy
     def _bending_inverse(self) -> Array:
@@ -137,13 +240,15 @@ class Linearization:
         growth = self.growth @ half_widths
         first = _integrals(self.most_grown * turned, z)
         second = _integrals(growth * self.bending, z)
-        weight, most = 1.5 * self.longest, turned.max(axis=0)
+        most = turned.max(axis=0)
         inner = self.longest * _integrals(2.0 * growth * most, z)
         # The square of a is convex in d, so that it is largest where all |dj| are.
         return _Terms(
-            turned_twice=float(_integrals(weight * first**2, z)[:, -1].max()),
-            turned_and_stretched=float(_integrals(2.0 * weight * first * second, z)[:, -1].max()),
-            stretched_twice=float(_integrals(weight * second**2, z)[-1]),
+            turned_twice=float(_integrals(self.longest * first**2, z)[:, -1].max()),
+            turned_and_stretched=float(
+                _integrals(2.0 * self.longest * first * second, z)[:, -1].max()
+            ),
+            stretched_twice=float(_integrals(self.longest * second**2, z)[-1]),
             turned=float(_integrals(2.0 * stretch * first.max(axis=0), z)[-1]),
             stretched=float(_integrals(2.0 * stretch * second, z)[-1]),
             mixed=float(_integrals(inner, z)[-1]),
@@ -154,8 +259,13 @@ class Linearization:
         of_each = self.curvature[:, :, free] * half_widths[free]
         if len(free) > _MOST_SIGNS:
             return np.linalg.norm(of_each, axis=1).sum(axis=1)[None]
-        bits = np.arange(1 << (len(free) - 1))[:, None] >> np.arange(len(free)) & 1
-        return np.linalg.norm(np.einsum("scj,dj->dsc", of_each, 1.0 - 2.0 * bits), axis=2)
+        return np.linalg.norm(np.einsum("scj,dj->dsc", of_each, _signs(len(free))), axis=2)
+
+
+def _signs(count: int) -> Array:
+    """All signs of so many numbers, but for that of all together, shape (d, count)."""
+    bits = np.arange(1 << max(count - 1, 0))[:, None] >> np.arange(count) & 1
+    return np.array(1.0 - 2.0 * bits, np.float64)
 
 
 def _integrals(values: Array, z: Array) -> Array:
