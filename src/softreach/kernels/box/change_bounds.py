@@ -70,7 +70,7 @@ def contract(  # noqa: C901
     y, b, gradient = np.zeros(3), np.zeros(3), np.zeros(3)
     gram, trial = np.zeros((3, 3)), np.zeros(3)
     for n in range(center.shape[0]):
-        h, e, enough = half[n], error[n], 0.5 * goal[n] ** 2
+        h, e, enough, best = half[n], error[n], 0.5 * goal[n] ** 2, 0.0
         for i in range(3):
             y[i], b[i] = multiplier[n, i], wanted[n, i] - tips[n, i]
             for j in range(m):
