@@ -75,6 +75,25 @@ _FRAMES = """milliseconds => new Promise(done => {
 """Resolves with the pictures a second of the page."""
 
 
+_MOVES = """([[left, top], [right, bottom], milliseconds]) => new Promise(done => {
+    const canvas = document.querySelector("canvas"), begin = performance.now();
+    let count = 0;
+    const next = now => {
+        if (now - begin > milliseconds) { done(count); return; }
+        const share = 0.5 - 0.5 * Math.cos(2 * Math.PI * (now - begin) / 1000);
+        canvas.dispatchEvent(new PointerEvent("pointermove", {
+            clientX: left + share * (right - left), clientY: top + share * (bottom - top),
+            pointerId: 1, buttons: 1, bubbles: true,
+        }));
+        count += 1;
+        requestAnimationFrame(next);
+    };
+    requestAnimationFrame(next);
+})"""
+"""Moves the mouse to and fro, once for each picture, as browsers tell of it; resolves with how
+often. Playwright's own mouse waits for the page several times between two moves."""
+
+
 class Drag(NamedTuple):
     """What became of a drag of the tip."""
 
@@ -92,19 +111,15 @@ def dragged_tip(tab: Tab, seconds: float = 2.0) -> Drag:
     arm = tab.session.state.design
     ends = [np.array(place(tab, tip)) for tip in np.asarray(tip_positions(arm, [CURLED, NEXT]))]
     served = _count_pulls(tab)
-    mouse, browser = tab.page.mouse, tab.context.new_cdp_session(tab.page)
+    mouse = tab.page.mouse
     mouse.move(*ends[0])
     tab.page.wait_for_timeout(200)
     mouse.down()
     mouse.move(*(ends[0] + 0.1 * (ends[1] - ends[0])))  # the first pull prepares the arm
     tab.page.wait_for_timeout(300)
-    events, first, begin = 0, len(served), time.perf_counter()
-    while (spent := time.perf_counter() - begin) < seconds:
-        share = 0.5 - 0.5 * np.cos(2 * np.pi * spent)
-        x, y = ends[0] + share * (ends[1] - ends[0])
-        moved = {"type": "mouseMoved", "x": x, "y": y, "button": "left", "buttons": 1}
-        browser.send("Input.dispatchMouseEvent", moved)  # mouse.move asks the page three times more
-        events += 1
+    first, begin = len(served), time.perf_counter()
+    events = tab.page.evaluate(_MOVES, [*map(list, ends), 1000 * seconds])
+    spent = time.perf_counter() - begin
     count = len(served) - first
     mouse.up()
     tab.settle()

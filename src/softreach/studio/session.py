@@ -45,6 +45,7 @@ _Kind = TypeVar("_Kind", bound="Job")
 
 _CLICK = 0.01  # [rad] between the ray of a click and a point that it hits, with the usual lens
 _LINE = 1.0  # pixels of the page that edges are thick in a larger picture
+_SMOOTH = 2  # pixels of a picture for each of the page, of which smooth edges are made
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
 
@@ -298,15 +299,17 @@ class Session:
         Raises:
             InvalidInput: As `TabCamera.picture`.
         """
-        if scale == 1 or self.reach is None:
+        if self.reach is None:
             return self.camera.picture(scale)
+        drawn = max(scale, _SMOOTH)
         thickness = _LINE / self.camera.pixels_per_length
         with self.drawing:
             self.scene.draw_thick_lines(self.reach, self.state.appearance, thickness)
             try:
-                return self.camera.picture(scale)
+                picture = self.camera.picture(drawn)
             finally:
                 self.scene.remove("/thick-lines")
+        return picture if drawn == scale else _reduced(picture, drawn // scale)
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
@@ -466,3 +469,10 @@ class Session:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST_NOTE else f"{text[:_LONGEST_NOTE]} ..."
+
+
+def _reduced(picture: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    """The picture with one pixel for a square of so many along each side."""
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(picture).reduce(factor))
