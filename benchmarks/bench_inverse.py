@@ -33,7 +33,7 @@ def prepared(arm):
     from softreach.rod.kinematics import tip_positions
 
     solver = partial(solve_inverse, prepared_map(arm))
-    solver(targets_of(arm, 50)[1])
+    solver(targets_of(arm, 5_000)[1])  # few are searched by other kernels than many
     cloud = np.random.default_rng(9).uniform(*arm.bounds.T, (100_000, 3))
     return solver, cloud, KDTree(tip_positions(arm, cloud))
 
