@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
-from softreach.support.units import METER, LengthUnit, as_unit, handy_unit
+from softreach.support.units import METER, LengthUnit, as_unit
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -43,11 +43,9 @@ class Lengths:
         Raises:
             InvalidInput: No such unit.
         """
-        name = arm.display_unit if unit is None else unit
-        handy = handy_unit(arm.length)
-        return cls(
-            as_unit(handy if name is None else name, arm.length), arm.length, name is not None
-        )
+        chosen = unit is not None or arm.display_unit is not None
+        shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
+        return cls(shown, arm.length, chosen)
 
     @property
     def written(self) -> LengthUnit:
@@ -60,7 +58,7 @@ class Lengths:
 
     def text(self, meters: float, digits: str = ".6g") -> str:
         """A length [m] in words: "12.5 mm"."""
-        return f"{meters / self.unit.size:{digits}} {self.unit.name}"
+        return self.unit.rounded(meters, digits=digits)
 
     def record(self, name: str, meters: Any) -> dict[str, Any]:
         """Lengths [m] for machines, in m and in L."""

@@ -47,12 +47,6 @@ def size_text(size: Size, arm: Manipulator) -> str:
     return f"{size.name} {arm.length_unit.text(size.value, size.power, error)}"
 
 
-def length_text(length: float, arm: Manipulator, digits: str = ".3g") -> str:
-    """A length [L] in the unit of the arm."""
-    unit = arm.length_unit
-    return f"{length * arm.length / unit.size:{digits}} {unit.name}"
-
-
 def place_text(place: Iterable[float], arm: Manipulator, decimals: int = 4) -> str:
     """A place [L] in the unit of the arm, to so many digits of L after the point."""
     unit = arm.length_unit
@@ -110,9 +104,8 @@ def loaded_share(session: Session) -> str:
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = free.arm.length_unit.of(free.size.value, free.size.power)
-    unit = free.arm.length_unit.symbol(free.size.power)
-    return f" under loads, {share} of {whole:.4g} {unit} without"
+    whole = free.arm.length_unit.rounded(free.size.value, free.size.power)
+    return f" under loads, {share} of {whole} without"
 
 
 def tip_text(session: Session) -> list[Part]:

@@ -80,6 +80,10 @@ class LengthUnit(NamedTuple):
         scale = self.scale(power)
         return quantity(value / scale, self.symbol(power), error / scale)
 
+    def rounded(self, value: float, power: int = 1, digits: str = ".4g") -> str:
+        """A value in SI units with so many digits, such as "12.5 mm"."""
+        return f"{value / self.scale(power):{digits}} {self.symbol(power)}"
+
     def scale(self, power: int = 1) -> float:
         """Size of the unit of lengths [m], of areas [m²] for power 2, of volumes [m³] for 3."""
         if power == 3 and not self.relative:

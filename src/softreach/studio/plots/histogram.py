@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
-from softreach.studio.captions import length_text
 from softreach.studio.plots.plot import (
     Picture,
     PicturePlot,
@@ -112,11 +111,8 @@ def _label(arm: Manipulator, bundle: int) -> str:
 
 
 def _described(arm: Manipulator, samples: int, cut: Slice, solutions: Array | None) -> str:
-    where = (
-        ""
-        if cut.axis == "none"
-        else f" within the slice {cut.axis} = {length_text(cut.center, arm)}"
-    )
+    center = arm.length_unit.rounded(cut.center * arm.length, digits=".3g")
+    where = "" if cut.axis == "none" else f" within the slice {cut.axis} = {center}"
     marks = " Triangles are solutions of the inverse problem." if solutions is not None else ""
     return f"{samples:,} samples{where}; the line is the present activation.{marks}"
 

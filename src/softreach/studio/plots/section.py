@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.slice import plot_slice
-from softreach.studio.captions import length_text
 from softreach.studio.multiplicity import counts_at
 from softreach.studio.plots.plot import (
     Picture,
@@ -129,7 +128,8 @@ def section_picture(
         at, unit = plane.center * reach.arm.length, reach.arm.length_unit
         plot_slice(grid, ax=ax, view=view, at=at, unit=unit)
     _draw_boundary(ax, curves, view, reach.arm)
-    where = f"{plane.axis} = {length_text(plane.center, reach.arm)}"
+    center = plane.center * reach.arm.length
+    where = f"{plane.axis} = {reach.arm.length_unit.rounded(center, digits='.3g')}"
     ax.set_title(f"section {where}")
     described = _described(curves, plane, where, reach.arm)
     return Picture(reach.arm, pixels(figure, dark=dark), described)
@@ -185,7 +185,7 @@ def _described(curves: list[Array], plane: Slice, where: str, arm: Manipulator) 
     area = enclosed_area(curves, "xyz".index(plane.axis))
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     closed = all(np.array_equal(curve[0], curve[-1]) for curve in curves)
-    shown = f"{arm.length_unit.of(area * arm.length**2, 2):.4g} {arm.length_unit.symbol(2)}"
+    shown = arm.length_unit.rounded(area * arm.length**2, 2)
     return f"{where}: {parts}, {shown}" if closed else f"{where}: {len(curves)} curves"
 
 

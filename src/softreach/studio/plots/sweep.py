@@ -167,15 +167,12 @@ class SweepPlot(Plot):
     def show(self, result: Sweep) -> str:
         """Draw the volumes that are known so far."""
         unit = result.arm.length_unit
-        known, here_at = unit.of(result.volume, 3), result.value == result.parameter.shown
+        volumes = result.volume[result.value == result.parameter.shown]
         if len(result.value) > 1:
             label, here = result.parameter.label, result.parameter.shown
-            y = unit.label("V", 3)
+            known, y = unit.of(result.volume, 3), unit.label("V", 3)
             self._chart.show(label, result.value, (_VOLUME,), (known,), here, y=y)
-        parts = [
-            f"here V = {volume:.4g} {unit.symbol(3)} at {result.parameter.shown:g}"
-            for volume in known[here_at]
-        ]
+        parts = [f"here V = {unit.rounded(v, 3)} at {result.parameter.shown:g}" for v in volumes]
         if result.refused:
             parts.append(f"{len(result.refused)} values make no design or take too long")
         return " · ".join([*parts, *([] if result.complete else ["computing ..."])])

@@ -87,6 +87,6 @@ class VolumeCurvePlot(Plot):
             values += [np.full_like(result.radius, each) for each in (result.exact, result.convex)]
         unit = result.arm.length_unit
         shown = [unit.of(each, 3) for each in values]
+        at = float(np.interp(0.05, result.radius, result.volume))
         self._chart.show("α / L", result.radius, curves, shown, y=unit.label("V", 3))
-        at = float(np.interp(0.05, result.radius, shown[0]))
-        return f"V(0.05 L) = {at:.4g} {unit.symbol(3)} of {result.samples:,} samples"
+        return f"V(0.05 L) = {unit.rounded(at, 3)} of {result.samples:,} samples"

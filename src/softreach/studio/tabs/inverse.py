@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.captions import length_text, place_text
+from softreach.studio.captions import place_text
 from softreach.studio.expressions import vector_kind
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
@@ -60,7 +60,7 @@ class DragPanel:
             self._text.say(*([_DRAG_HINT] if look.handle else []))
             self._ball.show_lag(None, None)
             return
-        gap = length_text(drag.dragged.gap / arm.length, arm) if drag.dragged.gap else ""
+        gap = arm.length_unit.rounded(drag.dragged.gap, digits=".3g") if drag.dragged.gap else ""
         self._text.say(f"This branch ends {gap} short of the pointer." if gap else _DRAG_HINT)
         self._ball.show_lag(drag.wanted, drag.dragged.tip / arm.length, gap)
 
@@ -173,15 +173,16 @@ def _is_near(activation: Any, state: StudioState) -> bool:
 
 def _answer_text(answer: Solution, arm: Manipulator) -> str:
     """Result of a solution in words."""
-    place, length = place_text(answer.target / arm.length, arm), arm.length
+    place, unit = place_text(answer.target / arm.length, arm), arm.length_unit
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
-        near, gap = place_text(answer.nearest / length, arm), length_text(answer.gap / length, arm)
+        near = place_text(answer.nearest / arm.length, arm)
+        gap = unit.rounded(answer.gap, digits=".3g")
         return f"{place} is {certain}. Nearest: {near}, {gap} away."
     count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
     names = ", ".join(arm.input_names)
     return (
-        f"{count} {place} to {length_text(answer.residuals.max() / length, arm, '.1e')}. "
+        f"{count} {place} to {unit.rounded(answer.residuals.max(), digits='.1e')}. "
         f"Press one ({names}) to move the arm there, or click its shape; the one with a check mark "
         "is where it is."
     )

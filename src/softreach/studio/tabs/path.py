@@ -10,7 +10,6 @@ import numpy as np
 from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
-from softreach.studio.captions import length_text
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.jobs.path import (
     PATH_SHAPES,
@@ -208,7 +207,7 @@ def end_text(track: xr.Dataset, arm: Manipulator) -> str:
         arm: The design.
     """
     count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
-    end, way = track.attrs["end"], length_text(float(track.end_length) / arm.length, arm, ".4g")
+    end, way = track.attrs["end"], arm.length_unit.rounded(float(track.end_length))
     if end == "no_start":
         return "The first point is not reached: out of reach, or not from this activation."
     followed = f"{count} of {points} points are followed"

@@ -104,7 +104,7 @@ def _numbers_text(session: Session) -> list[Part]:
     share, unit = loaded_share(session), reach.arm.length_unit
     parts = [
         *reach_text(reach, share),
-        *([f" · α-shape {hull / unit.scale(3):.4g} {unit.symbol(3)}"] if hull is not None else []),
+        *([f" · α-shape {unit.rounded(hull, 3)}"] if hull is not None else []),
     ]
     if reach.arm != session.state.design:
         parts = [Strong("of the design before: "), *parts]
