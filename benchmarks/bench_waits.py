@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.bench_geometry import cpu_seconds
 from benchmarks.memory import peak_bytes, reset_peak
 from softreach.support.errors import SoftreachError
 
@@ -119,7 +120,7 @@ def print_growth() -> None:
     print("|---|--:|--:|--:|--:|--:|")
     for name, least, made in _growths():
         sizes = [least * k for k in _GROWN]
-        times = [_cpu(made(n)) for n in sizes]
+        times = [cpu_seconds(made(n)) for n in sizes]
         slope = np.polyfit(np.log(sizes), np.log(times), 1)[0]
         shown = " | ".join(f"{seconds:.3g}" for seconds in times)
         print(f"| {name} | {least:,} | {shown} | {slope:.2f} |", flush=True)
@@ -157,16 +158,6 @@ def _growths() -> Iterator[tuple[str, int, Callable[[int], Callable[[], object]]
         lambda n: partial(sr.activation_distance, sr.compute_cloud(arm, n), 1 / 60, queries=10_000),
     )
     yield "four views of n tips", 250_000, drawn
-
-
-def _cpu(run: Callable[[], object]) -> float:
-    """CPU seconds of the faster of two calls."""
-    times = []
-    for _ in range(2):
-        start = time.process_time()
-        run()
-        times.append(time.process_time() - start)
-    return min(times)
 
 
 def _examples() -> Iterator[tuple[str, list[str]]]:
@@ -255,7 +246,7 @@ def _function_rows() -> Iterator[str]:
 
 def _timed(function: Callable[..., object], arguments: dict[str, object], place: Path) -> Wait:
     """One call; what it writes goes to a place of its own."""
-    for name in ("path", "out"):
+    for name in ("path", "out", "folder"):
         if isinstance(arguments.get(name), str):
             place.mkdir()
             arguments[name] = place / Path(str(arguments[name])).name
