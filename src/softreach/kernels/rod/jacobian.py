@@ -14,6 +14,7 @@ from softreach.kernels.rod.tips import (
     BEND_ROWS,
     LANES,
     TIP,
+    TOGETHER,
     clear_tips,
     load,
     node_values,
@@ -24,8 +25,6 @@ from softreach.kernels.rod.tips import (
 from softreach.kernels.rod.twist import add, bracket, dexp
 
 __all__ = ["jacobians"]
-
-_TOGETHER = 16  # lanes: the last searches of many ask for a few rods at a time
 
 
 @inline
@@ -56,8 +55,8 @@ def _walk_column(work, column, table, k, j, groups):
         (t[8], t[9], t[10], t[11], lengths[2]),
     )
     for group in range(groups):
-        for lane in range(_TOGETHER):
-            i = group * _TOGETHER + lane
+        for lane in range(TOGETHER):
+            i = group * TOGETHER + lane
             base, middle, tip = nodes_at(work, i)
             omega = exponent(base, middle, tip)
             d_omega = exponent_derivative(
@@ -92,7 +91,7 @@ def _jacobians(table, gamma, work, lanes, columns, tips, out):
     bundles = gamma.shape[1]
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
-        groups = -(-count // _TOGETHER)
+        groups = -(-count // TOGETHER)
         load(lanes, gamma, first, count)
         clear_tips(work)
         for j in range(bundles):

@@ -17,6 +17,7 @@ from softreach.kernels.rod.tips import (
     LANES,
     NODE_ROWS,
     TIP,
+    TOGETHER,
     clear_tips,
     load,
     node_values,
@@ -27,13 +28,12 @@ from softreach.kernels.rod.twist import act, exp_derivatives
 
 __all__ = ["slopes"]
 
-_TOGETHER = 16  # lanes: the last searches of many ask for a few rods at a time
 
 # Scratch of a group of lanes: for each coordinate what multiplies changes of the tables' rows, the
 # rows of R, what multiplies dΩ in each coordinate, and the parts of the exponent.
-_AXIS, _SIX = NODE_ROWS * _TOGETHER, 6 * _TOGETHER
+_AXIS, _SIX = NODE_ROWS * TOGETHER, 6 * TOGETHER
 _TURN = 3 * _AXIS
-_POINT = _TURN + 9 * _TOGETHER
+_POINT = _TURN + 9 * TOGETHER
 _PARTS = _POINT + 3 * _SIX
 _SCRATCH = _PARTS + 5 * _SIX
 
@@ -55,8 +55,8 @@ def _slopes(table, same, gamma, work, lanes, columns, scratch, tips, out):
         _clear(columns)
         for k in range(table.shape[0] - 1, -1, -1):
             node_values(work, lanes, table, k)
-            for group in range(-(-count // _TOGETHER)):
-                begin = group * _TOGETHER
+            for group in range(-(-count // TOGETHER)):
+                begin = group * TOGETHER
                 _expand(work, begin, scratch)
                 for axis in range(3):
                     _pull_back(work, begin, scratch, axis, same)
@@ -86,7 +86,7 @@ def _store(work, columns, first, count, tips, out):
 @inline
 def _expand(work, begin, scratch):
     """Move the points of a group of lanes, and write what their derivatives are made of."""
-    for lane in range(_TOGETHER):
+    for lane in range(TOGETHER):
         i = begin + lane
         base, middle, tip = nodes_at(work, i)
         omega, (b1, b2, inner, left, right) = exponent_and_parts(base, middle, tip)
@@ -94,8 +94,8 @@ def _expand(work, begin, scratch):
         work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i] = x, y, z
         turn, first, second = exp_derivatives(omega)
         _write_row(scratch, _TURN + lane, turn[0])
-        _write_row(scratch, _TURN + 3 * _TOGETHER + lane, turn[1])
-        _write_row(scratch, _TURN + 6 * _TOGETHER + lane, turn[2])
+        _write_row(scratch, _TURN + 3 * TOGETHER + lane, turn[1])
+        _write_row(scratch, _TURN + 6 * TOGETHER + lane, turn[2])
         # dp = B ω + A v + A ω × p, row by row
         _write_twist(scratch, _POINT + lane, _row(second[0], z, first[1], -y, first[2], first[0]))
         _write_twist(
@@ -114,7 +114,7 @@ def _expand(work, begin, scratch):
 @inline
 def _pull_back(work, begin, scratch, axis, same):
     """Write what multiplies changes of the tables' rows in one coordinate: theory (28)."""
-    for lane in range(_TOGETHER):
+    for lane in range(TOGETHER):
         b1 = _straight(scratch, _PARTS + lane)
         b2 = _straight(scratch, _PARTS + _SIX + lane)
         inner = _twist(scratch, _PARTS + 2 * _SIX + lane)
@@ -124,20 +124,20 @@ def _pull_back(work, begin, scratch, axis, same):
         base, middle, tip = pulled_back((b1, b2, inner, left, right), row)
         to, i = axis * _AXIS + lane, begin + lane
         _write_node(work, i, scratch, to, base, same)
-        _write_node(work, 4 * LANES + i, scratch, to + 4 * _TOGETHER, middle, same)
-        _write_node(work, 8 * LANES + i, scratch, to + 8 * _TOGETHER, tip, same)
-        _write_row(scratch, to + BEND_ROWS * _TOGETHER, (base[5], middle[5], tip[5]))
+        _write_node(work, 4 * LANES + i, scratch, to + 4 * TOGETHER, middle, same)
+        _write_node(work, 8 * LANES + i, scratch, to + 8 * TOGETHER, tip, same)
+        _write_row(scratch, to + BEND_ROWS * TOGETHER, (base[5], middle[5], tip[5]))
 
 
 @inline
 def _twist(scratch, at):
     return (
         scratch[at],
-        scratch[at + _TOGETHER],
-        scratch[at + 2 * _TOGETHER],
-        scratch[at + 3 * _TOGETHER],
-        scratch[at + 4 * _TOGETHER],
-        scratch[at + 5 * _TOGETHER],
+        scratch[at + TOGETHER],
+        scratch[at + 2 * TOGETHER],
+        scratch[at + 3 * TOGETHER],
+        scratch[at + 4 * TOGETHER],
+        scratch[at + 5 * TOGETHER],
     )
 
 
@@ -151,12 +151,12 @@ def _straight(scratch, at):
 @inline
 def _write_twist(scratch, to, a):
     _write_row(scratch, to, a[:3])
-    _write_row(scratch, to + 3 * _TOGETHER, a[3:])
+    _write_row(scratch, to + 3 * TOGETHER, a[3:])
 
 
 @inline
 def _write_row(scratch, to, row):
-    scratch[to], scratch[to + _TOGETHER], scratch[to + 2 * _TOGETHER] = row
+    scratch[to], scratch[to + TOGETHER], scratch[to + 2 * TOGETHER] = row
 
 
 @inline
@@ -178,9 +178,9 @@ def _write_node(work, i, scratch, to, row, same):
     growth = work[i]
     bend = row[0] * work[i + LANES] + row[1] * work[i + 2 * LANES] + row[2] * work[i + 3 * LANES]
     scratch[to] = bend + same * row[5]
-    scratch[to + _TOGETHER] = growth * row[0]
-    scratch[to + 2 * _TOGETHER] = growth * row[1]
-    scratch[to + 3 * _TOGETHER] = growth * row[2]
+    scratch[to + TOGETHER] = growth * row[0]
+    scratch[to + 2 * TOGETHER] = growth * row[1]
+    scratch[to + 3 * TOGETHER] = growth * row[2]
 
 
 @inline
@@ -188,10 +188,10 @@ def _carry(column, begin, scratch, table, k, j):
     """Carry the derivatives by one activation across step k."""
     t = table[k, :, j]
     bends = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9], t[10], t[11]
-    for lane in range(_TOGETHER):
+    for lane in range(TOGETHER):
         i = begin + lane
         point = column[i], column[LANES + i], column[2 * LANES + i]
-        x, y, z = _TURN + lane, _TURN + 3 * _TOGETHER + lane, _TURN + 6 * _TOGETHER + lane
+        x, y, z = _TURN + lane, _TURN + 3 * TOGETHER + lane, _TURN + 6 * TOGETHER + lane
         column[i] = _coordinate(scratch, x, lane, point, bends)
         column[LANES + i] = _coordinate(scratch, y, _AXIS + lane, point, bends)
         column[2 * LANES + i] = _coordinate(scratch, z, 2 * _AXIS + lane, point, bends)
@@ -206,30 +206,30 @@ def _stretch(column, begin, scratch, table, k, j):
         table[k, BEND_ROWS + 2, j],
     )
     for axis in range(3):
-        for lane in range(_TOGETHER):
-            at = axis * _AXIS + BEND_ROWS * _TOGETHER + lane
-            along = scratch[at] * base + scratch[at + _TOGETHER] * middle
-            column[axis * LANES + begin + lane] += along + scratch[at + 2 * _TOGETHER] * tip
+        for lane in range(TOGETHER):
+            at = axis * _AXIS + BEND_ROWS * TOGETHER + lane
+            along = scratch[at] * base + scratch[at + TOGETHER] * middle
+            column[axis * LANES + begin + lane] += along + scratch[at + 2 * TOGETHER] * tip
 
 
 @inline
 def _coordinate(scratch, turn, base, point, t):
     """A row of R with the derivative of the point, and the sum over a column of the table."""
-    middle, tip = base + 4 * _TOGETHER, base + 8 * _TOGETHER
+    middle, tip = base + 4 * TOGETHER, base + 8 * TOGETHER
     return (
         scratch[turn] * point[0]
-        + scratch[turn + _TOGETHER] * point[1]
-        + scratch[turn + 2 * _TOGETHER] * point[2]
+        + scratch[turn + TOGETHER] * point[1]
+        + scratch[turn + 2 * TOGETHER] * point[2]
         + scratch[base] * t[0]
-        + scratch[base + _TOGETHER] * t[1]
-        + scratch[base + 2 * _TOGETHER] * t[2]
-        + scratch[base + 3 * _TOGETHER] * t[3]
+        + scratch[base + TOGETHER] * t[1]
+        + scratch[base + 2 * TOGETHER] * t[2]
+        + scratch[base + 3 * TOGETHER] * t[3]
         + scratch[middle] * t[4]
-        + scratch[middle + _TOGETHER] * t[5]
-        + scratch[middle + 2 * _TOGETHER] * t[6]
-        + scratch[middle + 3 * _TOGETHER] * t[7]
+        + scratch[middle + TOGETHER] * t[5]
+        + scratch[middle + 2 * TOGETHER] * t[6]
+        + scratch[middle + 3 * TOGETHER] * t[7]
         + scratch[tip] * t[8]
-        + scratch[tip + _TOGETHER] * t[9]
-        + scratch[tip + 2 * _TOGETHER] * t[10]
-        + scratch[tip + 3 * _TOGETHER] * t[11]
+        + scratch[tip + TOGETHER] * t[9]
+        + scratch[tip + 2 * TOGETHER] * t[10]
+        + scratch[tip + 3 * TOGETHER] * t[11]
     )

@@ -35,6 +35,7 @@ LANES = 128
 BEND_ROWS = 12
 NODE_ROWS = BEND_ROWS + 3
 TIP = NODE_ROWS * LANES
+TOGETHER = 16  # lanes of derivatives: the last searches of many ask for a few rods at a time
 WORK = TIP + 3 * LANES
 _GROUP = 4  # bundles added at once
 

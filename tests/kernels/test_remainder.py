@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from softreach.kernels.box.cubic_errors import cubic_errors
+from softreach.kernels.rod.remainder import cubic_errors
 
 
 @pytest.mark.parametrize("bundles", [1, 3, 4, 6])
