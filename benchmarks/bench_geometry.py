@@ -147,7 +147,7 @@ def measured(name: str, n: int, repeat: int) -> dict[str, float]:
 
 def main(n: int = 400_000, repeat: int = 3, names: tuple[str, ...] = tuple(ROUTES)) -> None:
     """Print the table; ratios are of CPU seconds, which other work disturbs least."""
-    print(f"Hulls of {n:,} points, α = {ALPHA} L, the best of {repeat}\n")
+    print(f"## Hulls of {n:,} points, α = {ALPHA} L, the best of {repeat}\n")
     print("| route | V [L³] | wall [s] | CPU [s] | memory [GB] | times less CPU than SciPy |")
     print("|---|--:|--:|--:|--:|--:|")
     slowest = None

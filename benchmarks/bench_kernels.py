@@ -193,7 +193,7 @@ def _cloud_table(n: int) -> None:
     side = int(np.cbrt(n))
     sizes = {"uniform": n, "boundary": n, "sobol": 1 << (n.bit_length() - 1), "grid": side**3}
     for sampler, size in sizes.items():
-        run = partial(sr.compute_cloud, arm, size, 0, sampler, progress=lambda _: None)
+        run = partial(sr.compute_cloud, arm, size, sampler=sampler, progress=lambda _: None)
         seconds = best_time(run, repeat=3)
         share = tips * size / seconds.cpu
         print(f"| {sampler} | {size:,} | {seconds.wall:.3f} | {seconds.cpu:.3f} | {share:.0%} |")
