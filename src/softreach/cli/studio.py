@@ -25,7 +25,7 @@ _HERE = "127.0.0.1"
 def studio(
     source: Annotated[
         str,
-        Parameter(help="Design or its file (.toml), saved state (.json), cloud or atlas (.zarr)."),
+        Parameter(help="Design or its file (.toml), saved state (.json) or cloud (.zarr)."),
     ] = "minimal_trunk",
     /,
     *,
@@ -144,10 +144,10 @@ def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
 
 
 def _start(source: str) -> Start:
-    from softreach.studio.start import start_on_design, start_on_state, start_on_store
+    from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
 
     if source.rstrip("/").endswith(".zarr"):
-        return start_on_store(source)
+        return start_on_cloud(source)
     if source.lower().endswith(".json"):
         return start_on_state(source)
     return start_on_design(design_from(source))

@@ -12,34 +12,30 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
-from softreach.picture.axes_box import round_box
 from softreach.plot.style import pyplot
-from softreach.studio.fields import attempt
 from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
 from softreach.studio.jobs.calibration import DrawSample, FitArm
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
-from softreach.studio.jobs.morph import WriteMorph
-from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
-from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
+from softreach.studio.jobs.needs import CheckNeeds, ConfirmNeeds
+from softreach.studio.jobs.page import KeepState, SetTheme
+from softreach.studio.jobs.path import FollowPath, PlayPath
 from softreach.studio.jobs.plots import PLOT_JOBS
 from softreach.studio.jobs.reach import (
     ComputeReach,
     DifferentiateVolume,
     DrawArm,
     DrawCloud,
-    DrawSurfaces,
+    DrawSurface,
     FollowCamera,
     SweepReach,
 )
-from softreach.studio.jobs.search import CheckNeeds, ConfirmNeeds, DrawSearch, SearchDesigns
-from softreach.studio.scene.camera import framing
 from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
 from softreach.studio.serve.messages import LARGEST_UPLOAD
 from softreach.studio.serve.server import page_url, start_server, stop_server
-from softreach.studio.serve.viser_fixes import close_sockets, guard_inputs, request_path
+from softreach.studio.serve.viser_fixes import close_sockets, guard_inputs
 from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
-from softreach.studio.start import KeptWork, Start, state_in_request
+from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import CompilationWatch, IdleCompiler, Latest, StaleCheck
 from softreach.support.errors import InvalidInput, SoftreachError
@@ -52,19 +48,18 @@ if TYPE_CHECKING:
 __all__ = ["JOBS", "Studio"]
 
 JOBS: tuple[type[Job], ...] = (
-    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurfaces, FollowCamera, SweepReach,
+    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurface, FollowCamera, SweepReach,
     DrawFree, DrawReference, DrawReferenceArm,
     SolveInverse, DragTip,
-    FollowPath, PlayPath, WriteMovie, WriteMorph,
+    FollowPath, PlayPath,
     DrawSample, FitArm,
-    CheckNeeds, ConfirmNeeds, SearchDesigns, DrawSearch,
+    CheckNeeds, ConfirmNeeds,
     *PLOT_JOBS,
-    DrawMap, SetTheme, KeepState,
+    SetTheme, KeepState,
 )  # fmt: skip
 """Every kind of work that a tab has done for it."""
 
 _CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
-_CAMERA_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
 _PATIENCE = 0.5  # [s]
 _MOST_LEFT = 20  # closed tabs whose work is remembered
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
@@ -117,9 +112,7 @@ class Studio:
         self._libraries = threading.Thread(target=_load_libraries, daemon=True)
         self._libraries.start()
         self.server = start_server(host, port, token)
-        camera = start.state.camera or (
-            _camera_beside(start.state.design) if start.atlas is None else _CAMERA_ON_MAP
-        )
+        camera = start.state.camera or _camera_beside(start.state.design)
         self.server.initial_camera.position = camera.position
         self.server.initial_camera.look_at = camera.look_at
         self.server.on_client_connect(self._connected)
@@ -187,21 +180,18 @@ class Studio:
             self.sessions[client.client_id] = session
         if left is not None:
             session.take_up(*left)
-        _furnish(session, page_url(self.server))
+        _furnish(session)
         session.camera.on_move(lambda: session.follow(FollowCamera))
         session.job(SweepReach).is_due = self._sweeps and left is None
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)
         elif session.camera.is_upright and (left is None or left[0].camera is None):
-            _look_at_all(session)
+            session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
         elif left is not None and not left[1].past:
             session.say(_GOES_ON)
-        if session.atlas is not None and session.board is None:
-            session.say("There is no map: the atlas is no grid of two parameters or more.")
-        attempt(session, lambda: self._follow_link(session))
         self._rested.submit(partial(self._compile_ahead, session))
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)
@@ -212,13 +202,6 @@ class Studio:
             check()
         if self._compiler is not None:
             self._compiler.start()
-
-    def _follow_link(self, session: Session) -> None:
-        """Bring a tab that was opened by a link into its state."""
-        state = state_in_request(request_path(self.server, session.client.client_id))
-        if state is not None:
-            session.job(SweepReach).is_due = False
-            session.restore(state)
 
     def _disconnected(self, client: ClientHandle) -> None:
         with self._lock:
@@ -266,35 +249,24 @@ def _camera_beside(arm: Manipulator) -> Camera:
     return Camera(position=vector(position), look_at=vector(look_at))
 
 
-def _look_at_all(session: Session) -> None:
-    """See arm and map in the upper half of a phone."""
-    if session.board is None:
-        session.look_from("oblique")
-        return
-    low, high = round_box(np.vstack([*session.scene.axes.corners, session.board.corners]))
-    toward = np.subtract(_CAMERA_ON_MAP.position, _CAMERA_ON_MAP.look_at)
-    session.camera.look_from(framing(low, high, toward, session.camera.aspect))
-
-
 def _refuse_file(session: Session, name: str, size: int) -> None:
     most = f"at most {LARGEST_UPLOAD / 1e6:g} MB"
     session.say(str(InvalidInput(name, f"{size / 1e6:.3g} MB", most)))
 
 
-def _furnish(session: Session, url: str) -> None:
+def _furnish(session: Session) -> None:
     """Add the panels, and let clicks in the scene reach those that wait for them."""
     from softreach.studio.tabs.activation import ActivationPanel
-    from softreach.studio.tabs.atlas import AtlasPanel
     from softreach.studio.tabs.calibrate import CalibratePanel
     from softreach.studio.tabs.compare import ComparePanel
     from softreach.studio.tabs.design import DesignPanel
     from softreach.studio.tabs.export import ExportPanel
     from softreach.studio.tabs.inverse import DragPanel, InversePanel
     from softreach.studio.tabs.loads import LoadsPanel
+    from softreach.studio.tabs.needs import NeedsPanel
     from softreach.studio.tabs.parts import PartsPanel
     from softreach.studio.tabs.path import PathPanel
     from softreach.studio.tabs.plots import PlotsPanel
-    from softreach.studio.tabs.search import SearchPanel
     from softreach.studio.tabs.status import StatusPanel, add_history
     from softreach.studio.tabs.view import ViewPanel
 
@@ -307,16 +279,16 @@ def _furnish(session: Session, url: str) -> None:
         "Parts": (LoadsPanel, PartsPanel),
         "Move": (DragPanel, ActivationPanel, InversePanel, PathPanel),
         "View": (ViewPanel,),
-        "Plots": (PlotsPanel,) if session.board is None else (PlotsPanel, AtlasPanel),
+        "Plots": (PlotsPanel,),
         "Compare": (ComparePanel,),
-        "Goals": (SearchPanel, CalibratePanel),
+        "Goals": (NeedsPanel, CalibratePanel),
     }
     for name, together in kinds.items():
         tab = tabs.add_tab(name)
         made += [kind(gui, tab, session) for kind in together]
-    ExportPanel(gui, tabs.add_tab("Export"), session, url)
+    ExportPanel(gui, tabs.add_tab("Export"), session)
     session.panels = made
-    clickable = AtlasPanel | SearchPanel | PathPanel | InversePanel
+    clickable = NeedsPanel | PathPanel | InversePanel
     waiting = [panel for panel in reversed(made) if isinstance(panel, clickable)]
 
     @session.client.scene.on_click()

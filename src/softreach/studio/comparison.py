@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -89,35 +87,6 @@ def comparison_html(comparison: Comparison) -> str:
         paragraph("Some differ in more than these numbers.") if comparison.differ_otherwise else ""
     )
     return table(["design", *comparison.titles], rows) + more
-
-
-def comparison_csv(comparison: Comparison) -> str:
-    """The table as text, with errors and with differences from the first design."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    parts = [part for j in range(len(comparison.titles)) for part in _csv_columns(comparison, j)]
-    writer.writerow(["design", *(title for title, _ in parts)])
-    for k, name in enumerate(comparison.names):
-        cells = (column[k] for _, column in parts)
-        numbers = ("" if cell is None else repr(cell) for cell in cells)
-        writer.writerow([_plain(name), *numbers])
-    return text.getvalue()
-
-
-def _csv_columns(comparison: Comparison, column: int) -> list[tuple[str, list[Value]]]:
-    """A column, its errors if it has any, and the differences from the first design."""
-    title, rows = _plain(comparison.titles[column]), range(len(comparison.names))
-    errors = [comparison.errors[k][column] for k in rows]
-    return [
-        (title, [comparison.values[k][column] for k in rows]),
-        *([(f"{title} error", errors)] if any(error is not None for error in errors) else []),
-        (f"{title} difference", [comparison.difference(k, column) for k in rows]),
-    ]
-
-
-def _plain(text: str) -> str:
-    """Text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text[:1] in "=+-@\t" else text
 
 
 def _cell(comparison: Comparison, row: int, column: int) -> list[Part]:

@@ -9,9 +9,15 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from softreach.studio.expressions import number_kind, unit_in, vector_kind
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import Line, SliderField, TypedField
+from softreach.studio.widgets import (
+    Line,
+    SliderField,
+    TypedField,
+    number_kind,
+    unit_in,
+    vector_kind,
+)
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:

@@ -110,19 +110,6 @@ def alert(text: str) -> str:
     return f'<div role="alert" style="{_ALERT}">{inline(text)}</div>'
 
 
-def movie(name: str, frames: Sequence[str]) -> str:
-    """Frames, as addresses of pictures, that the page records as a video of this name, as HTML."""
-    return (
-        f'<div hidden data-movie="{inline(name)}" data-frames="{inline(" ".join(frames))}"></div>'
-    )
-
-
-def link(address: str, text: str, rest: str) -> str:
-    """A link that opens a new tab, and text after it, as HTML."""
-    target = f'<a href="{inline(address)}" target="_blank" rel="noopener">{inline(text)}</a>'
-    return f'<div style="{_SMALL}">{target}{inline(rest)}</div>'
-
-
 def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
     """A bar from the middle of its track under a slider, text under its label, as HTML.
 

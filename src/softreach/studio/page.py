@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import textwrap
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from softreach.studio import markup
 from softreach.studio.captions import ScaleBar, legend_text, reach_text
 from softreach.studio.reach import Reach
-from softreach.studio.scene.camera import lens
+from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.clouds import key_html
 from softreach.studio.scene.scene import Scene
 from softreach.studio.serve.server import start_server, stop_server
@@ -38,7 +37,7 @@ _INK = {False: ("white", "#222"), True: ("#141414", "#ddd")}
 """Paper and letters of a light page and of a dark one."""
 
 
-def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | None = None) -> str:
+def static_page(state: StudioState, reach: Reach) -> str:
     """The page, with the numbers of the design and its file under the scene.
 
     Only a server's scene can be saved, so one is started for a moment, on loopback. What hides the
@@ -47,7 +46,6 @@ def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | N
     Args:
         state: What to show.
         reach: Of its design.
-        picture: RGB beside the numbers, such as the map of an atlas.
     """
     server = start_server()
     try:
@@ -59,28 +57,26 @@ def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | N
     finally:
         stop_server(server)
     end = page.rindex("</body>")
-    caption = _html_caption(state, reach, key + _html_image(picture))
+    caption = _html_caption(state, reach, key)
     return page[:end] + _LAYOUT + caption + page[end:]
 
 
 def _look(server: ViserServer, scene: Scene, state: StudioState) -> None:
     """Begin at the camera of a state, and let it see the arm."""
     assert state.camera is not None
-    chosen, place = lens(state.camera, orthographic=state.appearance.orthographic)
     first = server.initial_camera
-    first.position, first.look_at = place.position, place.look_at
-    first.fov, first.near, first.far = chosen.fov, chosen.near, chosen.far
-    viewpoint = scene.viewpoint(place, state)
+    first.position, first.look_at = state.camera.position, state.camera.look_at
+    viewpoint = scene.viewpoint(state.camera, state)
     scene.clouds.look(viewpoint, state.appearance.cut)
     scene.axes.turn(viewpoint.position)
 
 
 def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
     look = state.showing(level=min(_MOST, state.appearance.level)).appearance
-    scene.draw_axes(reach, look)
+    scene.draw_axes(reach)
     if look.arm:
         scene.draw_arm(state.design, state.activation)
-    of_surface = scene.draw_surfaces(reach, look)
+    of_surface = scene.draw_surface(reach, look)
     return key_html(scene.draw_cloud(reach, look) or of_surface)
 
 
@@ -91,19 +87,6 @@ def _html_caption(state: StudioState, reach: Reach, key: str) -> str:
     paper, ink = _INK[state.appearance.dark]
     colors = f"background:{paper};color:{ink}"
     return f'<div data-softreach style="{_BOX};{colors}">{numbers}{key}{marks}{design}</div>'
-
-
-def _html_image(picture: NDArray[np.uint8] | None) -> str:
-    """The picture inside the page itself."""
-    if picture is None:
-        return ""
-    from matplotlib.image import imsave
-
-    file = io.BytesIO()
-    imsave(file, picture, format="png")
-    data = base64.b64encode(file.getvalue()).decode()
-    shown = f'<img alt="map" style="width:20em" src="data:image/png;base64,{data}">'
-    return f"<details><summary>atlas</summary>{shown}</details>"
 
 
 # What a tab shows as a picture that explains itself: key, numbers and design under the scene.
@@ -120,27 +103,25 @@ def picture_file(
     reach: Reach,
     key: BundleKey | ScalarKey | None,
     bar: ScaleBar,
-    scale: int = 1,
 ) -> bytes:
     """The picture as PNG.
 
     Args:
-        scene: What the canvas shows, RGBA on a transparent ground.
+        scene: What the canvas shows, RGBA on a transparent ground, finer than the page.
         state: What it shows.
         reach: Of its design.
         key: To its colors.
         bar: In the lower left of the scene, in pixels of the page.
-        scale: Pixels of the scene for each of the page, along each side.
     """
     from matplotlib.figure import Figure
 
-    height, width = (size / scale for size in scene.shape[:2])
+    height, width = (size / FINER for size in scene.shape[:2])
     lines = _wrapped(_caption(state, reach), int(width))
     below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
-    total, dpi = height + below, _DPI * scale
+    total, dpi = height + below, _DPI * FINER
     paper, ink = _INK[state.appearance.dark]
     figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=dpi, facecolor=paper)
-    figure.figimage(scene, 0, below * scale)
+    figure.figimage(scene, 0, below * FINER)
     _draw_bar(figure, bar, (_EDGE / width, (below + _EDGE) / total), (width, total), ink)
     if key is not None:
         _draw_key(figure, key, (1 - (height + 0.35 * _KEY) / total, _KEY / total), ink)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
-from softreach.cloud.volume import concave_hull
 from softreach.picture.shading import vertex_normals
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.studio.state import TOL, solvable_rod
@@ -24,7 +23,6 @@ from softreach.studio.work import (
     affordable_level,
     all_cores,
     level_in_memory,
-    memory_share,
 )
 from softreach.support.errors import InvalidInput, no_warnings
 from softreach.workspace import (
@@ -39,10 +37,6 @@ from softreach.workspace.sheets import Sheets
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.geometry.hull import Hull
-
-_ALPHA_NUMBERS = 128
-"""A point of an α-shape takes about as much memory as a sample of so many activations."""
 
 _INSIDE = 2e-3
 """Depth behind a boundary at which activations are counted [L]."""
@@ -189,19 +183,6 @@ class Reach:
     def share(self, status: TipStatus) -> float:
         """Share of the samples that have a status [-]."""
         return float((self.status == status).mean())
-
-    @cached_property
-    def alpha_shape(self) -> Hull:
-        """The α-shape of at most 2^17 points that are stable, α = 0.05 L."""
-        rows = shown_rows(self, level_in_memory(_ALPHA_NUMBERS, memory_share(), 17))
-        with all_cores, no_warnings():  # coarse clouds are sparse
-            return concave_hull(self.cloud.tip[rows[self.status[rows] == TipStatus.STABLE]])
-
-    @property
-    def alpha_volume(self) -> float | None:
-        """Volume of the α-shape [m³], if it is known; nothing is computed."""
-        hull: Hull | None = vars(self).get("alpha_shape")
-        return None if hull is None else hull.volume
 
 
 def shown_samples(reach: Reach, level: int) -> Rows:

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.atlas_map import MapBoard, board_of
 from softreach.studio.plots.plot import Figures
 from softreach.studio.reach import Reach, cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
@@ -27,14 +26,12 @@ from softreach.studio.work import Latest, StaleCheck, return_memory_soon
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
-    import xarray as xr
     from viser import ClientHandle
 
     from softreach.inverse import Solution
     from softreach.plot.coloring import BundleKey, ScalarKey
     from softreach.requirements import Check
     from softreach.studio.jobs.calibration import Bench
-    from softreach.studio.jobs.search import SearchRun
     from softreach.studio.scene.drag import TipDrag
     from softreach.studio.slopes import VolumeSlopes
 
@@ -43,9 +40,8 @@ __all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
 Array = NDArray[np.float64]
 _Kind = TypeVar("_Kind", bound="Job")
 
-_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits, with the usual lens
-_LINE = 1.0  # pixels of the page that edges are thick in a larger picture
-_SMOOTH = 2  # pixels of a picture for each of the page, of which smooth edges are made
+_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
+_LINE = 1.0  # pixels of the page that edges are thick in a picture
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
 
@@ -189,8 +185,6 @@ class Session:
         """Place of the tip [L]; None before it is known, and without equilibrium."""
         self.posture: TipStatus | None = None
         """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
-        self.trail: list[Array] = []
-        """Places of the tip before [L]."""
         self.answer: Solution | None = None
         """Of the inverse problem."""
         self.drag: TipDrag | None = None
@@ -203,12 +197,8 @@ class Session:
         """The design against its needs, or the design before it until that is known."""
         self.check_refusal = ""
         """Reason why it cannot be judged."""
-        self.search: SearchRun | None = None
-        """The search that was begun last."""
         self.figures = Figures()
         """Results of the plots beside the scene."""
-        self.atlas: xr.Dataset | None = start.atlas
-        self.board: MapBoard | None = board_of(self.scene, self.atlas)
         self.drawing = threading.RLock()
         """Held while nodes that several jobs draw are taken away and drawn again."""
         self._changing, self._showing = threading.RLock(), threading.RLock()
@@ -276,7 +266,7 @@ class Session:
         points = cloud_points(reach, look.level)
         hidden = self.scene.clouds.hidden(points) & shows_cloud(reach, look)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
-        hit = picked_point(points[seen], origin, direction, _CLICK * self.camera.narrowness)
+        hit = picked_point(points[seen], origin, direction, _CLICK)
         if hit is None:
             return None
         sample = int(shown_rows(reach, look.level)[seen[hit]])
@@ -293,23 +283,21 @@ class Session:
             camera = framing(*self.scene.axes.corners, toward, self.camera.aspect)
         self.camera.look_from(camera)
 
-    def picture(self, scale: int = 1) -> NDArray[np.uint8]:
-        """Picture of the tab, `scale` pixels for each of the page along each side, RGBA.
+    def picture(self) -> NDArray[np.uint8]:
+        """Picture of the tab, RGBA, with `camera.FINER` pixels for each of the page a side.
 
         Raises:
             InvalidInput: As `TabCamera.picture`.
         """
         if self.reach is None:
-            return self.camera.picture(scale)
-        drawn = max(scale, _SMOOTH)
+            return self.camera.picture()
         thickness = _LINE / self.camera.pixels_per_length
         with self.drawing:
             self.scene.draw_thick_lines(self.reach, self.state.appearance, thickness)
             try:
-                picture = self.camera.picture(drawn)
+                return self.camera.picture()
             finally:
                 self.scene.remove("/thick-lines")
-        return picture if drawn == scale else _reduced(picture, drawn // scale)
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
@@ -352,7 +340,7 @@ class Session:
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""
-        return self.state.replace(camera=self.camera.usual())
+        return self.state.replace(camera=self.camera.actual())
 
     def say(self, note: str) -> None:
         """Show text to the reader."""
@@ -441,9 +429,9 @@ class Session:
         for worker in self._workers.values():
             worker.close()
         # viser may hold on to what belongs to a page for a while; clouds are large.
-        self.reach = self.free = self.reference = self.answer = self.atlas = None
-        self.panels, self.trail, self.figures, self.bench = [], [], Figures(), None
-        self.check = self.search = self.slopes = None
+        self.reach = self.free = self.reference = self.answer = None
+        self.panels, self.figures, self.bench = [], Figures(), None
+        self.check = self.slopes = None
         self._shown.clear()
         return_memory_soon()
 
@@ -469,10 +457,3 @@ class Session:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST_NOTE else f"{text[:_LONGEST_NOTE]} ..."
-
-
-def _reduced(picture: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
-    """The picture with one pixel for a square of so many along each side."""
-    from PIL import Image
-
-    return np.asarray(Image.fromarray(picture).reduce(factor))

@@ -42,12 +42,6 @@ class PlotSettings:
         """A copy with another parameter."""
         return replace(self, parameter=parameter)
 
-    @classmethod
-    def from_fields(cls, values: Mapping[str, Any]) -> Self:
-        """Settings from what a saved state holds of them; an older one has a switch a plot."""
-        shown = values.get("shown", [name for name, on in values.items() if on is True])
-        return cls(shown=tuple(shown), parameter=values.get("parameter", ""))
-
 
 @dataclass(frozen=True, kw_only=True)
 class TipPath:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import parameters
 from softreach.studio import markup
-from softreach.studio.expressions import unit_in
 from softreach.studio.reach import Quality, Reach
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
+from softreach.studio.widgets import unit_in
 from softreach.studio.work import Budget, OverBudget, StaleCheck
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.parallel import undivided

@@ -1,21 +1,16 @@
-"""Start of a tab: a design, a stored cloud, an atlas, a link, or the work that was kept."""
+"""Start of a tab: a design, a saved state, a stored cloud, or the work that was kept."""
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import os
 import sys
 import threading
-import zlib
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
-from urllib.parse import parse_qs, quote, urlsplit
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.atlas_map import metric_names
 from softreach.studio.files import LARGEST
 from softreach.studio.reach import Quality, Reach, reached
 from softreach.studio.snapshots import Snapshot
@@ -23,11 +18,7 @@ from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.files.atomic import replacing
 from softreach.support.files.kinds import FileKind, text_with
-from softreach.support.files.stores import kind_of
 from softreach.support.files.text import read_text
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +28,6 @@ class Start:
     state: StudioState
     quality: Quality
     reach: Reach | None = None
-    atlas: xr.Dataset | None = None
 
 
 def start_on_design(arm: Manipulator, quality: Quality | None = None) -> Start:
@@ -56,32 +46,17 @@ def start_on_state(path: str | PathLike[str], quality: Quality | None = None) ->
     return Start(state=StudioState.from_json(text), quality=quality or Quality())
 
 
-def start_on_store(path: str | PathLike[str], quality: Quality | None = None) -> Start:
-    """Begin with a cloud that `save_cloud` wrote, or with the largest design of an atlas.
+def start_on_cloud(path: str | PathLike[str], quality: Quality | None = None) -> Start:
+    """Begin with a cloud that `save_cloud` wrote.
 
     Raises:
-        InvalidInput: The store is neither, or the atlas holds no design yet.
+        InvalidInput: There is no cloud at this path.
     """
+    from softreach.cloud.clouds import open_cloud
+
     quality = quality or Quality()
-    if kind_of(path) == "cloud":
-        from softreach.cloud.clouds import open_cloud
-
-        reach = reached(open_cloud(path), quality)
-        return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
-    from softreach.atlas import open_atlas
-
-    atlas = open_atlas(path)
-    return Start(state=StudioState(design=_best(atlas)), quality=quality, atlas=atlas)
-
-
-def _best(atlas: xr.Dataset) -> Manipulator:
-    from softreach.atlas import atlas_design, best_designs
-
-    best = best_designs(atlas, metric_names(atlas)[0])
-    dims = [str(dim) for dim in atlas["status"].dims]
-    if not best.sizes.get("rank"):
-        raise InvalidInput("atlas", "no design is done", "built, at least in part")
-    return atlas_design(atlas, **{dim: float(best[dim].values[0]) for dim in dims})
+    reach = reached(open_cloud(path), quality)
+    return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
 
 
 # Folder of a user for the state of a program.
@@ -204,48 +179,3 @@ def _text(path: Path) -> bytes:
     if len(text) > _LARGEST:
         raise InvalidInput("file", path.name, f"at most {_LARGEST} bytes")
     return text
-
-
-# Link: a web address that holds the state of a tab.
-
-
-_LONGEST = 7000  # a request line may have 8192 characters
-
-
-def state_link(url: str, state: StudioState) -> str:
-    """The address that opens a tab in this state, while the studio serves at that port.
-
-    viser's page hands nothing of its address to the server but the socket that it is told to open,
-    so the state travels in the socket's address.
-
-    Raises:
-        InvalidInput: The state is too long for an address.
-    """
-    packed = base64.urlsafe_b64encode(zlib.compress(state.to_json().encode(), 9)).decode()
-    socket = url.replace("http", "ws", 1) + "/?state=" + packed.rstrip("=")
-    if len(socket) > _LONGEST:
-        raise InvalidInput("state", f"{len(socket)} characters", f"{_LONGEST} in a link", "save it")
-    return f"{url}/?websocket={quote(socket, safe='')}"
-
-
-def state_in_request(path: str) -> StudioState | None:
-    """The state that the socket of a page asks for, or None.
-
-    Raises:
-        InvalidInput: It is no state.
-        InvalidDesign: A design in it cannot exist.
-    """
-    packed = parse_qs(urlsplit(path).query).get("state")
-    return StudioState.from_json(_unpacked(packed[0])) if packed else None
-
-
-def _unpacked(text: str) -> bytes:
-    stream = zlib.decompressobj()
-    try:
-        data = base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True)
-        unpacked = stream.decompress(data, _LARGEST)
-    except (ValueError, zlib.error) as error:
-        raise InvalidInput("link", str(error), "one that the studio made, complete") from None
-    if not stream.eof:
-        raise InvalidInput("link", "cut short", "one that the studio made, complete")
-    return unpacked

@@ -77,7 +77,7 @@ def _is_solvable(arm: Manipulator) -> bool:
         return False
 
 
-VERSION = 1
+VERSION = 2
 LEVELS = range(12, 22)
 """The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
 
@@ -122,20 +122,6 @@ class Slice:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapView:
-    """Metric and parameters of the map of an atlas; "" is the first there is."""
-
-    metric: str = ""
-    right: str = ""
-    """The parameter to the right."""
-    up: str = ""
-    shown: bool = True
-
-    def __post_init__(self) -> None:
-        _check_plain("map", self)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Appearance:
     """Looks of a tab: what is drawn and how."""
 
@@ -145,38 +131,20 @@ class Appearance:
     slice: Slice = field(default_factory=Slice)
     cut: str = "window"
     """Part of the cloud that is cut away in front of the arm: one of `CUTS`."""
-    lit: bool = True
-    """A lamp shines on the points."""
-    orthographic: bool = False
-    """Parallels stay parallel."""
     dark: bool = False
     """The page is dark."""
     cloud: bool = False
     arm: bool = True
-    axes: bool = True
     surface: bool = True
     """The exact boundary of the reachable set."""
-    alpha_shape: bool = False
-    trail: bool = False
-    """A line through the places where the tip has been."""
-    free: bool = True
-    """The cloud without loads, faint, around that of a loaded arm."""
-    ghosts: bool = True
-    """The shapes of all solutions of the inverse problem at once."""
     mouse: str = "tip"
     """Use of the mouse in the scene, one of `MOUSE`; it turns the view besides."""
-    map: MapView = field(default_factory=MapView)
     plots: PlotSettings = field(default_factory=PlotSettings)
 
     @property
     def handle(self) -> bool:
         """True if there is a ball on the tip, to be dragged."""
         return self.mouse == "tip"
-
-    @property
-    def surfaces(self) -> bool:
-        """True if any surface is shown."""
-        return self.surface or self.alpha_shape
 
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
@@ -292,10 +260,10 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
 
 
 def _fields(values: dict[str, Any]) -> dict[str, Any]:
-    look = _looks(dict(values["appearance"]))
-    look["slice"], look["map"] = Slice(**look["slice"]), MapView(**look["map"])
-    look["plots"] = PlotSettings.from_fields(look.get("plots", {}))
-    camera, reference, path = values["camera"], values["reference"], values.get("path")
+    look = dict(values["appearance"])
+    look["slice"] = Slice(**look["slice"])
+    look["plots"] = PlotSettings(**look["plots"])
+    camera, reference, path = values["camera"], values["reference"], values["path"]
     return {
         "design": design_of_text(values["design"], "state file"),
         "activation": tuple(map(float, values["activation"])),
@@ -305,16 +273,8 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "side_by_side": bool(values["side_by_side"]),
         "camera": camera and _camera(**camera),
         "path": path and TipPath.from_fields(path),
-        "needs": str(values.get("needs", "")),
+        "needs": str(values["needs"]),
     }
-
-
-def _looks(look: dict[str, Any]) -> dict[str, Any]:
-    """Looks that a state holds; an older one has a size of points and a switch of the ball."""
-    look.pop("point_size", None)
-    if "handle" in look:
-        look["mouse"] = "tip" if look.pop("handle") else "none"
-    return look
 
 
 def _camera(position: Any, look_at: Any, aspect: float | None = None) -> Camera:
@@ -332,7 +292,7 @@ def _check_number(name: str, value: object, low: float, high: float) -> None:
         raise InvalidInput(name, value, f"{low:g} to {high:g}")
 
 
-def _check_plain(name: str, value: Appearance | MapView) -> None:
+def _check_plain(name: str, value: Appearance) -> None:
     """Texts are texts and switches are switches, in a state that came from elsewhere too."""
     for attribute in fields(value):
         content = getattr(value, attribute.name)

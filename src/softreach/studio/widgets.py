@@ -8,15 +8,16 @@ tells when Enter is pressed.
 from __future__ import annotations
 
 import math
+import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
-from softreach.support.quantity import shortened
+from softreach.support.quantity import shortened, sizes_in
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _PRECISION = 12
 """Digits after the point that viser leaves of what a slider holds."""
 _UNAPPLIED = "Enter applies it."
+_DIGITS = 15  # of what was converted from another unit
+_UNIT_IN = re.compile(r"\[([^\]]+)\]$| / (L)$")
 
 
 class Line:
@@ -93,11 +96,10 @@ def number_text(value: float) -> str:
     return f"{value:.12g}"
 
 
-def vector_of(text: str) -> tuple[float, ...] | None:
-    """The three finite numbers that a text lists; None if it does not."""
-    numbers = [number_of(part) for part in text.replace(";", ",").replace(",", " ").split()]
-    finite = tuple(value for value in numbers if value is not None)
-    return finite if len(numbers) == len(finite) == 3 else None
+def unit_in(label: str) -> str:
+    """The unit that a label names, as in "taper φ [deg]" and "target / L"; "" for none."""
+    match = _UNIT_IN.search(label)
+    return "" if match is None else match[1] or match[2]
 
 
 class TextKind(NamedTuple):
@@ -106,22 +108,62 @@ class TextKind(NamedTuple):
     demand: str
     """Demand on a text, as in "must be a number"."""
     value: Callable[[str], Any]
-    """From a text; None if it is no such value, or a `ValueError` that says what is wrong."""
+    """From a text; None if it is no such value."""
     text: Callable[[Any], str]
     """From a value, as a person would type it."""
-    is_worked_out: Callable[[str], bool] = lambda _: False
-    """True for a text in whose place its value is shown once it is applied."""
 
 
-NUMBER = TextKind("a number", number_of, number_text)
+def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
+    """Numbers in a unit, or with another one behind them.
+
+    Args:
+        unit: Of what has none; "" for plain numbers.
+        length: L [m] of the arm, which is a unit of lengths.
+    """
+    demand = "a number" + _with_units(_units(unit, length()))
+    return TextKind(demand, lambda text: _number(text, _units(unit, length())), number_text)
+
+
+def vector_kind(unit: str, length: Callable[[], float]) -> TextKind:
+    """Three of them, as `number_kind`."""
+
+    def value(text: str) -> tuple[float, ...] | None:
+        mark = next((mark for mark in ";," if mark in text), None)
+        parts = [_number(part, _units(unit, length())) for part in text.split(mark)]
+        finite = tuple(part for part in parts if part is not None)
+        return finite if len(parts) == len(finite) == 3 else None
+
+    demand = "three numbers, such as 0, 0, -9.81" + _with_units(_units(unit, length()))
+    return TextKind(demand, value, lambda vector: ", ".join(map(number_text, vector)))
+
+
+def _number(text: str, units: Mapping[str, float]) -> float | None:
+    """The number that a text is in the unit of a field; None for anything else."""
+    text = text.strip()
+    name = next((name for name in sorted(units, key=len)[::-1] if text.endswith(name)), "")
+    number = number_of(text.removesuffix(name))
+    # 2 deg are 2.0 deg, whatever their sizes in rad
+    return number if number is None or not name else float(f"{number * units[name]:.{_DIGITS}g}")
+
+
+def _units(unit: str, length: float) -> Mapping[str, float]:
+    """Units that may be typed, with their sizes in that of a field."""
+    if not unit:
+        return {}
+    if unit == "L":
+        return {"L": 1.0} | {name: size / length for name, size in sizes_in("m").items()}
+    sizes = sizes_in(unit)
+    return sizes | {"L": length * sizes["m"]} if "m" in sizes else sizes
+
+
+def _with_units(units: Mapping[str, float]) -> str:
+    return f", without a unit or in {', '.join(units)}" if units else ""
 
 
 class TypedField:
     """Text field for a value, applied by Enter and by leaving it; below it a line for refusals."""
 
-    def __init__(
-        self, gui: GuiApi, label: str, value: Any, hint: str, kind: TextKind = NUMBER
-    ) -> None:
+    def __init__(self, gui: GuiApi, label: str, value: Any, hint: str, kind: TextKind) -> None:
         self._kind, self._value = kind, value
         self._is_refused = False
         self._lock = threading.RLock()
@@ -174,18 +216,14 @@ class TypedField:
 
     def _submitted(self, event: Any) -> None:
         text = self._text.value
-        try:
-            value, wrong = self._kind.value(text), ""
-        except ValueError as error:
-            value, wrong = None, f"; {error}"
-        if value is None:
-            self._message.warn(f"{shortened(text)!r}: must be {self._kind.demand}{wrong}")
+        if (value := self._kind.value(text)) is None:
+            self._message.warn(f"{shortened(text)!r}: must be {self._kind.demand}")
             return
         with self._lock:
             self._value = value
             self.warn("")
         self._apply(event)
-        if not self._is_refused and self._kind.is_worked_out(text):
+        if not self._is_refused and number_of(text) is None:  # typed with a unit
             self._text.value = self._kind.text(self._value)
 
     def _apply(self, event: Any) -> None:
@@ -207,8 +245,8 @@ class SliderField(TypedField):
         ends: tuple[float, float],
         step: float,
         value: float,
-        hint: str = "",
-        kind: TextKind = NUMBER,
+        hint: str,
+        kind: TextKind,
     ) -> None:
         self._ends = ends
         self._slider = gui.add_slider(label, *ends, step, self._within(value), hint=hint or None)

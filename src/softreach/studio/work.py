@@ -185,11 +185,6 @@ class OverBudget(Exception):
     """A computation would need more than it may have; the text says of what."""
 
 
-def memory_share() -> float:
-    """Memory that a computation that begins now may plan with [bytes]."""
-    return _SHARE * free_memory()
-
-
 class Budget:
     """Limits of one computation, which has to call it as often as it can."""
 

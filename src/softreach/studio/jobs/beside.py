@@ -18,7 +18,7 @@ _LEVEL = 16
 class DrawFree(Job):
     """The reach of a loaded arm without its loads, faint behind the loaded one."""
 
-    depends_on = "unloaded", "appearance.free", "appearance.slice"
+    depends_on = "unloaded", "appearance.slice"
     only_with = "design.loads"
 
     def run(self, check: StaleCheck) -> None:
@@ -45,7 +45,7 @@ class DrawFree(Job):
     def _draw(self) -> None:
         session = self.session
         with session.drawing, session.client.atomic():
-            session.scene.draw_free(session.free, session.state.appearance)
+            session.scene.draw_free(session.free, session.state.appearance.slice)
             draw_axes(session)
         session.show()
 

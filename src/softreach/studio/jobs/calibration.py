@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -14,13 +13,6 @@ from softreach.calibration.calibration import Calibration, calibrate
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import MarkerModel
-from softreach.calibration.report import (
-    error_cells,
-    error_head,
-    number_rows,
-    remarks,
-)
-from softreach.studio import markup
 from softreach.studio.jobs.reach import FollowCamera
 from softreach.studio.session import AskedJob, Job
 from softreach.studio.state import StudioState
@@ -38,13 +30,9 @@ class Bench:
     arm: Manipulator
     """The design that they were read for."""
     sample: int = 0
-    as_calibrated: bool = False
-    """The markers of the calibrated arm are shown, not those of the design."""
     distances: Array | None = None
     """From the measured to the predicted markers of the sample [m]; None if it is not shown."""
     result: Calibration | None = None
-    summary: str = ""
-    """Tables and remarks on the result, as HTML."""
 
     def fits(self, arm: Manipulator) -> bool:
         """True of an arm with the inputs and the markers of the one that the data were read for."""
@@ -53,6 +41,11 @@ class Bench:
     def posed(self, state: StudioState) -> StudioState:
         """The state with the inputs of the sample, as far as its bounds go."""
         return state.replace(activation=tuple(self.data.inputs[self.sample].tolist()))
+
+    def fitted(self, design: Manipulator) -> Manipulator | None:
+        """The calibrated arm; None without a fit that began with this design."""
+        result = self.result
+        return result.arm if result is not None and result.start == design else None
 
 
 def _columns(arm: Manipulator) -> tuple[object, ...]:
@@ -69,8 +62,6 @@ class DrawSample(Job):
         check()
         session, state, bench = self.session, self.session.state, self.session.bench
         if bench is None:
-            session.scene.remove("/sample")
-            session.follow(FollowCamera)
             return
         if bench.fits(state.design) and bench.posed(state).activation == state.activation:
             self._draw(bench, state)
@@ -81,29 +72,26 @@ class DrawSample(Job):
         session.show()
 
     def _draw(self, bench: Bench, state: StudioState) -> None:
-        session, arm = self.session, state.design
-        if bench.as_calibrated and bench.result is not None:
-            arm = bench.result.arm
+        session, design = self.session, state.design
+        arm = bench.fitted(design) or design
         sample = bench.data.of(np.array([bench.sample]))
         # The inputs of a sample may be beyond the bounds of the design.
         model = MarkerModel.of(free_numbers(arm, ["pose"]), sample)
         predicted, measured = model.of_arm(arm).places[0], sample.places[0]
         bench.distances = np.linalg.norm(predicted - measured, axis=1)
-        length = state.design.length
         with session.drawing, session.client.atomic():
-            session.scene.draw_sample(measured / length, predicted / length)
-            if arm == state.design:
+            session.scene.draw_sample(measured / design.length, predicted / design.length)
+            if arm == design:
                 session.scene.remove("/sample/arm")
             else:
                 same = state.replace(design=arm).activation
-                session.scene.draw_arm(arm, same, "/sample/arm", length)
+                session.scene.draw_arm(arm, same, "/sample/arm", design.length)
 
 
 class FitArm(AskedJob):
     """Fits free numbers of the design to all samples; says how far it is, and can be canceled."""
 
     free: tuple[str, ...] = ()
-    hold_out = 0.0
 
     def do(self, check: StaleCheck) -> None:
         """Fit, and show the calibrated arm."""
@@ -117,36 +105,8 @@ class FitArm(AskedJob):
             session.report(f"calibrating, step {next(steps)}")
 
         with session.working("calibrating"), no_warnings():
-            result = calibrate(
-                session.state.design,
-                bench.data,
-                free=self.free,
-                hold_out=self.hold_out,
-                progress=progress,
-            )
-            check()
-            summary = _summary(result)
+            result = calibrate(session.state.design, bench.data, free=self.free, progress=progress)
         check()
-        bench.result, bench.summary, bench.as_calibrated = result, summary, True
+        bench.result = result
         session.follow(DrawSample)
         session.show()
-
-
-def _summary(result: Calibration) -> str:
-    unit = result.arm.length_unit
-    numbers, errors = number_rows(result, unit), error_cells(result, unit)
-    lines = [*remarks(result, unit)]
-    if not result.fit.converged:
-        lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
-    return "".join(
-        [
-            markup.table(("number", "calibrated", "design"), _lone(numbers)),
-            markup.table(error_head(unit), _lone(errors)),
-            *map(markup.paragraph, lines),
-        ]
-    )
-
-
-def _lone(rows: Iterable[Sequence[str]]) -> list[list[tuple[str]]]:
-    """Cells of one line each."""
-    return [[(cell,) for cell in row] for row in rows]

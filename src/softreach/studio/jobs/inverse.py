@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.inverse.drag import Drag, Dragged
-from softreach.studio.jobs.plots import plots_from
 from softreach.studio.scene.drag import TipDrag
 from softreach.studio.session import Job
 from softreach.studio.state import StudioState, Vector, solvable_rod, vector
@@ -25,7 +24,7 @@ _DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, an
 class SolveInverse(Job):
     """The activations that reach the target, and their shapes."""
 
-    depends_on = "design", "target", "appearance.ghosts"
+    depends_on = "design", "target"
     only_with = "target"
 
     take_nearest = False
@@ -51,7 +50,6 @@ class SolveInverse(Job):
         check()
         self._draw(state.design.length)
         self._move()
-        self.session.refresh(*plots_from("answer"))
         self.session.show()
 
     def _draw(self, length: float) -> None:
@@ -62,9 +60,8 @@ class SolveInverse(Job):
             return
         nearest = None if len(answer) else answer.nearest / length
         session.scene.draw_target(answer.target / length, nearest)
-        if session.state.appearance.ghosts:
-            shapes = answer.activations if len(answer) else answer.nearest_activation[None]
-            session.scene.draw_ghosts(session.state.design, shapes)
+        shapes = answer.activations if len(answer) else answer.nearest_activation[None]
+        session.scene.draw_ghosts(session.state.design, shapes)
 
     def _move(self) -> None:
         """Move the arm to the solution nearest to where it is, once after it was ordered."""

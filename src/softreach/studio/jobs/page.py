@@ -1,4 +1,4 @@
-"""Jobs around the scene: the light of the page, the map of an atlas, the state that is kept."""
+"""Jobs around the scene: the light of the page, the state that is kept."""
 
 from __future__ import annotations
 
@@ -32,24 +32,6 @@ class KeepState(Job):
             time.sleep(_REST / 10)
         check()
         self.session.keep()
-
-
-class DrawMap(Job):
-    """A metric of an atlas over two parameters, and where the design is on it."""
-
-    depends_on = "design", "appearance.map"
-
-    @classmethod
-    def has_use(cls, session: Session) -> bool:
-        """True if there is an atlas that a map can be drawn of."""
-        return session.board is not None
-
-    def run(self, check: StaleCheck) -> None:
-        """Draw it."""
-        check()
-        if self.session.board is not None:
-            self.session.board.draw(self.session.state.appearance.map, self.session.state.design)
-            self.session.show()
 
 
 class SetTheme(Job):

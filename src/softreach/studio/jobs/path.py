@@ -1,26 +1,20 @@
-"""Jobs of a path of the tip: followed, played, written as an animation; paths of plain shapes."""
+"""Jobs of a path of the tip: followed, and played."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from softreach.inverse.path import PathStatus, track_path
-from softreach.plot.path_movie import path_movie
-from softreach.studio.reach import cloud_points
 from softreach.studio.session import AskedJob, Job
 from softreach.studio.settings import TipPath
-from softreach.studio.state import Camera, StudioState, solvable_rod
+from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import StaleCheck
-from softreach.support.errors import InvalidInput
 
 _RESIDUAL = 1e-8  # [L]
 _STEP = 0.05  # [s] between points that are played
-_LEVEL = 14  # of the cloud behind an animation
 
 
 class FollowPath(Job):
@@ -73,31 +67,6 @@ class PlayPath(AskedJob):
             time.sleep(_STEP)
 
 
-class WriteMovie(AskedJob):
-    """The arm along its path as a GIF."""
-
-    def do(self, check: StaleCheck) -> None:
-        """Draw and send it; says how far it is, and can be canceled."""
-        session, path = self.session, self.session.state.path
-        track, reach = session.figures.track, session.reach
-        if track is None or path is None or reach is None:
-            raise InvalidInput("path", "none yet", "followed before it is animated")
-
-        def progress(share: float) -> None:
-            check()
-            session.report(f"drawing path.gif, {100 * share:.0f} %")
-
-        movie = path_movie(
-            track,
-            reach.arm.length * cloud_points(reach, _LEVEL),
-            view=view_from(session.camera.usual()),
-            progress=progress,
-        )
-        check()
-        session.client.send_file_download("path.gif", movie, save_immediately=True)
-        session.say(f"path.gif is written: {len(movie) / 1e6:.1f} MB.")
-
-
 def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioState:
     """The arm at a point of its path.
 
@@ -113,80 +82,3 @@ def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioS
         return state
     path = replace(state.path, at=point)
     return state.replace(path=path, activation=tuple(there.tolist()))
-
-
-def view_from(camera: Camera) -> tuple[float, float]:
-    """Azimuth and elevation of the camera [rad]."""
-    x, y, z = np.subtract(camera.position, camera.look_at)
-    return float(np.arctan2(y, x)), float(np.arctan2(z, np.hypot(x, y)))
-
-
-# Paths of a few plain shapes that begin at the tip.
-
-
-Array = NDArray[np.float64]
-
-PLANES: Mapping[str, tuple[int, int]] = {"x, y": (0, 1), "x, z": (0, 2), "y, z": (1, 2)}
-"""The plane of a shape: its first and its second direction."""
-
-_POINTS = 97
-
-
-def drawn_path(shape: str, plane: str, size: float, tip: ArrayLike) -> Array:
-    """A shape through the tip, which is where it begins.
-
-    Args:
-        shape: One of `PATH_SHAPES`.
-        plane: One of `PLANES`.
-        size: Largest extent, in the unit of the tip; negative for the other side.
-        tip: Where it begins.
-
-    Returns:
-        Points in the unit of the tip, shape (n, 3).
-
-    Raises:
-        InvalidInput: An unknown shape or plane, or no size.
-    """
-    for name, value, known in (("shape", shape, PATH_SHAPES), ("plane", plane, PLANES)):
-        if value not in known:
-            raise InvalidInput(name, value, f"one of {', '.join(known)}")
-    if not (np.isfinite(size) and size != 0):
-        raise InvalidInput("size", size, "a finite number other than 0")
-    across = PATH_SHAPES[shape](np.linspace(0.0, 1.0, _POINTS))
-    points = np.tile(np.asarray(tip, float), (_POINTS, 1))
-    points[:, PLANES[plane]] += size * across
-    return points
-
-
-def straight_path(corners: ArrayLike, points: int = _POINTS) -> Array:
-    """Even points on the straight lines between corners, which are among them, shape (n, 3)."""
-    places = np.asarray(corners, float)
-    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    pieces = np.maximum(1, np.round(points * lengths / max(lengths.sum(), 1e-300)).astype(int))
-    parts = [
-        start + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (end - start)
-        for start, end, count in zip(places[:-1], places[1:], pieces, strict=True)
-    ]
-    return np.concatenate([*parts, places[-1:]])
-
-
-def _circle(share: Array) -> Array:
-    angle = 2 * np.pi * share
-    return np.stack([np.cos(angle) - 1.0, np.sin(angle)], axis=1) / 2
-
-
-def _figure_eight(share: Array) -> Array:
-    angle = 2 * np.pi * share
-    return np.stack([np.sin(angle), np.sin(2 * angle)], axis=1) / 2
-
-
-def _line(share: Array) -> Array:
-    return np.stack([share, np.zeros_like(share)], axis=1)
-
-
-PATH_SHAPES: Mapping[str, Callable[[Array], Array]] = {
-    "circle": _circle,
-    "figure eight": _figure_eight,
-    "line": _line,
-}
-"""From shares of the way, 0 to 1, to places in the plane."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softreach.studio.plots import PLOTS
-from softreach.studio.plots.plot import Plot, Source
+from softreach.studio.plots.plot import Plot
 from softreach.studio.session import Job
 from softreach.studio.work import StaleCheck
 
@@ -28,11 +28,7 @@ def _job_of(plot: type[Plot]) -> type[Job]:
     return ComputePlot
 
 
-_JOBS = {plot: _job_of(plot) for plot in PLOTS}
-PLOT_JOBS = tuple(_JOBS.values())
+PLOT_JOBS = tuple(map(_job_of, PLOTS))
 """One for each plot."""
-
-
-def plots_from(source: Source) -> tuple[type[Job], ...]:
-    """Jobs of the plots that are computed from something else than the state alone."""
-    return tuple(job for plot, job in _JOBS.items() if source in plot.sources)
+REACH_JOBS = tuple(job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True) if plot.of_reach)
+"""Those of plots that are computed from the reach, not from the state alone."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.jobs.plots import plots_from
+from softreach.studio.jobs.plots import REACH_JOBS
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.needs import requirements_of
 from softreach.studio.reach import Reach, shown_rows, stages
@@ -23,7 +23,6 @@ from softreach.support.errors import InvalidInput
 
 Array = NDArray[np.float64]
 
-_LONGEST_TRAIL = 2000
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _MOST_PLACES = 40  # that a view is cut free to
 _SWEEP, _FRAME, _TURNS = 4.0, 0.04, 2.0  # [s] of a sweep, [s] between its pictures, turns
@@ -90,7 +89,7 @@ class DrawCloud(Job):
 
     depends_on = (
         "appearance.level", "appearance.color", "appearance.slice",
-        "appearance.cloud", "appearance.surface", "appearance.axes", "appearance.lit",
+        "appearance.cloud", "appearance.surface",
     )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
@@ -104,25 +103,25 @@ class DrawCloud(Job):
             self.session.follow(ComputeReach)
 
 
-class DrawSurfaces(Job):
-    """The exact boundary and the α-shape."""
+class DrawSurface(Job):
+    """The exact boundary."""
 
     depends_on = (
-        "appearance.surface", "appearance.alpha_shape", "appearance.slice",
-        "appearance.cloud", "appearance.color", "appearance.lit", "appearance.dark",
+        "appearance.surface", "appearance.slice",
+        "appearance.cloud", "appearance.color", "appearance.dark",
     )  # fmt: skip
-    only_with = "appearance.surfaces"
+    only_with = "appearance.surface"
 
     def run(self, check: StaleCheck) -> None:
-        """Draw them, which computes them the first time."""
+        """Draw it, which computes it the first time."""
         check()
         reach, look = self.session.reach, self.session.state.appearance
         if reach is None:
             return
-        with self.session.working("computing surfaces" if look.surfaces else ""):
+        with self.session.working("computing the surface" if look.surface else ""):
             if look.surface and reach.has_surface and not look.cloud:
                 _count(self.session, reach.boundary, check)
-            key = self.session.scene.draw_surfaces(reach, look)
+            key = self.session.scene.draw_surface(reach, look)
         if key is not None:
             self.session.key = key
         self.session.show()
@@ -142,13 +141,13 @@ def _withdraw(session: Session, refusal: str) -> None:
     """Take away what belongs to the design before, and say what is wrong with this one."""
     session.reach, session.key, session.refusal = None, None, refusal
     with session.drawing:
-        session.scene.remove("/cloud", "/unstable", "/slice", "/surface", "/alpha-shape")
+        session.scene.remove("/cloud", "/unstable", "/slice", "/surface")
     session.show()
 
 
 def _draw_cloud(session: Session) -> None:
     _draw_points(session)
-    session.refresh(DrawSurfaces, *plots_from("reach"))
+    session.refresh(DrawSurface, *REACH_JOBS)
     session.show()
 
 
@@ -190,19 +189,16 @@ def draw_axes(session: Session) -> None:
     """The box around what is drawn; to be called by whoever holds `Session.drawing`."""
     if session.reach is not None:
         free = session.free if session.state.design.loads is not None else None
-        session.scene.draw_axes(session.reach, session.state.appearance, free)
+        session.scene.draw_axes(session.reach, free)
 
 
-# The arm, and the trail of its tip.
+# The arm.
 
 
 class DrawArm(Job):
     """The arm in its activation, and where its tip has been."""
 
-    _trail_of: object = None
-    """The design whose tip left the trail."""
-
-    depends_on = "design", "activation", "appearance.arm", "appearance.trail"
+    depends_on = "design", "activation", "appearance.arm"
 
     def run(self, check: StaleCheck) -> None:
         """Draw them, and note where the tip is."""
@@ -212,7 +208,6 @@ class DrawArm(Job):
             session.scene.remove("/arm")
         else:
             self._draw(state)
-        self._draw_trail()
         session.follow(FollowCamera)
         session.show()
 
@@ -228,21 +223,12 @@ class DrawArm(Job):
         with session.client.atomic():
             tip = session.scene.draw_arm(state.design, state.activation)
         session.tip = tip if np.isfinite(tip).all() else None
-        if session.tip is not None:
-            session.trail = [*session.trail[-_LONGEST_TRAIL:], session.tip]
         if rod.supports_unstable:
             status = TipStatus(rod.status([state.activation])[0])
             lost = (
                 session.tip is None and status <= TipStatus.UNSTABLE
             )  # its shape was not found again
             session.posture = TipStatus.UNDECIDED if lost else status
-
-    def _draw_trail(self) -> None:
-        session, state = self.session, self.session.state
-        # Another arm's tip was never there.
-        if self._trail_of != state.design or not state.appearance.trail:
-            self._trail_of, session.trail = state.design, session.trail[-1:]
-        session.scene.draw_trail(np.array(session.trail))
 
 
 class SweepReach(AskedJob):
@@ -312,15 +298,13 @@ class FollowCamera(Job):
     """Cuts away what hides the arm and places to reach, and turns the axes to the camera."""
 
     depends_on = (
-        "appearance.cut", "appearance.arm", "appearance.handle", "appearance.orthographic",
-        "target", "needs",
+        "appearance.cut", "appearance.arm", "appearance.handle", "target", "needs",
     )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
         """Look from where the camera is by now."""
         time.sleep(_PAUSE)
         session = self.session
-        session.camera.project(orthographic=session.state.appearance.orthographic)
         if session.camera.keep_width():
             session.follow(FollowCamera)
         with session.drawing, session.client.atomic():

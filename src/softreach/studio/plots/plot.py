@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from softreach.studio.session import Session
 
 Array = NDArray[np.float64]
-Source = Literal["reach", "answer"]
 
 
 class Plot(ABC):
@@ -39,8 +38,8 @@ class Plot(ABC):
     hint: ClassVar[str]
     depends_on: ClassVar[tuple[str, ...]]
     """Attributes of the state that decide the result, such as "appearance.level"."""
-    sources: ClassVar[frozenset[Source]] = frozenset()
-    """Results of jobs that it is computed from; a job that renews one of them asks for the plot."""
+    of_reach: ClassVar[bool] = False
+    """True if it is computed from the reach, whose job asks for the plot."""
 
     @abstractmethod
     def __init__(self, gui: GuiApi, folder: Any) -> None:
@@ -54,7 +53,7 @@ class Plot(ABC):
     @staticmethod
     @abstractmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Any]:
-        """Results, each better than the one before; none while the sources are not complete.
+        """Results, each better than the one before; none while what it is computed from is not.
 
         Args:
             session: Of the tab, in whose present state the plot is shown.
@@ -98,7 +97,6 @@ class Curve(NamedTuple):
 
     name: str
     color: str
-    dashed: bool = False
     points: bool = False
     """Marks on its points."""
 
@@ -106,21 +104,17 @@ class Curve(NamedTuple):
 class Chart:
     """Curves over a common axis, drawn by the page itself; nothing before the first `show`."""
 
-    def __init__(
-        self, gui: GuiApi, container: Any, y: str = "", *, logarithmic: bool = False
-    ) -> None:
+    def __init__(self, gui: GuiApi, container: Any, y: str = "") -> None:
         """Take the place of a chart.
 
         Args:
             gui: Of the tab.
             container: Folder or tab that it goes into.
             y: Label of the vertical axis, with its unit, unless `show` has it.
-            logarithmic: Whether the horizontal axis is.
         """
         self._gui, self._container, self._y = gui, container, y
-        across = {"time": False, **({"distr": 3, "log": 10} if logarithmic else {})}
         whole = {"auto": False, "range": (0.0, 1.0)}
-        self._scales: Any = {"x": across, "y": {"auto": True}, _MARK: whole}
+        self._scales: Any = {"x": {"time": False}, "y": {"auto": True}, _MARK: whole}
         self._widget: Any = None
         self._made_of: object = None
 
@@ -180,8 +174,7 @@ def _axis(label: str) -> Any:
 
 def _series(curve: Curve) -> Any:
     points = {"show": curve.points, "size": 7, "fill": curve.color}
-    line = {"label": curve.name, "stroke": curve.color, "width": 2, "points": points}
-    return line | ({"dash": (6.0, 4.0)} if curve.dashed else {})
+    return {"label": curve.name, "stroke": curve.color, "width": 2, "points": points}
 
 
 _WIDTH = 4.3  # [inch], about as wide as a panel

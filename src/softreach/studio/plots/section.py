@@ -199,7 +199,7 @@ class SectionPlot(PicturePlot):
         "boundary, and how many activations reach each place"
     )
     depends_on = ("appearance.slice.axis", "appearance.slice.center", "appearance.dark")
-    sources = frozenset({"reach"})
+    of_reach = True
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:

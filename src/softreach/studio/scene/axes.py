@@ -37,13 +37,12 @@ class NumberedBox:
         low, high = self._box
         return low / self._scale, high / self._scale
 
-    def draw(self, *points: Array, arm: Manipulator, shown: bool) -> None:
+    def draw(self, *points: Array, arm: Manipulator) -> None:
         """Surround points [L], shapes (n, 3), with numbers in the unit of the arm."""
         self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
         self._box = round_box(*(self._scale * each for each in points))
         self._remove()
-        if shown:
-            self._draw()
+        self._draw()
 
     def turn(self, camera: Array, focal: float = np.inf) -> None:
         """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""

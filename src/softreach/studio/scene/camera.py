@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
+FINER = 2
+"""Pixels of a saved picture for each of the page, along each side."""
 VIEWS: dict[str, Array] = {
     "oblique": np.array([2.1, -3.85, 1.17]),
     "front": np.array([0.0, -1.0, 0.0]),
@@ -28,7 +30,6 @@ VIEWS: dict[str, Array] = {
 """Directions from the middle to the camera."""
 
 _STEP_BACK = 1.4  # times the distance, for two clouds side by side
-_AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
 _PATIENCE = 30.0  # [s] for a picture
 _LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
@@ -36,32 +37,6 @@ _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _POINTER = 0.012  # radius of what is clicked [L]
 _ROOM = 1.12  # times what would just fill the picture
-
-
-class Lens:
-    """Lens of a camera: its angle, its distance and its limits of depth."""
-
-    def __init__(self, *, orthographic: bool) -> None:
-        """The usual lens, or an orthographic one.
-
-        That is a very long lens from very far away: viser has no other. What is in sight does not
-        follow a zoom, as a page tells where its camera is only later, and half of it at a time.
-        Depths are integers to the graphics card: these tell 0.0005 L apart at the usual distance.
-        """
-        self.distance_ratio = _AWAY if orthographic else 1.0
-        """Times the usual distance at which the camera is with this lens."""
-        self.fov = 2.0 * float(np.arctan(np.tan(FOV / 2) / self.distance_ratio))
-        """Vertical angle [rad]."""
-        self.near, self.far = (4.0, 4000.0) if orthographic else (0.01, 1000.0)
-        """Limits of depth: anything nearer or farther is not drawn [L]."""
-
-
-def lens(camera: Camera, *, orthographic: bool) -> tuple[Lens, Camera]:
-    """Lens for a camera, and the camera with it that shows the same."""
-    offset = np.subtract(camera.position, camera.look_at)
-    chosen = Lens(orthographic=orthographic)
-    position = np.asarray(camera.look_at) + chosen.distance_ratio * offset
-    return chosen, Camera(position=vector(position), look_at=camera.look_at)
 
 
 def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
@@ -93,7 +68,6 @@ class TabCamera:
     def __init__(self, client: ClientHandle) -> None:
         """Follow the camera of a client."""
         self._client = client
-        self._orthographic = False
         self._aspect: float | None = None
         self._latest: float | None = None
         self._since = 0.0
@@ -113,45 +87,26 @@ class TabCamera:
         return self._client.camera.aspect
 
     @property
-    def narrowness(self) -> float:
-        """Angles over those of the usual lens [-]."""
-        return float(np.tan(self._client.camera.fov / 2) / np.tan(FOV / 2))
-
-    @property
     def focal(self) -> float:
         """Focal length [pixel]: what is as far away as it is long is so long in the picture."""
         camera = self._client.camera
         return camera.image_height / (2 * float(np.tan(camera.fov / 2)))
 
     def actual(self) -> Camera:
-        """Camera as it is; with an orthographic lens far away."""
+        """Camera as it is."""
         camera = self._client.camera
-        return Camera(position=vector(camera.position), look_at=vector(camera.look_at))
-
-    def usual(self) -> Camera:
-        """Camera with the usual lens that sees the same."""
-        place, narrowness = self.actual(), self.narrowness
-        offset = narrowness * np.subtract(place.position, place.look_at)
-        position = vector(place.look_at + offset)
-        return Camera(position=position, look_at=place.look_at, aspect=self.aspect)
+        place = {"position": vector(camera.position), "look_at": vector(camera.look_at)}
+        return Camera(**place, aspect=self.aspect)
 
     def fits(self, camera: Camera) -> bool:
         """True if the window is upright where that of a saved camera was, and else neither is."""
         return self.is_upright == ((camera.aspect or 1.0) < _UPRIGHT)
 
     def look_from(self, camera: Camera) -> None:
-        """Move it to where it sees what the usual lens would see from there."""
-        chosen, place = lens(camera, orthographic=self._orthographic)
+        """Move it."""
         with self._client.atomic():
             shown = self._client.camera
-            shown.fov, shown.near, shown.far = chosen.fov, chosen.near, chosen.far
-            shown.position, shown.look_at = place.position, place.look_at
-
-    def project(self, *, orthographic: bool) -> None:
-        """Change the lens and go on looking at the same."""
-        if orthographic != self._orthographic:
-            camera, self._orthographic = self.usual(), orthographic
-            self.look_from(camera)
+            shown.position, shown.look_at = camera.position, camera.look_at
 
     def keep_width(self) -> bool:
         """Step back as the picture gets narrower, and forth again: what was in sight stays so.
@@ -171,7 +126,7 @@ class TabCamera:
             return True
         before, self._aspect = self._aspect or now, now
         if (ratio := _half_sine(before) / _half_sine(now)) != 1.0:
-            camera = self.usual()
+            camera = self.actual()
             offset = ratio * np.subtract(camera.position, camera.look_at)
             position = vector(camera.look_at + offset)
             self.look_from(Camera(position=position, look_at=camera.look_at))
@@ -183,22 +138,19 @@ class TabCamera:
         camera = self._client.camera
         return self.focal / float(np.linalg.norm(camera.look_at - camera.position))
 
-    def picture(self, scale: int = 1) -> NDArray[np.uint8]:
+    def picture(self) -> NDArray[np.uint8]:
         """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
-
-        Args:
-            scale: Pixels of the picture for each of the page, along each side.
 
         Raises:
             InvalidInput: The tab does not answer: browsers stop drawing tabs in the background. Or
                 they would draw fewer pixels than that, and blow them up.
         """
         camera, client = self._client.camera, self._client
-        size = {"height": scale * camera.image_height, "width": scale * camera.image_width}
+        size = {"height": FINER * camera.image_height, "width": FINER * camera.image_width}
         if max(size.values()) > _LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
             value = f"{size['width']} by {size['height']} pixels"
             allowed = f"at most {_LONGEST} along a side and {_MOST_PIXELS / 1e6:.0f} million"
-            raise InvalidInput("picture", value, allowed, "choose a smaller size")
+            raise InvalidInput("picture", value, allowed, "make the window smaller")
         try:
             return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
         except TimeoutError:
@@ -214,7 +166,7 @@ class TabCamera:
         self._step(-shift, 1 / _STEP_BACK)
 
     def _step(self, shift: Array, ratio: float) -> None:
-        now = self.usual()
+        now = self.actual()
         look_at = np.asarray(now.look_at) + shift / 2
         position = (np.asarray(now.position) - now.look_at) * ratio + look_at
         self.look_from(Camera(position=vector(position), look_at=vector(look_at)))
@@ -357,15 +309,3 @@ def picked_point(
         return None
     # A little deeper but under the cursor is better than in front and beside it.
     return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / tolerance))])
-
-
-def plane_crossing(
-    origin: ArrayLike, direction: ArrayLike, point: ArrayLike, normal: ArrayLike
-) -> Array | None:
-    """Crossing of a ray and a plane, or None if they do not meet."""
-    start, ray, n = (np.asarray(v, float) for v in (origin, direction, normal))
-    slope = ray @ n
-    if slope == 0.0:
-        return None
-    far = (np.asarray(point, float) - start) @ n / slope
-    return start + far * ray if far > 0 else None

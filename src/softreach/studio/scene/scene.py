@@ -59,7 +59,7 @@ _BODY = 0.62, 0.60, 0.58
 """Color of the body: stands out through the surface from a light and from a dark page."""
 _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
-_GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
+_GHOST, _REFERENCE, _SURFACE = 0.35, (150, 150, 158), (90, 140, 200)
 _CLEAR_SURFACE = 0.6  # opacity of the boundary, through which the arm is seen
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _MARK: Color = (235, 90, 0)
@@ -118,7 +118,7 @@ class Scene:
         coloring = sample_colors(reach, look.level, look.color)
         kept, unstable = in_slice(points, look.slice), unstable_samples(reach, look.level)
         stable = kept & ~unstable
-        colors = lit(coloring.rgb, points) if look.lit else coloring.rgb
+        colors = lit(coloring.rgb, points)
         size = point_size(len(points))
         self._points("/cloud", points[stable], colors[stable], size)
         self._draw_unstable(points[kept & unstable], size)
@@ -129,19 +129,19 @@ class Scene:
         color = np.array(UNSTABLE, np.uint8)
         self._points("/unstable", points, color, _UNSTABLE_SIZE * size, shape="diamond")
 
-    def draw_free(self, reach: Reach | None, look: Appearance) -> None:
+    def draw_free(self, reach: Reach | None, cut: Slice) -> None:
         """The reach of the arm without its loads, a faint surface; None takes it away.
 
         Points, where there is no surface, lie before those of the loaded arm.
         """
         self.remove("/free")
-        if reach is None or not look.free:
+        if reach is None:
             return
         if reach.has_surface:
-            self._surface("/free", reach.sheets, reach, look.slice, FAINT, _FAINT)
+            self._surface("/free", reach.sheets, reach, cut, FAINT, _FAINT)
             return
         points = cloud_points(reach, _FREE_LEVEL)
-        kept = in_slice(points, look.slice)
+        kept = in_slice(points, cut)
         gray = np.array(FAINT, np.uint8)
         self._points("/free", points[kept], gray, _FREE_SIZE * point_size(len(points)))
 
@@ -170,7 +170,7 @@ class Scene:
             self._draw_shape(arm, shape, "/arm", arm.length)
         around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
         straight = shape["position"].values / arm.length
-        self.axes.draw(around, straight, arm=arm, shown=look.axes)
+        self.axes.draw(around, straight, arm=arm)
 
     def _draw_shape(self, arm: Manipulator, shape: Any, path: str, length: float) -> Array:
         if np.isnan(shape["position"].values).any():
@@ -229,16 +229,12 @@ class Scene:
         for k, activation in enumerate(activations):
             self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
 
-    def draw_surfaces(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
-        """The exact boundary and the α-shape, as far as they are shown; slow the first time.
+    def draw_surface(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
+        """The exact boundary, if it is shown; slow the first time.
 
         Returns:
             The key to the colors of the boundary; None where it has none of its own.
         """
-        if look.alpha_shape and len(reach.alpha_shape.faces):
-            self._surface("/alpha-shape", reach.alpha_shape, reach, look.slice, _HULL)
-        else:
-            self.remove("/alpha-shape")
         if not (look.surface and reach.has_surface):
             self.remove("/surface")
             return None
@@ -251,9 +247,8 @@ class Scene:
     def _draw_boundary(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """The exact boundary in the colors of what is asked, with its edges and folds."""
         coloring, sheets = surface_colors(reach, look.color), reach.sheets
-        vertices, colors = sheets.vertices / reach.arm.length, coloring.rgb
-        if look.lit:
-            colors = shaded(colors, vertex_normals(vertices, sheets.faces))
+        vertices = sheets.vertices / reach.arm.length
+        colors = shaded(coloring.rgb, vertex_normals(vertices, sheets.faces))
         skin = sliced(Skin(vertices, sheets.faces, colors.astype(float)), look.slice)
         lines = _lines_of(reach, look)
         self.remove("/surface")
@@ -275,20 +270,12 @@ class Scene:
             ink = _INK[look.dark]
             self._api.add_line_segments("/thick-lines", lines, ink, thickness=thickness)
 
-    def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
+    def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
-        clouds = [reach] if free is None or not look.free else [reach, free]
+        clouds = [reach] if free is None else [reach, free]
         around = (cloud_points(source, 14) for source in clouds)
         straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
-        self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm, shown=look.axes)
-
-    def draw_trail(self, tips: Array) -> None:
-        """A line through the places where the tip has been [L], shape (n, 3)."""
-        if len(tips) < 2:
-            self.remove("/trail")
-            return
-        pieces = np.stack([tips[:-1], tips[1:]], axis=1).astype(np.float32)
-        self._api.add_line_segments("/trail", pieces, _MARK, thickness=0.004)
+        self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm)
 
     def draw_path(self, points: Array, followed: Array) -> None:
         """A path [L], pale, and as far as the arm can follow it, dark; a ball where that ends."""
@@ -338,16 +325,6 @@ class Scene:
             point_shape="circle",
             precision="float32",
         )
-
-    def draw_picture(
-        self, path: str, image: NDArray[np.uint8], size: float, center: Array, turn: Any
-    ) -> None:
-        """A square picture [L]."""
-        self._api.add_image(path, image, size, size, format="png", wxyz=turn, position=center)
-
-    def draw_mark(self, path: str, center: Array) -> None:
-        """A small ball."""
-        self._api.add_icosphere(path, 0.02, _MARK, position=center)
 
     def draw_reference(self, reach: Reach, look: Appearance, shift: Array, name: str) -> None:
         """Another design: its boundary in gray around this one's cloud, or its cloud beside it.

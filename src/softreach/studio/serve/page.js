@@ -45,7 +45,7 @@ document.documentElement.addEventListener("keydown", function (event) {
 });
 
 // Keys of the page, in one table: how a key is written, what it does, and what is done here, if
-// anything. The rest is viser's, or a command of the studio's.
+// anything.
 (function () {
   var keys = [
     ["1 \u2026 8", "choose a tab", /^[1-8]$/, chooseTab],
@@ -63,6 +63,12 @@ document.documentElement.addEventListener("keydown", function (event) {
     lists.sort(function (one, other) { return other.length - one.length; });
     var enter = new KeyboardEvent("keydown", { key: "Enter", bubbles: true }); // to a click it is deaf
     if (lists[0] && lists[0][key - 1]) lists[0][key - 1].dispatchEvent(enter);
+  }
+
+  function press(step) {
+    var buttons = [...document.querySelectorAll("button")];
+    var button = buttons.find(function (each) { return each.textContent.toLowerCase() === step; });
+    if (button) button.click();
   }
 
   function toggleTable() {
@@ -86,9 +92,14 @@ document.documentElement.addEventListener("keydown", function (event) {
   }
 
   addEventListener("keydown", function (event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (!document.querySelector("[data-history]")) return; // a page that was saved has no tabs
-    if (event.target.closest && event.target.closest("input, textarea, select, [role=slider]")) return;
+    if (event.target.closest && event.target.closest("input, textarea, select")) return;
+    var command = event.ctrlKey || event.metaKey;
+    if (command && !event.altKey && event.key.toLowerCase() === "z") {
+      event.preventDefault();
+      press(event.shiftKey ? "redo" : "undo");
+    }
+    if (command || event.altKey || event.target.closest("[role=slider]")) return;
     keys.forEach(function (key) {
       if (!key[2] || !key[2].test(event.key)) return;
       event.preventDefault();
@@ -107,10 +118,7 @@ document.documentElement.addEventListener("keydown", function (event) {
       if (control.tagName === "LABEL") label = control.textContent.trim() || label;
       else if (control.getAttribute("aria-label") || control.textContent.trim()) return;
       else if (control.tagName === "BUTTON") {
-        var picture = control.innerHTML;
-        var words = control.className.includes("CloseButton") ? "close"
-          : picture.includes("search") ? "commands" : "settings of the viewer";
-        control.setAttribute("aria-label", words);
+        control.setAttribute("aria-label", "close");
       } else if (label) control.setAttribute("aria-label", label);
     });
     document.querySelectorAll("img").forEach(function (picture) {
@@ -242,51 +250,4 @@ document.documentElement.addEventListener("keydown", function (event) {
   ["keydown", "pointerdown", "wheel"].forEach(function (kind) {
     addEventListener(kind, function () { say(""); }, { capture: true, passive: true });
   });
-})();
-
-// Frames that the server has drawn become a video here: browsers have the encoder.
-(function () {
-  var kinds = ["video/mp4;codecs=avc1.42E01F", "video/mp4", "video/webm"], pause = 60, rest = 1200;
-  function record(name, frames) {
-    var kind = window.MediaRecorder && kinds.find(MediaRecorder.isTypeSupported);
-    if (!kind) return;
-    var canvas = document.createElement("canvas");
-    canvas.width = frames[0].width;
-    canvas.height = frames[0].height;
-    var paper = canvas.getContext("2d"), parts = [];
-    paper.drawImage(frames[0], 0, 0);
-    var options = { mimeType: kind, videoBitsPerSecond: 8e6 };
-    var recorder = new MediaRecorder(canvas.captureStream(), options);
-    recorder.ondataavailable = function (event) { parts.push(event.data); };
-    recorder.onstop = function () {
-      var link = document.createElement("a");
-      link.href = URL.createObjectURL(new Blob(parts, { type: kind }));
-      link.download = name + (kind.startsWith("video/mp4") ? ".mp4" : ".webm");
-      link.click();
-      setTimeout(function () { URL.revokeObjectURL(link.href); }, 60000);
-    };
-    recorder.start();
-    var begun = performance.now(), end = pause * frames.length + rest;
-    var timer = setInterval(function () {
-      var at = performance.now() - begun;
-      paper.drawImage(frames[Math.min(Math.floor(at / pause), frames.length - 1)], 0, 0);
-      if (at < end) return;
-      clearInterval(timer);
-      recorder.stop();
-    }, pause / 2);
-  }
-  new MutationObserver(function () {
-    var movie = document.querySelector("[data-movie]");
-    if (!movie) return;
-    var name = movie.dataset.movie, addresses = movie.dataset.frames.split(" ");
-    movie.removeAttribute("data-movie");
-    movie.hidden = Boolean(window.MediaRecorder);
-    if (!movie.hidden) movie.textContent = "This browser cannot record a video.";
-    movie.removeAttribute("data-frames");
-    Promise.all(addresses.map(function (address) {
-      var frame = new Image();
-      frame.src = address;
-      return frame.decode().then(function () { return frame; });
-    })).then(function (frames) { record(name, frames); });
-  }).observe(document.documentElement, { childList: true, subtree: true });
 })();

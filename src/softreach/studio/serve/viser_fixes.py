@@ -27,7 +27,6 @@ __all__ = [
     "guarding",
     "headed",
     "headed_body",
-    "request_path",
     "without_tunnel",
 ]
 
@@ -169,13 +168,6 @@ class _Inputs:
         if size <= LARGEST_UPLOAD:
             self._taken[message.transfer_uuid] = size
             accept(number, message)
-
-
-def request_path(server: ViserServer, client_id: int) -> str:
-    """Address in the request of a page's socket, from the first slash on; "/" if unknown."""
-    connections = getattr(_sockets(server), "_live_connections", {})
-    request = getattr(connections.get(client_id), "request", None)
-    return "/" if request is None else request.path
 
 
 def close_sockets(server: ViserServer) -> None:

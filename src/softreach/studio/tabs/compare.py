@@ -6,15 +6,8 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio.comparison import (
-    Candidate,
-    Comparison,
-    compared,
-    comparison_csv,
-    comparison_html,
-)
+from softreach.studio.comparison import Candidate, compared, comparison_html
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.jobs.morph import WriteMorph
 from softreach.studio.reach import beside
 from softreach.studio.snapshots import REFERENCE, Snapshot, numbers_of
 from softreach.studio.state import StudioState
@@ -31,11 +24,6 @@ _NONE = "none yet"
 _NOW = "now"
 """Name of the row of the design in the fields."""
 _UNDRAWN, _AROUND, _BESIDE = "not drawn", "in gray around this design", "beside this design"
-_ABOUT_GOAL = "The snapshot in which the movie ends, or the design in the fields"
-_ABOUT_MOVIE = (
-    "From the chosen snapshot, as seen from here: reach, arm and volume of each design on the way. "
-    "Browsers that cannot record MP4 make WebM"
-)
 
 
 class ComparePanel:
@@ -44,10 +32,8 @@ class ComparePanel:
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         self._session, self._lock = session, threading.RLock()
         self._known: object = None
-        self._comparison: Comparison | None = None
         with tab:
             self._table = Line(gui, _HINT)
-            self._name = gui.add_text("name", "", hint="of the snapshot; empty for the next number")
             take = gui.add_button("Take snapshot", hint="keep design, activation and target")
             self._of_chosen = gui.add_folder("snapshots", visible=False)
             with self._of_chosen:
@@ -61,21 +47,11 @@ class ComparePanel:
                 )
                 restore = gui.add_button("Restore", hint="go back to it; the view stays")
                 delete = gui.add_button("Delete", color="gray", hint="forget it, for good")
-                save = gui.add_button(
-                    "Save table (CSV)",
-                    color="gray",
-                    hint="with errors and differences, for a spreadsheet",
-                )
-                self._goal: Any = gui.add_dropdown("movie to", (_NOW,), hint=_ABOUT_GOAL)
-                movie = gui.add_button_group("movie", ("GIF", "MP4"), hint=_ABOUT_MOVIE)
-                self._frames = Line(gui)
         self._choice.on_update(lambda _: self._follow_drawn(session.state))
         self._drawn.on_update(self._draw)
-        bind_button(movie, session, lambda: self._write_movie(movie.value))
         bind_button(take, session, self._take)
         bind_button(restore, session, self._restore)
         bind_button(delete, session, self._delete)
-        bind_button(save, session, self._save)
 
     def show(self, session: Session) -> None:
         """Bring menu and table in line with the snapshots and the design."""
@@ -90,12 +66,11 @@ class ComparePanel:
             self._follow_menu(tuple(each.name for each in kept))
             self._of_chosen.visible = bool(kept)
             if not kept:
-                self._comparison = None
                 self._table.say(_HINT)
                 return
             rows = [Candidate(each.name, each.state.design, each.numbers) for each in kept]
-            self._comparison = compared([*rows, Candidate(_NOW, design, numbers)])
-            self._table.show(comparison_html(self._comparison))
+            comparison = compared([*rows, Candidate(_NOW, design, numbers)])
+            self._table.show(comparison_html(comparison))
 
     def _kept(self) -> tuple[Snapshot, ...]:
         """The snapshots, and what an older state draws without one."""
@@ -116,7 +91,6 @@ class ComparePanel:
     def _follow_menu(self, names: tuple[str, ...]) -> None:
         if tuple(self._choice.options) != (names or (_NONE,)):
             self._choice.options = names or (_NONE,)
-            self._goal.options = (_NOW, *names)
 
     def _follow_drawn(self, state: StudioState) -> None:
         """Show how the chosen snapshot is drawn."""
@@ -156,15 +130,10 @@ class ComparePanel:
     def _take(self) -> None:
         session = self._session
         state = session.state_now()
-        name = self._name.value.strip() or session.snapshots.free_name()
-        if name in (_NOW, REFERENCE):
-            raise InvalidInput(
-                "snapshot name", name, "another, as the table has a row of its own so"
-            )
+        name = session.snapshots.free_name()
         numbers = numbers_of(session.reach, state)
         snapshot = Snapshot(name=name, state=state, taken=time.time(), numbers=numbers)
         session.snapshots.add(snapshot)
-        self._name.value = ""
         session.show()
         self._choice.value = name
 
@@ -187,16 +156,3 @@ class ComparePanel:
 
     def _named(self) -> Snapshot | None:
         return next((each for each in self._kept() if each.name == self._choice.value), None)
-
-    def _write_movie(self, kind: str) -> None:
-        session, goal = self._session, self._session.snapshots.named(self._goal.value)
-        job = session.job(WriteMorph)
-        job.between = self._chosen().state, session.state if goal is None else goal.state
-        job.format, job.frames = kind, self._frames
-        job.ask()
-
-    def _save(self) -> None:
-        if self._comparison is None:
-            raise InvalidInput("table", "empty", "of one snapshot or more", "take one first")
-        content = comparison_csv(self._comparison).encode("utf-8-sig")  # as spreadsheets expect
-        self._session.client.send_file_download("designs.csv", content, save_immediately=True)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio import markup
 from softreach.studio.captions import scale_bar
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.files import (
@@ -18,8 +17,7 @@ from softreach.studio.files import (
     surface_file,
 )
 from softreach.studio.page import picture_file, static_page
-from softreach.studio.start import state_link
-from softreach.studio.widgets import Line
+from softreach.studio.scene.camera import FINER
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -29,14 +27,8 @@ if TYPE_CHECKING:
     from softreach.studio.session import Session
 
 
-_ABOUT_LINK = (
-    "; copy the link to keep it. It holds the state itself, and opens while a studio serves at "
-    "this address."
-)
-
 _ABOUT = {
     "Save this work": "Everything that this tab shows, to be loaded again (JSON)",
-    "Link to this work": "An address that opens a tab in this state",
     "Load": "A state (.json) or a design (.toml) that was saved",
     "data": "The design alone, which the command line reads too; all samples of the cloud, tips "
     "[m] and activations; or the exact boundary of the reachable set [m]",
@@ -44,7 +36,6 @@ _ABOUT = {
     "picture": "The scene as it is seen, with legend, design and a scale bar, which is right at "
     "the depth of the point that the camera turns about; three views and an oblique one of the "
     "points that are shown; or the scene in one file, to be turned without a studio",
-    "size": "Pixels of the picture for each of the page, along each side, drawn anew",
     "Save picture": "As a file of this type",
 }
 _SECOND: Any = {"color": "gray"}
@@ -54,14 +45,11 @@ _CLOUD, _SURFACE = "cloud ({})", "exact surface ({})"
 _SEEN, _VIEWS, _PAGE = "as it is seen (.png)", "four views (.png)", "web page (.html)"
 
 
-_SIZES = {f"{scale}\N{MULTIPLICATION SIGN}": scale for scale in (1, 2, 3, 4)}
-
-
 class ExportPanel:
     """Buttons that send a file to the browser, and one that takes a file back."""
 
-    def __init__(self, gui: GuiApi, tab: Any, session: Session, url: str) -> None:
-        self._session, self._url = session, url
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        self._session = session
         self._writers = self._data_writers()
         self._painters = {
             _SEEN: self._save_picture, _VIEWS: self._save_figure, _PAGE: self._save_page
@@ -69,8 +57,6 @@ class ExportPanel:
         with tab:
             with gui.add_folder("this work"):
                 self._button("Save this work", self._save_state)
-                self._button("Link to this work", self._link, **_SECOND)
-                self._address = Line(gui)
                 load = gui.add_upload_button("Load state or design", hint=_ABOUT["Load"], **_SECOND)
             with gui.add_folder("design and data"):
                 self._data = gui.add_dropdown("data", tuple(self._writers), hint=_ABOUT["data"])
@@ -79,7 +65,6 @@ class ExportPanel:
                 self._kind = gui.add_dropdown(
                     "picture", tuple(self._painters), hint=_ABOUT["picture"]
                 )
-                self._size = gui.add_dropdown("size", tuple(_SIZES), hint=_ABOUT["size"])
                 self._button("Save picture", lambda: self._painters[self._kind.value]())
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
 
@@ -93,10 +78,6 @@ class ExportPanel:
 
     def _save_state(self) -> None:
         self._send("softreach-studio.json", self._session.state_now().to_json().encode())
-
-    def _link(self) -> None:
-        address = state_link(self._url, self._session.state_now())
-        self._address.show(markup.link(address, "This state in a new tab", _ABOUT_LINK))
 
     def _save_design(self) -> None:
         self._send("design.toml", self._session.state.design.file_text.encode())
@@ -112,20 +93,16 @@ class ExportPanel:
 
     def _save_picture(self) -> None:
         session, reach = self._session, self._reach()
-        camera, state, scale = session.camera, session.state, _SIZES[self._size.value]
-        focal, picture = camera.pixels_per_length, session.picture(scale)
-        bar = scale_bar(focal, picture.shape[1] / scale / 5, state.design.length)
-        self._write(
-            "studio.png", lambda: picture_file(picture, state, reach, session.key, bar, scale)
-        )
+        camera, state = session.camera, session.state
+        focal, picture = camera.pixels_per_length, session.picture()
+        bar = scale_bar(focal, picture.shape[1] / FINER / 5, state.design.length)
+        self._write("studio.png", lambda: picture_file(picture, state, reach, session.key, bar))
 
     def _save_page(self) -> None:
-        self._write("reachability.html", self._page)
-
-    def _page(self) -> bytes:
-        board = self._session.board
-        picture = None if board is None or board.map is None else board.map.image
-        return static_page(self._session.state_now(), self._reach(), picture).encode()
+        session = self._session
+        self._write(
+            "reachability.html", lambda: static_page(session.state_now(), self._reach()).encode()
+        )
 
     def _button(self, label: str, action: Callable[[], None], **looks: Any) -> None:
         button = self._session.client.gui.add_button(label, hint=_ABOUT[label], **looks)

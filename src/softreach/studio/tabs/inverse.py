@@ -9,12 +9,11 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.captions import place_text
-from softreach.studio.expressions import vector_kind
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.state import MOUSE, StudioState, rod_of
-from softreach.studio.widgets import Line, TextKind, TypedField, show_where
+from softreach.studio.widgets import Line, TextKind, TypedField, show_where, vector_kind
 
 if TYPE_CHECKING:
     from viser import GuiApi

@@ -1,4 +1,4 @@
-"""Path of the tip: loaded or drawn, followed, played and saved."""
+"""Path of the tip: loaded or clicked, followed, played and saved."""
 
 from __future__ import annotations
 
@@ -11,15 +11,7 @@ from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.jobs.path import (
-    PATH_SHAPES,
-    PLANES,
-    PlayPath,
-    WriteMovie,
-    at_point,
-    drawn_path,
-    straight_path,
-)
+from softreach.studio.jobs.path import PlayPath, at_point
 from softreach.studio.plots.plot import Chart, Curve
 from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.state import StudioState, solvable_rod
@@ -34,9 +26,10 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.studio.session import Session
 
-_HINT = "The tip follows a path as far as its branch of solutions goes."
+_HINT = "The tip follows a path as far as its branch of solutions goes: load one, or click it."
 _MOST_CURVES = 8  # in the timeline: more are not told apart
 _FILE_SIZE = 1 << 20  # bytes of a path that is loaded
+_POINTS = 24  # of the straight line to each place that is clicked
 
 
 class PathPanel:
@@ -48,27 +41,18 @@ class PathPanel:
         self._revision = -1
         with tab, gui.add_folder("follow a path"):
             Line(gui, _HINT)
-            self._draw_widgets(gui)
+            self._path_widgets(gui)
             self._text = Line(gui)
             self._walk = gui.add_folder("along it", visible=False)
             with self._walk:
                 self._walk_widgets(gui)
         self._listen()
 
-    def _draw_widgets(self, gui: GuiApi) -> None:
-        self._shape = gui.add_dropdown(
-            "shape", tuple(PATH_SHAPES), hint="of a path that begins at the tip"
-        )
-        self._plane = gui.add_dropdown("plane", tuple(PLANES), hint="in which the shape lies")
-        self._size = gui.add_number(
-            "size / L", 0.1, min=-2.0, max=2.0, step=0.01, hint="extent; < 0 for the other side"
-        )
-        self._draw = gui.add_button("Draw the path", hint="the shape of this size, from the tip on")
+    def _path_widgets(self, gui: GuiApi) -> None:
         self._load = gui.add_upload_button(
             "Load a path (CSV)",
             mime_type=".csv,text/csv",
             hint="columns x, y, z [m]",
-            color="gray",
         )
         self._clear = gui.add_button(
             "Remove the path", hint="and what was found along it", color="gray", visible=False
@@ -81,16 +65,13 @@ class PathPanel:
         self._at = gui.add_slider("point", 0, 1, 1, 0, hint="point of the path where the arm is")
         graph = gui.add_folder("activations along the path")
         self._timeline = Chart(gui, graph, "activation")
-        self._save = gui.add_button_group(
-            "save", ("CSV", "GIF"), hint="the activations as a table, or the arm as an animation"
-        )
+        self._save = gui.add_button("Save the path (CSV)", hint="with its activations")
 
     def _listen(self) -> None:
         session = self._session
-        bind_button(self._draw, session, self._drawn)
         bind_button(self._clear, session, lambda: self._take(None))
         bind_button(self._play, session, self._played)
-        bind_button(self._save, session, self._saved)
+        bind_button(self._save, session, self._save_csv)
         self._load.on_upload(lambda _: attempt(session, lambda: self._read(self._load.value)))
         self._at.on_update(self._moved)
 
@@ -138,20 +119,12 @@ class PathPanel:
     def _take(self, path: TipPath | None) -> None:
         self._session.update(lambda state: state.replace(path=path))
 
-    def _drawn(self) -> None:
-        """A shape from the tip, on the branch of the present activation."""
-        state, size = self._session.state, float(self._size.value)
-        points = drawn_path(
-            self._shape.value, self._plane.value, size * state.design.length, _tip(state)
-        )
-        self._take(TipPath.through(points, state.activation))
-
     def _extend(self, point: np.ndarray) -> None:
         """On to one more point, straight; what there is of a path begins at the tip."""
         state, path = self._session.state, self._session.state.path
         before = np.array(path.points) if path is not None else _tip(state)[None]
         start = state.activation if path is None else path.start
-        more = straight_path([before[-1], point], 24)[1:]
+        more = np.linspace(before[-1], point, _POINTS + 1)[1:]
         self._take(TipPath.through(np.concatenate([before, more]), start))
 
     def _read(self, file: UploadedFile) -> None:
@@ -178,20 +151,11 @@ class PathPanel:
     def _walked(self, activations: np.ndarray) -> Any:
         return lambda state: at_point(state, activations, int(self._at.value))
 
-    def _ask(self, kind: type[PlayPath | WriteMovie]) -> None:
-        self._session.job(kind).ask()
-
     def _played(self) -> None:
         if self._play.value == "Play":
-            self._ask(PlayPath)
+            self._session.job(PlayPath).ask()
         else:
             self._session.follow(PlayPath)  # which drops what it is doing
-
-    def _saved(self) -> None:
-        if self._save.value == "CSV":
-            self._save_csv()
-        else:
-            self._ask(WriteMovie)
 
     def _save_csv(self) -> None:
         if self._shown is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softreach.studio import markup
 from softreach.studio.captions import legend_text, loaded_share, reach_text
@@ -81,7 +81,7 @@ def _marks(session: Session) -> list[list[Part]]:
     reach = session.reach
     if reach is None:
         return []
-    free = session.state.appearance.free and session.free is not None
+    free = session.free is not None
     lines = [legend_text(reach, free=free)]
     if reach.refusal:
         lines.append([f"No exact volume: {reach.refusal}"])
@@ -100,12 +100,7 @@ def _numbers_text(session: Session) -> list[Part]:
     reach, work = session.reach, _work(session)
     if reach is None:
         return [session.refusal or work]
-    hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
-    share, unit = loaded_share(session), reach.arm.length_unit
-    parts = [
-        *reach_text(reach, share),
-        *([f" · α-shape {unit.rounded(hull, 3)}"] if hull is not None else []),
-    ]
+    parts = reach_text(reach, loaded_share(session))
     if reach.arm != session.state.design:
         parts = [Strong("of the design before: "), *parts]
     return [*parts, *([f" · {work}"] if work else [])]
@@ -130,7 +125,7 @@ def _stop_or_go_on(session: Session) -> None:
 
 
 def add_history(gui: GuiApi, session: Session) -> None:
-    """Add undo, redo and reset: a row of buttons, and keys; text fields keep their own undo."""
+    """Add undo, redo and reset; keys of the page press the first two."""
     actions: dict[str, Callable[[], None]] = {
         "Undo": lambda: session.step(back=True),
         "Redo": lambda: session.step(back=False),
@@ -138,11 +133,3 @@ def add_history(gui: GuiApi, session: Session) -> None:
     }
     row = gui.add_button_group("history", tuple(actions), hint=_HISTORY_HINT)
     row.on_click(lambda _: attempt(session, actions[row.value]))
-    again: Any = "cmd/ctrl+shift"
-    commands = {
-        "Undo": gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl"),
-        "Redo": gui.add_command("Redo", hotkey="Z", modifier=again),
-        "Reset": gui.add_command("Reset the design"),
-    }
-    for name, command in commands.items():
-        command.on_trigger(lambda _, name=name: attempt(session, actions[name]))

@@ -1,4 +1,4 @@
-"""View of the scene: colors, number of points, slice, surfaces, camera."""
+"""View of the scene: colors, slice, surfaces, camera."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from softreach.studio.fields import Attribute, Fields, attribute, bind_button
 from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.clouds import color_names
-from softreach.studio.state import CUTS, LEVELS, StudioState
+from softreach.studio.state import CUTS, StudioState
 from softreach.studio.widgets import show_where
 
 if TYPE_CHECKING:
@@ -15,21 +15,11 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-_COUNTS = {level: f"{1 << level:,}" for level in LEVELS}
 _ACROSS = {axis: axis for axis in ("none", "x", "y", "z")}
 _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, from the map itself"),
     "cloud": ("cloud", "Tips of sampled activations"),
-    "alpha_shape": (
-        "α-shape (0.05 L)",
-        "The surface of a cloud by balls of radius α = 0.05 L, to compare with",
-    ),
-    "free": ("reach without loads", "Faint, around that of the loaded arm"),
-    "ghosts": ("other solutions", "The arm in every activation that reaches the target"),
-    "trail": ("trail of the tip", "Where it has been"),
-    "axes": ("axes", "x, y and z in the world"),
-    "lit": ("shading", "Points and surfaces are shaded as in a light"),
     "dark": ("dark page", "Light on dark"),
 }
 
@@ -47,31 +37,17 @@ class ViewPanel:
                 "What the color of a point says; the key is above the tabs",
             )
             fields.dropdown(
-                "points",
-                _COUNTS,
-                attribute("appearance.level"),
-                "Samples that are shown, at most as many as time and memory allow",
-            )
-            fields.dropdown(
                 "cut away",
                 CUTS,
                 attribute("appearance.cut"),
                 "What of the cloud is taken away, so that arm and target are seen",
             )
             with gui.add_folder("show"):
-                self._toggles = {
-                    name: fields.checkbox(label, attribute(f"appearance.{name}"), hint)
-                    for name, (label, hint) in _TOGGLES.items()
-                }
-            with gui.add_folder("camera"):
-                views = gui.add_button_group(
-                    "look from", tuple(VIEWS), hint="Along an axis of the world, or between them"
-                )
-                fields.checkbox(
-                    "orthographic",
-                    attribute("appearance.orthographic"),
-                    "Without perspective: what is parallel stays parallel",
-                )
+                for name, (label, hint) in _TOGGLES.items():
+                    fields.checkbox(label, attribute(f"appearance.{name}"), hint)
+            views = gui.add_button_group(
+                "look from", tuple(VIEWS), hint="Along an axis of the world, or between them"
+            )
             fields.dropdown(
                 "slice across",
                 _ACROSS,
@@ -87,22 +63,12 @@ class ViewPanel:
                     attribute("appearance.slice.center"),
                     "Middle of the slab along the axis [L]",
                 )
-                fields.slider(
-                    "thickness / L",
-                    (0.01, 1.0),
-                    0.01,
-                    attribute("appearance.slice.thickness"),
-                    "Of the slab [L]",
-                )
         bind_button(views, session, lambda: session.look_from(views.value))
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the state."""
         self._fields.show(session)
-        state = session.state
-        show_where(state.design.loads is not None, self._toggles["free"])
-        show_where(state.target is not None, self._toggles["ghosts"])
-        show_where(state.appearance.slice.axis != "none", self._slab)
+        show_where(session.state.appearance.slice.axis != "none", self._slab)
 
 
 def _color(state: StudioState) -> str:
