@@ -48,7 +48,7 @@ def opened(studio: Studio) -> Iterator[Session]:
 def session(opened) -> Session:
     opened.update(lambda state: state.replace(design=ARM, activation=()))
     opened.end_step()
-    panel_of(opened)._remove()
+    opened.bench = None
     opened.settle()
     return opened
 
@@ -59,7 +59,6 @@ def panel_of(session) -> CalibratePanel:
 
 def loaded(session, upload=None) -> CalibratePanel:
     panel = panel_of(session)
-    panel._columns.value = {}
     panel._read(upload or file())
     session.settle()
     return panel
@@ -108,9 +107,6 @@ def test_a_sample_is_shown_only_while_the_arm_has_its_inputs(session):
     session.step(back=True)
     session.settle()
     assert drawn(session, "/sample/measured") is not None
-    panel._remove()
-    session.settle()
-    assert drawn(session, "/sample/measured") is None
 
 
 def test_inputs_beyond_the_bounds_are_said_and_their_markers_predicted_as_they_are(session):
@@ -126,7 +122,6 @@ def test_inputs_beyond_the_bounds_are_said_and_their_markers_predicted_as_they_a
 def test_a_fit_finds_the_numbers_of_the_arm_and_applying_it_can_be_undone(session):
     panel = loaded(session)
     fitted(panel, session, "pose.position, taper")
-    assert session.bench.as_calibrated
     summary = panel._summary._widget.content
     for words in ("pose.x", "taper", "±", "20 fitted", "constant curvature", "limited by"):
         assert words in summary
@@ -209,31 +204,10 @@ def test_a_file_of_no_poses_is_refused_in_one_line_and_the_one_before_stays(sess
     assert session.bench is before
 
 
-def test_columns_are_given_where_their_names_do_not_tell(session):
-    panel = panel_of(session)
-    upload = file(markers=("disk1", "disk2"))
-    panel._columns.value = {"half": "disk2", "tool": "disk1"}
-    panel._read(upload)
-    session.settle()
-    np.testing.assert_allclose(session.bench.data.places, PLACES[:, ::-1], atol=1e-12)
-    assert session.bench.data.source == "bench.csv"
-
-
 def test_data_of_another_arm_is_no_longer_shown(session):
     panel = loaded(session)
     session.update(lambda state: state.replace(design=ARM.replace(markers=())))
     session.settle()
     assert drawn(session, "/sample/measured") is None
     with pytest.raises(sr.InvalidInput, match="load the data again"):
-        panel._pose()
-
-
-def test_every_number_that_does_not_count_something_can_be_added(session):
-    panel = loaded(session)
-    assert {"pose", "length", "taper", "markers.half.station"} <= set(panel._number.options)
-    assert not any(name.endswith("bundles") for name in panel._number.options)
-    panel._free.value = "pose"
-    panel._number.value = "taper"
-    panel._added()
-    panel._added()
-    assert panel._free.value == "pose, taper"
+        panel._pose(session.bench)

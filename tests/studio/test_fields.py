@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from softreach.arm.parameters import changed
 from softreach.studio.fields import Attribute, Fields, attribute
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import Slice, StudioState
-from softreach.studio.widgets import Line, number_of, vector_of
+from softreach.studio.widgets import Line, number_kind, number_of, unit_in, vector_kind
 from softreach.support.errors import InvalidInput
 
 
@@ -127,11 +128,11 @@ def test_an_attribute_reads_and_writes_its_own_value_alone():
 
 
 def test_a_field_writes_what_a_person_changes_and_nothing_else(page):
-    box = Fields(page).checkbox("trail", attribute("appearance.trail"), "hint")
+    box = Fields(page).checkbox("cloud", attribute("appearance.cloud"), "hint")
     box.moved(True, client=None)  # as the program sets it
-    assert not page.state.appearance.trail
+    assert not page.state.appearance.cloud
     box.moved(True)
-    assert page.state.appearance.trail
+    assert page.state.appearance.cloud
     box.moved(True)
     assert page.updates == 1  # a page reports again what was only drawn anew
 
@@ -231,27 +232,6 @@ def test_fields_follow_a_design_that_others_change(page):
     assert bound.value == 1.2
 
 
-def test_an_expression_is_applied_and_its_number_shown_in_its_place(page):
-    _, bound, _, form, text, line = field(page)
-    typed(text, form, "1/2 - 0.2")
-    assert (bound.value, text.value, line.content) == (0.3, "0.3", "")
-    page.state = page.state.replace(design=changed(page.state.design, {"length": 0.2}))
-    typed(text, form, "5 cm")
-    assert (page.state.appearance.slice.center, text.value) == (0.25, "0.25")
-
-
-def test_a_wrong_expression_stays_beside_one_line_and_changes_nothing(page):
-    _, bound, _, form, text, line = field(page)
-    for wrong, why in (("5 deg", "deg is not expected there"), ("1/(2-2)", "it is not finite")):
-        typed(text, form, wrong)
-        assert (bound.value, text.value, page.updates) == (0.0, wrong, 0)
-        assert f"&#x27;{wrong}&#x27;: must be a number" in line.content
-        assert why in line.content
-    typed(text, form, "9000 - 4000")  # read, but no place of a slice
-    assert (text.value, page.updates) == ("9000 - 4000", 0)
-    assert "slice.center = 5000" in line.content
-
-
 def test_fields_that_are_removed_leave_nothing(page):
     fields = field(page)[0]
     fields.button("Rest", lambda state: state, "hint")
@@ -270,12 +250,43 @@ def test_a_number_is_what_a_person_types(text, value):
     assert number_of(text) == value
 
 
+def test_a_number_with_a_unit_is_applied_and_shown_in_that_of_the_field(page):
+    _, bound, _, form, text, line = field(page)
+    page.state = page.state.replace(design=changed(page.state.design, {"length": 0.2}))
+    typed(text, form, "5 cm")
+    assert (bound.value, text.value, line.content) == (0.25, "0.25", "")
+    for wrong in ("5 deg", "1/2", "cm"):
+        typed(text, form, wrong)
+        assert (bound.value, text.value, page.updates) == (0.25, wrong, 1)
+        demand = "must be a number, without a unit or in L, m, cm"
+        assert f"&#x27;{wrong}&#x27;: {demand}" in line.content
+
+
+@pytest.mark.parametrize(
+    ("text", "label", "value"),
+    [
+        ("100g", "payload [g]", 100.0), ("0.1 kg", "payload [g]", 100.0), ("5", "L [mm]", 5.0),
+        ("5 cm", "L [mm]", 50.0), ("0.1 L", "L [mm]", 40.0), ("2 deg", "taper φ [deg]", 2.0),
+        ("0.5", "ratio", 0.5), ("5 %", "ratio", None), ("1 kg", "L [mm]", None),
+        ("m", "L [mm]", None), ("nan m", "L [mm]", None),
+    ],
+)  # fmt: skip
+def test_units_that_measure_the_same_may_be_typed(text, label, value):
+    assert number_kind(unit_in(label), lambda: 0.4).value(text) == value
+
+
+def test_every_unit_of_an_angle_is_the_angle_that_it_says():
+    value = number_kind("deg", lambda: 1.0).value("0.5 rad")
+    assert value == pytest.approx(math.degrees(0.5), rel=1e-14)
+
+
 @pytest.mark.parametrize(
     ("text", "value"),
     [
         ("0, 0, -9.81", (0.0, 0.0, -9.81)), ("1 2 3", (1.0, 2.0, 3.0)), ("1; 2; 3", (1, 2, 3)),
-        ("1, 2", None), ("1, 2, 3, 4", None), ("1, 2, x", None), ("1, 2, inf", None),
+        ("80 mm, 5cm, -0.24 L", (0.08, 0.05, -0.12)), ("1, 2", None), ("1, 2, 3, 4", None),
+        ("1, 2, x", None), ("1, 2, inf", None), ("1, 2, 3 kg", None),
     ],
 )  # fmt: skip
-def test_a_vector_is_three_numbers(text, value):
-    assert vector_of(text) == value
+def test_a_vector_is_three_numbers_with_their_units(text, value):
+    assert vector_kind("m", lambda: 0.5).value(text) == value

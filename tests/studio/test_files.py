@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 import io
-import re
 
 import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.arm.parameters import changed, find_parameter
-from softreach.atlas import DesignSpace, build_atlas, open_atlas
+from softreach.arm.parameters import changed
 from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
-from softreach.plot.style import pyplot
 from softreach.studio import page
-from softreach.studio.atlas_map import atlas_map, fixed_places, map_choices, metric_names
 from softreach.studio.captions import size_text
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
@@ -24,8 +19,8 @@ from softreach.studio.reach import Quality, cloud_points, stages
 from softreach.studio.scene.camera import in_the_way
 from softreach.studio.scene.clouds import in_slice, sample_values
 from softreach.studio.scene.scene import Scene
-from softreach.studio.start import start_on_design, start_on_state, start_on_store
-from softreach.studio.state import Camera, MapView, Slice, StudioState
+from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
+from softreach.studio.state import Camera, Slice, StudioState
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -35,14 +30,6 @@ SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accurac
 def fine(trunk):
     *_, last = stages(trunk, 10, SMALL, lambda: None)
     return last
-
-
-@pytest.fixture(scope="module")
-def store(trunk, tmp_path_factory):
-    space = DesignSpace.grid(trunk, revolution=[0.5, 1.5, 2.5], taper=[0.0, 0.02])
-    path = tmp_path_factory.mktemp("atlas") / "atlas.zarr"
-    build_atlas(space, path, n=200, metrics=("convex",), progress=lambda _: None)
-    return path
 
 
 def test_files_are_those_of_the_librarys_own_writers(fine, tmp_path):
@@ -101,15 +88,6 @@ def test_a_saved_page_is_cut_free_for_its_camera_as_the_tab_is(fine, monkeypatch
         np.testing.assert_array_equal(made[-1].clouds.hidden(points), hidden)
 
 
-def test_a_saved_page_carries_the_map(fine):
-    red = np.full((4, 4, 3), (255, 0, 0), np.uint8)
-    saved = static_page(StudioState(design=fine.arm), fine, red)
-    (data,) = re.findall(r'alt="map".*?data:image/png;base64,([^"]+)', saved)
-    drawn = pyplot().imread(io.BytesIO(base64.b64decode(data)), format="png")
-    np.testing.assert_array_equal(255 * drawn[..., :3], red)
-    assert 'alt="map"' not in static_page(StudioState(design=fine.arm), fine)
-
-
 def test_a_design_file_changes_the_design_alone(trunk):
     state = StudioState(design=trunk, target=(0.0, 0.1, 0.5))
     other = changed(trunk, {"taper": 0.01})
@@ -133,69 +111,12 @@ def test_a_saved_state_is_begun_with(trunk, tmp_path):
 def test_a_cloud_from_a_file_is_shown_as_it_is(trunk, tmp_path):
     cloud = compute_cloud(trunk, 500)
     save_cloud(cloud, tmp_path / "cloud.zarr")
-    start = start_on_store(tmp_path / "cloud.zarr", SMALL)
+    start = start_on_cloud(tmp_path / "cloud.zarr", SMALL)
     assert start.reach is not None
     np.testing.assert_array_equal(start.reach.cloud.tip, cloud.tip)
     assert start.state.design == trunk
     with pytest.raises(InvalidInput, match="Zarr store"):
-        start_on_store(tmp_path / "nothing.zarr")
-
-
-def test_an_atlas_opens_on_its_largest_design(store):
-    start = start_on_store(store, SMALL)
-    atlas = open_atlas(store)
-    best = atlas.convex_volume.where(atlas.convex_volume == atlas.convex_volume.max(), drop=True)
-    for name in ("taper", "revolution"):
-        value = find_parameter(start.state.design, name).value(start.state.design)
-        assert value == pytest.approx(float(best[name][0]))
-    assert start.atlas is not None
-
-
-def test_a_click_on_the_map_finds_the_design_that_was_drawn_there(store):
-    atlas = open_atlas(store)
-    shown = atlas_map(atlas, MapView(metric="convex_volume"), {})
-    for revolution in atlas.revolution.values:
-        for taper in atlas.taper.values:
-            at = {"revolution": float(revolution), "taper": float(taper)}
-            assert shown.parameters_at(*shown.place_of(**at)) == at
-    assert shown.parameters_at(0.01, 0.5) is None
-    rows, columns, colors = shown.image.shape
-    assert rows == columns > 1000  # sharp on a wide screen
-    assert colors == 3
-    assert metric_names(atlas) == ["convex_volume"]
-
-
-def test_a_map_needs_two_parameters(trunk, tmp_path):
-    space = DesignSpace.grid(trunk, taper=[0.0, 0.02])
-    atlas = build_atlas(
-        space, tmp_path / "a.zarr", n=100, metrics=("convex",), progress=lambda _: None
-    )
-    with pytest.raises(InvalidInput, match="two parameters"):
-        atlas_map(atlas, MapView(), {})
-
-
-def test_a_map_holds_what_it_does_not_show_nearest_to_the_design(trunk, tmp_path):
-    space = DesignSpace.grid(
-        trunk, revolution=[0.5, 1.5], taper=[0.0, 0.02], radius_ratio=[0.5, 0.7]
-    )
-    path = tmp_path / "a.zarr"
-    build_atlas(space, path, n=100, metrics=("convex",), progress=lambda _: None)
-    atlas, view = open_atlas(path), MapView(right="radius_ratio", up="revolution")
-    held = fixed_places(atlas, view, changed(trunk, {"taper": 0.013}))
-    assert held == {"taper": 1}
-    shown = atlas_map(atlas, view, held)
-    assert (shown.names, shown.fixed) == (("radius_ratio", "revolution"), {"taper": 0.02})
-    at = {"radius_ratio": 0.7, "revolution": 0.5}
-    assert shown.parameters_at(*shown.place_of(**at)) == at | {"taper": 0.02}
-    assert shown.values_of(changed(trunk, at)) == pytest.approx(at)
-    assert shown.values_of(changed(trunk, {"revolution": 3.0})) is None
-    for wrong, named in (
-        (MapView(right="taper", up="taper"), "map = taper and taper"),
-        (MapView(up="x"), "map = .* and x"),
-        (MapView(metric="x"), "metric = x: must be one of convex_volume"),
-    ):
-        with pytest.raises(InvalidInput, match=named):
-            map_choices(atlas, wrong)
+        start_on_cloud(tmp_path / "nothing.zarr")
 
 
 def test_a_design_starts_at_rest():

@@ -61,18 +61,6 @@ def test_a_dragged_slider_is_one_step_that_buttons_and_keys_undo(tab):
     assert tab.session.reach.arm == second
 
 
-@pytest.mark.large
-def test_reset_leads_back_to_the_beginning_and_can_be_undone(tab):
-    tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"revolution": np.radians(60)})))
-    tab.session.update(lambda s: s.showing(color="manipulability"))
-    before = tab.session.state
-    tab.press("Reset")
-    become(tab, lambda: tab.session.state.design == TRUNK, "the first design is back")
-    assert tab.session.state.appearance.color == "manipulability"
-    tab.press("Undo")
-    become(tab, lambda: tab.session.state == before, "the reset is undone")
-
-
 def test_where_there_is_nothing_to_redo_the_page_says_so_and_no_tab_jumps(tab):
     bar = tab.page.get_by_role("tablist").first.bounding_box()
     redo = tab.page.get_by_role("button", name="Redo", exact=True)
@@ -122,53 +110,4 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, folder):
         tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).wait_for()
         tab.press("Undo")
         become(tab, lambda: tab.session.state.design == TRUNK, "the history is there too")
-        tab.close()
-
-
-@pytest.mark.large
-def test_a_page_that_is_reloaded_goes_on_where_it_was_beside_another_tab(browser, folder):
-    with Studio(start(), work=KeptWork(folder)) as studio:
-        one, other = Tab(browser, studio), None
-        one.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.02})))
-        one.settle()
-        other = Tab(browser, studio)
-        assert other.session.state.design == TRUNK  # what is open elsewhere stays there
-        other.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.01})))
-        other.settle()
-        one.session = reloaded(one, studio)
-        assert taper(one) == 0.02
-        assert one.session.reach.arm == one.session.state.design
-        one.page.get_by_text(size_text(one.session.reach.size, one.session.reach.arm)).wait_for()
-        one.press("Undo")
-        become(one, lambda: one.session.state.design == TRUNK, "the history is there too")
-        assert taper(other) == 0.01
-        other.close()
-        one.close()
-
-
-@pytest.mark.large
-def test_a_server_that_is_started_again_goes_on_where_the_last_one_ended(browser, folder):
-    with Studio(start(), work=KeptWork(folder)) as studio:
-        tab = Tab(browser, studio)
-        tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.02})))
-        tab.session.update(lambda s: s.replace(activation=(-0.5, 0.0, 0.0)))
-        tab.settle()
-        kept = tab.session.state
-        tab.close()
-    with Studio(start(), work=KeptWork(folder)) as studio:
-        tab = Tab(browser, studio)
-        assert tab.session.state.replace(camera=None) == kept.replace(camera=None)
-        assert tab.session.reach.arm == kept.design
-        tab.close()
-
-
-@pytest.mark.large
-def test_work_that_cannot_be_read_is_named_and_the_studio_begins_anew(browser, folder):
-    folder.mkdir()
-    (folder / "latest.json").write_text('{"softreach_studio": 1, "design": "<b class=struck>"}')
-    with Studio(start(), work=KeptWork(folder)) as studio:
-        tab = Tab(browser, studio)
-        tab.page.get_by_text("Work is not kept").wait_for()
-        assert tab.page.locator(".struck").count() == 0
-        assert tab.session.state.design == TRUNK
         tab.close()

@@ -40,7 +40,7 @@ HOSTILE = {
     "50 MB.toml": "#" * 50_000_000,
     "mouse.json": look_with(mouse=["tip"]),
     "huge level.json": look_with(level=10**4000),
-    "digits.json": '{"softreach_studio": 1, "activation": ' + "9" * 5000 + "}",
+    "digits.json": '{"softreach_studio": 2, "activation": ' + "9" * 5000 + "}",
     "huge activation.json": state_with(activation=[10**400] * 3),
     "infinite activation.json": state_with(activation=[float("inf")] * 3),
     "no activation.json": state_with(activation=None),

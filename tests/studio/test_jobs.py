@@ -11,26 +11,26 @@ from softreach.studio.app import JOBS
 from softreach.studio.jobs.beside import DrawFree, DrawReference
 from softreach.studio.jobs.calibration import DrawSample
 from softreach.studio.jobs.inverse import SolveInverse
-from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
+from softreach.studio.jobs.needs import CheckNeeds
+from softreach.studio.jobs.page import KeepState, SetTheme
 from softreach.studio.jobs.plots import PLOT_JOBS
 from softreach.studio.jobs.reach import (
     ComputeReach,
     DifferentiateVolume,
     DrawArm,
     DrawCloud,
-    DrawSurfaces,
+    DrawSurface,
     FollowCamera,
 )
-from softreach.studio.jobs.search import CheckNeeds, DrawSearch
 from softreach.studio.plots import PLOTS
 from softreach.studio.session import what_follows
 from softreach.studio.settings import PlotSettings
-from softreach.studio.state import Camera, MapView, Slice, StudioState
+from softreach.studio.state import Camera, Slice, StudioState
 from tests.studio.test_state import states
 
 _PLOT = {plot.name: job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True)}
 NEEDS = Requirements(payloads=(0.0,)).to_toml()
-ALONG_ARM, SECTION = _PLOT["along_arm"], _PLOT["section"]
+SWEEP, SECTION = _PLOT["sweep"], _PLOT["section"]
 
 
 @given(states())
@@ -44,22 +44,19 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     other = changed(trunk, {"taper": 0.01})
     changes = {
         state.replace(activation=(-1.0, 0.0, 0.0)): {DrawArm, DrawSample},
-        state.showing(color="multiplicity"): {DrawCloud, DrawSurfaces},
-        state.showing(slice=Slice(axis="x")): {DrawCloud, DrawSurfaces},
-        state.showing(map=MapView(metric="volume")): {DrawMap},
-        state.showing(surface=False): {DrawCloud, DrawSurfaces},
-        state.showing(cloud=True): {DrawCloud, DrawSurfaces},
+        state.showing(color="multiplicity"): {DrawCloud, DrawSurface},
+        state.showing(slice=Slice(axis="x")): {DrawCloud, DrawSurface},
+        state.showing(surface=False): {DrawCloud, DrawSurface},
+        state.showing(cloud=True): {DrawCloud, DrawSurface},
         state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowCamera},
         state.showing(cut="half"): {FollowCamera},
-        state.showing(orthographic=True): {FollowCamera},
-        state.showing(dark=True): {SetTheme, DrawSearch, DrawSurfaces},
+        state.showing(dark=True): {SetTheme, DrawSurface},
         state.replace(needs=NEEDS): {CheckNeeds, FollowCamera},
         state.replace(reference=trunk): {DrawReference},
         state.replace(design=other): {
             ComputeReach,
             DifferentiateVolume,
             DrawArm,
-            DrawMap,
             DrawSample,
         },
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
@@ -69,7 +66,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
 
 
 def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(trunk):
-    plots = PlotSettings(shown=("along_arm", "section"))
+    plots = PlotSettings(shown=("sweep", "section"))
     bare = StudioState(design=trunk)
     full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk, needs=NEEDS)
     full = full.showing(plots=plots)
@@ -79,21 +76,20 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
             ComputeReach,
             DifferentiateVolume,
             DrawArm,
-            DrawMap,
             DrawSample,
             SolveInverse,
             CheckNeeds,
-            ALONG_ARM,
+            SWEEP,
         },
         full.showing(slice=Slice(axis="x")): {
             DrawCloud,
             DrawReference,
-            DrawSurfaces,
+            DrawSurface,
             SECTION,
         },
-        full.showing(color="rgb"): {DrawCloud, DrawReference, DrawSurfaces},
-        full.showing(surface=False): {DrawCloud, DrawSurfaces},
-        full.showing(plots=PlotSettings()): {ALONG_ARM, SECTION},
+        full.showing(color="rgb"): {DrawCloud, DrawReference, DrawSurface},
+        full.showing(surface=False): {DrawCloud, DrawSurface},
+        full.showing(plots=PlotSettings()): {SWEEP, SECTION},
         full.replace(target=None): {SolveInverse, FollowCamera},
         full.replace(reference=None): {DrawReference},
         full.replace(needs=""): {CheckNeeds, FollowCamera},
@@ -110,6 +106,5 @@ def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
     )
     assert DrawFree in what_follows(JOBS, bare, light)
     assert DrawFree not in what_follows(JOBS, light, heavy)
-    assert DrawFree in what_follows(JOBS, heavy, heavy.showing(free=False))
     assert DrawFree in what_follows(JOBS, heavy, bare)
     assert DrawFree not in what_follows(JOBS, bare, bare.replace(design=trunk))

@@ -38,16 +38,6 @@ def test_a_snapshot_comes_back_from_its_text(known):
     np.testing.assert_equal(back.numbers, known)
 
 
-def test_sizes_of_older_snapshots_are_in_lengths_of_their_arm():
-    arm = changed(TRUNK, {"length": 0.2})
-    kept = Snapshot(name="small", state=StudioState(design=arm), taken=1.0, numbers=numbers(0.7))
-    older = json.loads(kept.to_json())
-    older["numbers"]["size"] = {"name": "volume", "value": 0.7, "error": 1e-4, "unit": "L³"}
-    size = Snapshot.from_json(json.dumps(older)).numbers.size
-    np.testing.assert_allclose((size.value, size.error), (0.7 * 0.2**3, 1e-4 * 0.2**3))
-    assert size.power == 3
-
-
 def broken(**changes):
     return json.dumps(json.loads(snapshot(numbers=numbers(0.7)).to_json()) | changes)
 

@@ -114,7 +114,7 @@ def test_a_vector_that_cannot_be_is_refused(lce, field, wrong):
 
 
 def test_a_state_keeps_its_loads(lce):
-    state = StudioState(design=hanging(lce, 5.0)).showing(free=False)
+    state = StudioState(design=hanging(lce, 5.0))
     assert StudioState.from_json(state.to_json()) == state
 
 

@@ -9,15 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import softreach as sr
-from softreach.arm import Loads, designs
+from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.studio.app import JOBS
-from softreach.studio.jobs.plots import PLOT_JOBS, plots_from
+from softreach.studio.jobs.plots import PLOT_JOBS
 from softreach.studio.plots import PLOTS
-from softreach.studio.plots.along_arm import AlongArmPlot, along_arm
 from softreach.studio.plots.plot import Chart, Curve, Figures
-from softreach.studio.plots.sweep import sweep
+from softreach.studio.plots.sweep import SweepPlot, sweep
 from softreach.studio.reach import Quality
 from softreach.studio.session import what_follows
 from softreach.studio.settings import PlotSettings
@@ -26,7 +24,6 @@ from softreach.studio.state import StudioState
 
 STATE = StudioState(design=designs.minimal_trunk())
 MOVED = STATE.replace(activation=(-1.0, 0.0, -0.5))
-SHOWN = PlotSettings(shown=(AlongArmPlot.name,))
 
 
 class Session(SimpleNamespace):
@@ -56,37 +53,15 @@ def test_only_what_is_shown_becomes_stale(plot):
     shown = STATE.showing(plots=PlotSettings(shown=(plot.name,)))
     assert job in what_follows(JOBS, STATE, shown)
     assert job not in what_follows(JOBS, STATE, MOVED)
-    depends = "activation" in plot.depends_on
-    assert (job in what_follows(JOBS, shown, shown.replace(activation=MOVED.activation))) == depends
+    assert job not in what_follows(JOBS, shown, shown.replace(activation=MOVED.activation))
 
 
-def test_plots_are_asked_for_by_what_they_are_computed_from():
-    for source in ("reach", "answer"):
-        jobs = [job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True) if source in plot.sources]
-        assert list(plots_from(source)) == jobs != []
-
-
-def test_a_plot_is_computed_only_while_it_is_shown():
-    for settings, count in ((PlotSettings(), 0), (SHOWN, 1)):
-        job = job_of(AlongArmPlot, MOVED.showing(plots=settings))
+def test_a_plot_is_computed_only_while_it_is_shown(monkeypatch):
+    monkeypatch.setattr(SweepPlot, "compute", lambda *_: iter(["a result"]))
+    for settings, count in ((PlotSettings(), 0), (PlotSettings(shown=("sweep",)), 1)):
+        job = job_of(SweepPlot, STATE.showing(plots=settings))
         job.run(lambda: None)
         assert (len(job.session.figures.plots), job.session.shown) == (count, count)
-
-
-def test_curvature_along_the_arm_is_that_of_its_shape():
-    values = along_arm(MOVED.design, MOVED.activation)
-    shape = sr.configuration(MOVED.design, MOVED.activation, len(values.station))
-    bending = np.linalg.norm(shape.curvature.values[:, :2], axis=1) * MOVED.design.length
-    np.testing.assert_allclose(values.bending, bending, atol=1e-9)
-    np.testing.assert_allclose(values.extension, shape.extension.values, atol=1e-12)
-
-
-@pytest.mark.filterwarnings("ignore:the load number is above")
-def test_an_arm_that_cannot_be_computed_has_no_curves():
-    heavy = designs.lce_arm().replace(loads=Loads(gravity=(0.0, 0.0, 9.81), payload=1.0))
-    values = along_arm(heavy, [0.0] * heavy.bundles)
-    assert values.arm == heavy
-    assert np.isnan(values.extension).all()
 
 
 QUICK = Quality(coarse_accuracy=0.1, tol=1e-4)

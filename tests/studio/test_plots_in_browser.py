@@ -7,7 +7,6 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed, find_parameter
-from softreach.cloud.volume import volume_curve
 from softreach.studio.settings import PlotSettings
 from softreach.studio.state import Slice
 
@@ -17,38 +16,6 @@ def _nothing_beside_the_scene(tab):
     yield
     tab.session.update(lambda s: s.showing(plots=PlotSettings(), slice=Slice()))
     tab.settle()
-
-
-def test_curvature_along_the_arm_follows_a_slider(tab):
-    tab.open("Plots")
-    assert not tab.page.get_by_text("largest κL").is_visible()
-    tab.page.get_by_label("along the arm", exact=True).check()
-    tab.page.get_by_text("largest κL").wait_for()
-    tab.wait(lambda: tab.page.locator(".uplot canvas").count() == 2, "two charts are drawn")
-    tab.open("Move")
-    before = ink(tab)
-    tab.drag("γ left", -60)
-    tab.settle()
-    state, found = tab.session.state, tab.session.figures.plots["along_arm"]
-    shape = sr.configuration(state.design, state.activation, len(found.station))
-    bending = np.linalg.norm(shape.curvature.values[:, :2], axis=1) * state.design.length
-    np.testing.assert_allclose(found.bending, bending, atol=1e-9)
-    np.testing.assert_allclose(found.extension, shape.extension.values, atol=1e-12)
-    tab.page.get_by_text(f"largest κL {bending.max():.4g}").wait_for()
-    tab.wait(lambda: ink(tab) != before, "the chart is drawn anew")
-
-
-@pytest.mark.large
-def test_the_volume_against_alpha_is_that_of_the_cloud(tab):
-    tab.open("Plots")
-    tab.page.get_by_label("V against α").check()
-    tab.page.get_by_text("V(0.05 L)").wait_for()
-    tab.settle()
-    found, reach = tab.session.figures.plots["volume_curve"], tab.session.reach
-    tips = reach.cloud.tip[: found.samples]
-    np.testing.assert_allclose(found.volume[::20], volume_curve(tips, found.radius[::20]))
-    assert found.exact == reach.volume
-    assert (found.volume <= found.convex * (1 + 1e-9)).all()
 
 
 @pytest.mark.large
@@ -103,21 +70,6 @@ def test_a_sweep_in_progress_is_dropped_for_that_of_another_design(tab):
     assert tab.session.figures.plots["sweep"].complete
 
 
-@pytest.mark.large
-def test_histograms_are_those_of_the_samples_that_the_slice_leaves(tab):
-    tab.open("Plots")
-    tab.page.get_by_label("activations", exact=True).check()
-    samples = tab.session.reach.samples
-    tab.page.get_by_text(f"{samples:,} samples; the line").or_(
-        tab.page.get_by_text("samples; the line is the present")
-    ).first.wait_for()
-    cut = Slice(axis="z", center=0.6, thickness=0.1)
-    tab.session.update(lambda s: s.showing(slice=cut))
-    tab.page.get_by_text("within the slice z = 0.6 m").wait_for()
-    picture = tab.page.locator("img").first
-    assert picture.evaluate("image => image.naturalWidth") > 600
-
-
 def test_names_in_a_chart_are_text(tab):
     from softreach.studio.plots.plot import Chart, Curve
 
@@ -129,8 +81,3 @@ def test_names_in_a_chart_are_text(tab):
     tab.page.get_by_text(name).wait_for()
     assert tab.page.locator("img[src=x]").count() == 0
     folder.remove()
-
-
-def ink(tab) -> str:
-    """What the first chart shows."""
-    return tab.page.locator(".uplot canvas").first.evaluate("canvas => canvas.toDataURL()")

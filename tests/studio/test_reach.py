@@ -15,7 +15,7 @@ from softreach.rod.kinematics import tip_positions
 from softreach.studio.captions import scale_bar
 from softreach.studio.jobs.reach import swept_activation
 from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
-from softreach.studio.scene.camera import is_behind, picked_point, plane_crossing
+from softreach.studio.scene.camera import is_behind, picked_point
 from softreach.studio.scene.clouds import (
     color_names,
     in_slice,
@@ -112,13 +112,6 @@ def test_a_ray_picks_the_nearest_of_the_points_on_it():
     assert picked_point(points, eye, (0, 1, 0), 0.01) is None
 
 
-def test_a_ray_meets_a_plane_in_front_of_the_eye_only():
-    hit = plane_crossing((0, 0, 0), (1, 1, 0), (2, 0, 0), (1, 0, 0))
-    np.testing.assert_allclose(hit, (2, 2, 0))
-    assert plane_crossing((0, 0, 0), (-1, 0, 0), (2, 0, 0), (1, 0, 0)) is None
-    assert plane_crossing((0, 0, 0), (0, 1, 0), (2, 0, 0), (1, 0, 0)) is None
-
-
 def test_the_box_holds_every_point_and_its_numbers_are_round(rng):
     points = rng.uniform(-0.73, 1.19, (100, 3))
     box = axes_box(points)
@@ -177,13 +170,6 @@ def test_a_surface_is_read_back_from_its_file():
         surface.visual.vertex_attributes["color"][0], (255, 255, 255, 128)
     )
     np.testing.assert_allclose(lines.vertices, vertices[:2])
-
-
-def test_the_volume_of_the_alpha_shape_is_known_once_it_is_there(trunk):
-    *_, fine = stages(trunk, 15, SMALL, lambda: None)
-    assert fine.alpha_volume is None
-    assert len(fine.alpha_shape.faces)
-    assert fine.alpha_volume == pytest.approx(fine.volume, rel=0.2)
 
 
 def test_a_ball_hides_what_is_behind_it_and_nothing_that_it_touches():

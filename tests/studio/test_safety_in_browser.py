@@ -9,7 +9,6 @@ import pytest
 
 from softreach.arm import designs
 from softreach.studio import StudioState
-from softreach.studio.start import state_link
 from tests.studio.tab import CHEAP
 
 STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
@@ -22,7 +21,7 @@ def state_with(**changes) -> str:
     look = values["appearance"]
     for path, value in changes.items():
         place, _, name = path.rpartition("__")
-        {"": values, "look": look, "slice": look["slice"], "map": look["map"]}[place][name] = value
+        {"": values, "look": look, "slice": look["slice"]}[place][name] = value
     return json.dumps(values)
 
 
@@ -43,8 +42,6 @@ STATES = {
     "mouse": state_with(look__mouse=STRIKE),
     "switch": state_with(look__cloud=STRIKE),
     "axis": state_with(slice__axis=STRIKE),
-    "metric": state_with(map__metric=STRIKE),
-    "parameter": state_with(map__right=STRIKE),
     "unknown": state_with(**{"look__" + STRIKE: 1}),
     "version": state_with(softreach_studio=STRIKE),
     "target": state_with(target=[STRIKE] * 3),
@@ -110,23 +107,7 @@ def test_no_text_of_a_file_or_its_name_is_markup(tab, names):
                 assert_nothing_struck(tab.page)
         if name == "level.json":
             tab.page.get_by_text(STRIKE).first.wait_for()
-    assert taken & {"color.json", "metric.json", "parameter.json"}
-
-
-@pytest.mark.large
-def test_no_text_of_a_link_is_markup(tab, browser, studio, monkeypatch):
-    struck = StudioState(design=designs.minimal_trunk())
-    monkeypatch.setattr(StudioState, "to_json", lambda _: STATES["level"])
-    address = state_link(studio.url, struck)
-    monkeypatch.undo()
-    known, page = set(studio.sessions), browser.new_page()
-    page.goto(address)
-    tab.wait(lambda: set(studio.sessions) - known, "the other tab connects")
-    page.get_by_text("level = ").first.wait_for()
-    assert_nothing_struck(page)
-    studio.sessions[max(studio.sessions)].settle()
-    page.close()
-    tab.wait(lambda: set(studio.sessions) <= known, "the session of the closed tab ends")
+    assert taken & {"color.json", "named.toml"}
 
 
 def test_an_address_that_names_another_server_opens_no_page(browser, studio):

@@ -17,7 +17,7 @@ from softreach.studio.reach import stages
 from softreach.studio.scene.axes import NumberedBox
 from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
-from softreach.studio.state import Appearance
+from softreach.studio.state import Appearance, Slice
 from tests.made_arms import MADE_ARMS
 from tests.studio.conftest import SMALL
 
@@ -57,7 +57,7 @@ def test_numbers_along_the_axes_are_places_in_the_unit_of_the_design(unit, size)
     arm = changed(arm, {"length": 0.2})
     corners = np.array([[-0.5, -0.7, 0.1], [0.6, 0.5, 1.1]])
     box = NumberedBox(drawn)
-    box.draw(corners, arm=arm, shown=True)
+    box.draw(corners, arm=arm)
     labels = [node for path, node in drawn.added.items() if path.startswith("/axes/label")]
     names = [label.text for label in labels if label.text[0] in "xyz"]
     assert names == [arm.length_unit.label(axis) for axis in "xyz"]
@@ -123,7 +123,7 @@ def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or
     scene = Scene(meshes)
 
     def drawn(reach, look):
-        keys = scene.draw_surfaces(reach, look), scene.draw_cloud(reach, look)
+        keys = scene.draw_surface(reach, look), scene.draw_cloud(reach, look)
         return keys, {path for path in meshes.added if path in ("/surface", "/cloud")}
 
     keys, nodes = drawn(reach, look)
@@ -141,15 +141,15 @@ def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or
 
 def test_the_reach_without_loads_is_a_faint_surface_and_points_only_where_it_has_none(trunk):
     *_, reach = stages(trunk, 12, SMALL, lambda: None)
-    meshes, look = Meshes(), Appearance()
+    meshes = Meshes()
     scene = Scene(meshes)
-    scene.draw_free(reach, look)
+    scene.draw_free(reach, Slice())
     free = meshes.added["/free"]
     np.testing.assert_allclose(free.vertices, reach.sheets.vertices / trunk.length, atol=1e-6)
     assert free.opacity < 0.3
-    scene.draw_free(replace(reach, exact=None), look)
+    scene.draw_free(replace(reach, exact=None), Slice())
     assert len(meshes.added["/free"].points)
-    scene.draw_free(reach, replace(look, free=False))
+    scene.draw_free(None, Slice())
     assert not meshes.added
 
 

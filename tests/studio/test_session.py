@@ -41,17 +41,6 @@ def test_a_click_for_a_path_hits_no_point_that_is_cut_away(session):
     assert path is None or not session.scene.clouds.hidden(path[-1:]).any()
 
 
-def test_a_click_for_a_path_hits_as_closely_with_a_long_lens_as_with_the_usual_one(session):
-    session.update(lambda state: state.showing(orthographic=True, cut="none"))
-    assert session.settle()
-    points = cloud_points(session.reach, session.state.appearance.level)
-    eye = np.asarray(session.client.camera.position)
-    across = np.cross(eye - points.mean(axis=0), [0.0, 0.0, 1.0])
-    across /= np.linalg.norm(across)
-    beside = points[np.argmax(points @ across)] + 0.4 * across
-    assert clicked_path(session, eye, beside - eye) is None
-
-
 def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_design(session):
     calls: list[str] = []
 

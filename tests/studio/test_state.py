@@ -17,7 +17,6 @@ from softreach.studio.state import (
     MOUSE,
     Appearance,
     Camera,
-    MapView,
     Slice,
     StudioState,
 )
@@ -37,9 +36,7 @@ def states(draw: st.DrawFn) -> StudioState:
         color=draw(st.sampled_from(["rgb", "bundle 0", "multiplicity"])),
         slice=Slice(axis=axis, center=draw(numbers), thickness=draw(st.floats(0.01, 1))),
         surface=draw(st.booleans()),
-        trail=draw(st.booleans()),
         mouse=draw(st.sampled_from([*MOUSE])),
-        map=MapView(metric=draw(st.sampled_from(["", "volume"])), shown=draw(st.booleans())),
     )
     return StudioState(
         design=draw(arms()),
@@ -56,15 +53,6 @@ def states(draw: st.DrawFn) -> StudioState:
 @given(states())
 def test_a_state_comes_back_from_its_text(state):
     assert StudioState.from_json(state.to_json()) == state
-
-
-@pytest.mark.parametrize(("handle", "mouse"), [(True, "tip"), (False, "none")])
-def test_a_state_of_an_older_version_opens(trunk, handle, mouse):
-    values = json.loads(StudioState(design=trunk).to_json())
-    del values["appearance"]["mouse"]
-    values["appearance"] |= {"point_size": 0.01, "handle": handle}
-    state = StudioState.from_json(json.dumps(values))
-    assert state.appearance.mouse == mouse
 
 
 @given(states())

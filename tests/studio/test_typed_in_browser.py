@@ -75,18 +75,6 @@ def test_arrow_keys_on_a_control_leave_the_camera_alone(tab):
 
 
 @pytest.mark.large
-def test_nothing_happens_before_enter_and_the_field_says_so(tab):
-    tab.open("Design")
-    before = tab.session.state.design
-    typed(tab, "taper φ [deg]", "1.5", enter=False)
-    tab.page.get_by_text("Enter applies it").wait_for()
-    assert tab.session.state.design == before
-    tab.page.keyboard.press("Enter")
-    tab.wait(lambda: tab.session.state.design != before, "Enter applies it")
-    tab.page.get_by_text("Enter applies it").wait_for(state="hidden")
-
-
-@pytest.mark.large
 def test_refused_numbers_say_why_under_their_field_in_its_own_unit(tab):
     for label, text, said in (
         ("taper φ [deg]", "30", "taper φ [deg] = 30"),
@@ -103,13 +91,6 @@ def test_refused_numbers_say_why_under_their_field_in_its_own_unit(tab):
         typed(tab, label, "1.5" if text != "much" else "1")
         tab.wait(lambda old=before: tab.session.state.design != old, "a number is taken")
         alert.wait_for(state="hidden")
-
-
-@pytest.mark.large
-def test_an_activation_below_zero_is_typed(tab):
-    tab.open("Move")
-    typed(tab, "γ left", "-0.05")
-    tab.wait(lambda: tab.session.state.activation[0] == -0.05, "the bundle pulls")
 
 
 def test_every_control_has_a_tooltip_with_its_meaning(tab):
@@ -154,28 +135,18 @@ def test_keys_choose_tabs_and_show_their_table_but_not_while_one_types(tab):
     tab.page.keyboard.press("Escape")  # restores what was in the field
 
 
-def test_an_expression_with_a_unit_is_worked_out_and_a_wrong_one_says_why(tab):
-    place = typed(tab, "taper φ [deg]", "pi/120 rad")
-    tab.wait(lambda: value(tab, "taper") == pytest.approx(np.radians(1.5)), "it is applied")
-    tab.wait(lambda: place.input_value() == "1.5", "its number is shown")
+def test_a_number_with_a_unit_is_shown_in_that_of_its_field_and_a_wrong_one_says_why(tab):
+    place = typed(tab, "taper φ [deg]", "0.02 rad")
+    tab.wait(lambda: value(tab, "taper") == pytest.approx(0.02, rel=1e-14), "it is applied")
+    tab.wait(lambda: place.input_value() == f"{np.degrees(0.02):.12g}", "its number is shown")
     before = tab.session.state.design
     place = typed(tab, "taper φ [deg]", "2 cm")
-    alert = tab.page.get_by_role("alert").filter(has_text="cm is not expected there")
+    alert = tab.page.get_by_role("alert").filter(has_text="must be a number")
     alert.wait_for()
     assert place.input_value() == "2 cm"
     assert tab.session.state.design == before
-    typed(tab, "taper φ [deg]", "2*0.75")  # what it is already
+    typed(tab, "taper φ [deg]", "1.5")
     alert.wait_for(state="hidden")
-
-
-def test_components_of_a_typed_target_are_expressions(tab):
-    tab.open("Move")
-    place = tab.page.locator("xpath=//label[normalize-space()='target [m]']/following::input[1]")
-    place.fill("(0.1*2 m, 0, 30 cm + 0.4 m)")
-    place.press("Enter")
-    tab.wait(lambda: tab.session.state.target is not None, "it is applied")
-    np.testing.assert_allclose(tab.session.state.target, (0.2, 0.0, 0.7), atol=1e-12)
-    tab.wait(lambda: place.input_value() == "0.2, 0, 0.7", "its numbers are shown")
 
 
 def test_an_arm_is_read_and_aimed_in_the_unit_of_its_design(tab):

@@ -21,7 +21,6 @@ REFERENCE = "reference"
 """Name of a design that an older state keeps without a snapshot."""
 _LONGEST_NAME = 60
 _MOST = 100
-_POWERS = {"L³": 3, "L²": 2, "L": 1, "": 0}
 
 
 class Numbers(NamedTuple):
@@ -87,7 +86,7 @@ class Snapshot:
             return cls(
                 name=values["name"],
                 taken=float(values["taken"]),
-                numbers=_numbers(values["numbers"], state.design.length),
+                numbers=_numbers(values["numbers"]),
                 state=state,
             )
         except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
@@ -183,7 +182,7 @@ def numbers_of(reach: Reach | None, state: StudioState) -> Numbers | None:
     return Numbers(reach.size, reach.unreachability)
 
 
-def _numbers(values: Any, length: float) -> Numbers | None:
+def _numbers(values: Any) -> Numbers | None:
     if values is None:
         return None
     size = values["size"]
@@ -191,11 +190,7 @@ def _numbers(values: Any, length: float) -> Numbers | None:
     if not (math.isfinite(value) and math.isfinite(error)):
         raise ValueError("numbers that are not finite")
     share = math.nan if unr is None else float(unr)
-    power, scale = size.get("power"), 1.0
-    if power is None:  # an older one, in L
-        power = _POWERS[size["unit"]]
-        scale = length**power
-    return Numbers(Size(str(size["name"]), value * scale, error * scale, int(power)), share)
+    return Numbers(Size(str(size["name"]), value, error, int(size["power"])), share)
 
 
 def _or_none(value: float) -> float | None:

@@ -1,4 +1,4 @@
-"""Needs and search in a tab without a browser: judged live, searched for, loaded and undone."""
+"""Needs in a tab without a browser: typed, loaded, judged live and drawn."""
 
 from __future__ import annotations
 
@@ -10,21 +10,17 @@ import numpy as np
 import pytest
 
 import softreach as sr
-import softreach.studio.jobs.search as jobs
+import softreach.studio.jobs.needs as jobs
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.optimization.free_parameters import free_parameters
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.studio import Studio
 from softreach.studio.jobs.inverse import SolveInverse
-from softreach.studio.jobs.search import DrawSearch
 from softreach.studio.needs import requirements_of
 from softreach.studio.scene.needs import MISSED
-from softreach.studio.search_ranges import ranges_of, slider_range
 from softreach.studio.session import Session
-from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.tabs.search import SearchPanel
+from softreach.studio.tabs.needs import NeedsPanel
 from softreach.support.errors import SoftreachError
 from tests.studio.sockets import page
 
@@ -43,19 +39,14 @@ def opened(studio: Studio) -> Iterator[Session]:
 @pytest.fixture
 def session(opened, monkeypatch) -> Session:
     monkeypatch.setattr(jobs, "_PAUSE", 0.0)
-    monkeypatch.setattr(jobs, "_BETWEEN", 0.0)
-    panel = panel_of(opened)
-    panel._forget()
-    panel._free.value = ""
-    panel._first.value, panel._second.value = "maximize exact_volume", "nothing more"
     opened.update(lambda state: state.replace(design=ARM, activation=POSE, needs="", target=None))
     opened.settle()
     opened.end_step()
     return opened
 
 
-def panel_of(session) -> SearchPanel:
-    return next(panel for panel in session.panels if isinstance(panel, SearchPanel))
+def panel_of(session) -> NeedsPanel:
+    return next(panel for panel in session.panels if isinstance(panel, NeedsPanel))
 
 
 def added(session, kind, text="") -> None:
@@ -71,14 +62,6 @@ def verdict(session) -> str:
 
 def drawn(session, name):
     return session.client.scene.get_handle_by_name(f"/needs{name}")
-
-
-def searched(session, free, first, second="nothing more", designs=6) -> None:
-    panel = panel_of(session)
-    panel._free.value, panel._designs.value = free, designs
-    panel._first.value, panel._second.value = first, second
-    panel._ask()
-    session.settle()
 
 
 def test_a_place_is_a_ball_where_it_is_reached_and_a_cross_with_its_gap_where_it_is_not(session):
@@ -227,41 +210,6 @@ def test_numbers_that_make_no_need_are_refused(opened):
         assert opened.state == before
 
 
-def test_a_search_fills_its_picture_and_its_best_is_loaded_and_undone(session):
-    added(session, "place to reach")
-    told = []
-    session.report, plain = lambda text: (told.append(text), plain(text))[1], session.report
-    searched(session, "taper = 0:3", "maximize exact_volume")
-    session.report = plain
-    run, panel = session.search, panel_of(session)
-    assert any(text.startswith("searching, ") for text in told)
-    assert run.result is not None
-    assert len(run.candidates) > 1
-    assert "computed to full accuracy" in panel._summary._widget.content
-    assert "taper φ [deg]" in panel._values._widget.content
-    panel._loaded()
-    session.settle()
-    assert session.state.design == run.result.arm
-    assert session.check.met
-    session.step(back=True)
-    session.settle()
-    assert session.state.design == ARM
-
-    # A click on a point of the board does the same.
-    candidate, place = run.picture.candidates[-1], run.picture.places[-1]
-    at = session.job(DrawSearch).board.in_scene(*place)
-    origin = np.array([2.1, -3.85, 1.45])
-    assert panel.click(origin, at - origin)
-    session.settle()
-    assert session.state.design == run.arm(candidate)
-    assert not panel.click(origin, np.array([0.0, 0.0, 1.0]))
-    panel._forget()
-    session.settle()
-    assert session.client.scene.get_handle_by_name("/search") is None
-    assert not panel.click(origin, at - origin)
-    assert not panel._take.visible
-
-
 def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session):
     session.update(lambda state: state.showing(cut="none", cloud=True))
     assert session.settle()
@@ -275,78 +223,6 @@ def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session)
     (place,) = requirements_of(session.state.needs).places
     assert np.linalg.norm(np.cross(place, point) / np.linalg.norm(point)) < 0.02 * ARM.length
     assert session.check.met
-
-
-def test_two_objectives_have_a_front_whose_designs_are_loaded_one_by_one(session):
-    added(session, "place to reach")
-    searched(session, "taper, revolution = 60:120", "maximize exact_volume", "minimize mean_effort")
-    run, panel = session.search, panel_of(session)
-    assert [goal.sense for goal in run.problem.goals] == [1.0, -1.0]
-    assert panel._at.visible == (len(run.front) > 1)
-    for k, candidate in enumerate(run.front, 1):
-        panel._at.value = k
-        panel._loaded()
-        assert session.state.design == run.arm(candidate)
-
-
-def test_a_canceled_search_keeps_what_it_has_judged(session, monkeypatch):
-    def canceled_soon(*arguments, follow, **options):
-        def judged(candidate):
-            session.cancel()
-            follow(candidate)
-
-        return plain(*arguments, follow=lambda c: (follow(c), judged(c)), **options)
-
-    plain = jobs.search
-    monkeypatch.setattr(jobs, "search", canceled_soon)
-    searched(session, "taper", "maximize exact_volume", designs=50)
-    assert "Canceled" in session.note
-    assert session.search.result is None
-    assert len(session.search.candidates) == 1
-    panel_of(session)._loaded()
-    assert session.state.design == session.search.arm(session.search.candidates[0])
-
-
-BAD_SEARCHES = [
-    ("", "maximize exact_volume", "nothing more", "one parameter or more"),
-    ("tapper", "maximize exact_volume", "nothing more", "taper"),
-    ("taper = 3:0", "maximize exact_volume", "nothing more", "low < high"),
-    ("taper = a:b", "maximize exact_volume", "nothing more", "a range such as 0:3"),
-    ("taper, taper", "maximize exact_volume", "nothing more", "given once"),
-    ("taper", "maximize coverage", "nothing more", "regions"),
-    ("taper", "maximize mass", "minimize mass", "given once"),
-    ("taper", "nothing more", "nothing more", "no needs"),
-]
-
-
-def test_a_search_that_cannot_be_is_refused_in_one_line(session):
-    for free, first, second, words in BAD_SEARCHES:
-        session.say("")
-        try:
-            searched(session, free, first, second)
-            said = session.note
-        except SoftreachError as error:  # which the button shows
-            said = str(error)
-        assert words in said
-        assert "\n" not in said
-        assert session.search is None
-
-
-def test_ranges_are_typed_in_the_units_of_sliders(trunk):
-    typed = ranges_of("taper = -1:3, revolution, left.offset = -right.offset", trunk)
-    assert typed["taper"] == pytest.approx(np.radians([-1, 3]))
-    assert typed["revolution"] == pytest.approx(np.radians([1, 360]))
-    assert typed["left.offset"] == "-right.offset"
-
-
-@pytest.mark.parametrize("name", ["minimal_trunk", "lce_arm", "redundant_trunk"])
-def test_the_range_of_every_slider_can_be_searched(name):
-    arm = getattr(designs, name)()
-    names = [slider.name for slider in slider_parameters(arm)]
-    assert names
-    for each in names:
-        (free,) = free_parameters(arm, ranges_of(f"{each} = {slider_range(arm, each)}", arm)).free
-        assert free.low < free.high
 
 
 def test_needs_of_many_places_are_drawn_with_few_labels(session):
