@@ -23,7 +23,7 @@ from softreach.inverse.drag import Drag
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.scene import Scene
 from softreach.studio.serve.server import start_server, stop_server
-from softreach.studio.state import LEVELS, Appearance
+from softreach.studio.state import Appearance
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -114,7 +114,6 @@ def print_table(scene: Scene, repeat: int) -> None:
     runs = [first_picture(scene, moved(k), Quality()) for k in range(1, repeat + 1)]
     off = max(abs(run["coarse"].volume / run["fine"].volume - 1) for run in runs)
     four = first_picture(scene, designs.redundant_trunk(), Quality())
-    most = first_picture(scene, moved(repeat + 1), Quality(), max(LEVELS))
     arm_updates(scene, 10)
     arm = best([arm_updates(scene, 60) for _ in range(repeat)])
     tip_drags(scene, 3)
@@ -124,7 +123,6 @@ def print_table(scene: Scene, repeat: int) -> None:
     print("|---|--:|--:|--:|")
     row("slider to first cloud (65,536 points) and volume", best([r["coarse"] for r in runs]), 0.5)
     row("slider to fine result (524,288 points, 0.3 %)", best([r["fine"] for r in runs]))
-    row("the same with 2,097,152 points, once", most["fine"])
     row("first cloud and volume with four bundles, once", four["coarse"])
     row("fine result with four bundles, once", four["fine"], 0.9)
     row("update of the arm while an activation is dragged", arm, 0.05)

@@ -62,7 +62,7 @@ def furnish(tab: Tab) -> None:
     tab.session.update(
         lambda s: s.replace(activation=(-0.7, -0.4, -0.9), target=(0.05, 0.02, 0.15))
     )
-    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("along_arm", "section"))))
+    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section", "sweep"))))
     tab.settle()
     tab.open("Compare")
     tab.press("Take snapshot")

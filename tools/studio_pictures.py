@@ -22,7 +22,6 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.studio import Studio
-from softreach.studio.jobs.search import SearchDesigns
 from softreach.studio.settings import PlotSettings
 from softreach.studio.start import start_on_design
 
@@ -55,15 +54,10 @@ def studio_handle(tab: Tab) -> None:
 
 
 def studio_plots(tab: Tab) -> None:
-    """The section and the curves along the arm."""
+    """The section, and the volume against the taper."""
     pose(tab, CURLED)
     tab.open("Plots")
-    views = PlotSettings(
-        shown=(
-            "along_arm",
-            "section",
-        )
-    )
+    views = PlotSettings(shown=("section", "sweep"), parameter="taper")
     tab.session.update(lambda state: state.showing(plots=views))
     tab.settle()
     tab.page.get_by_text("one closed curve").wait_for()
@@ -73,28 +67,23 @@ def studio_compare(tab: Tab) -> None:
     """Three designs in a table."""
     tab.open("Compare")
     first = tab.session.state.design
-    for name, taper in (("published", None), ("taper 1.5°", 1.5), ("taper 1°", 1.0)):
+    for taper in (None, 1.5, 1.0):
         if taper is not None:
             design = changed(first, {"taper": np.radians(taper)})
             tab.session.update(
                 lambda state, design=design: state.replace(design=design, activation=CURLED)
             )
             tab.settle()
-        take(tab, name)
+        take(tab)
 
 
-def studio_search(tab: Tab) -> None:
-    """Three places, one of them missed, and the front of a search."""
+def studio_needs(tab: Tab) -> None:
+    """Three places, one of them missed."""
     pose(tab, CURLED)
     needs = Requirements(targets=[Target([place], name=name) for name, place in PLACES.items()])  # pyright: ignore[reportArgumentType]
     tab.session.update(lambda state: state.replace(needs=needs.to_toml()))
     tab.settle()
     tab.open("Goals")
-    search = tab.session.job(SearchDesigns)
-    search.free = {"taper": (0.0, 0.05), "revolution": (1.0, 3.0), "left.offset": (0.0, 3.0)}
-    search.maximize, search.minimize, search.designs = ("exact_volume",), ("mean_effort",), 400
-    search.ask()
-    tab.wait(lambda: tab.session.search and tab.session.search.result, "the search is complete")
 
 
 def studio_phone(tab: Tab) -> None:
@@ -107,7 +96,7 @@ SCENES: dict[str, Callable[[Tab], None]] = {
     "studio-handle": studio_handle,
     "studio-plots": studio_plots,
     "studio-compare": studio_compare,
-    "studio-search": studio_search,
+    "studio-needs": studio_needs,
     "studio-phone": studio_phone,
 }
 

@@ -162,7 +162,7 @@ def change_the_body(tab, folder) -> None:
     for slider in slider_parameters(tab.session.state.design):
         nudged(tab, slider.label)
     for label, text in (
-        ("length [m]", "110 cm"), ("bore / outer radius", "0.1"), ("Poisson's ratio ν", "0.45"),
+        ("length [mm]", "1.1 m"), ("bore / outer radius", "0.1"), ("Poisson's ratio ν", "0.45"),
     ):  # fmt: skip
         typed(tab, label, text)
     assert tab.session.state.design.length == 1.1
