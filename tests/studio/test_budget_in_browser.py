@@ -11,27 +11,14 @@ from softreach.arm.parameters import changed
 from softreach.studio import Quality
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
-from softreach.studio.work import Latest, all_cores
+from softreach.studio.work import Latest
 from tests.studio.conftest import SMALL
-from tests.studio.tab import PATIENCE, Tab
 
 ENDLESS = Quality(coarse_level=12, fine_level=12, fine_accuracy=1e-5, most_seconds=3600.0)
 
 
 def five_bundles():
     return changed(designs.minimal_trunk(), {"longitudinal.bundles": 3})
-
-
-@pytest.mark.large
-def test_a_slider_that_makes_five_bundles_leaves_the_server_alive(tab):
-    tab.open("Design")
-    tab.drag("bundles of longitudinal", 60)
-    tab.wait(lambda: tab.session.state.design.bundles >= 5, "there are more bundles")
-    tab.settle()
-    reach = tab.session.reach
-    assert reach.arm == tab.session.state.design
-    assert reach.fine
-    tab.page.get_by_text(f"{reach.samples:,} samples").first.wait_for()
 
 
 def begin_endless(tab):
@@ -69,18 +56,6 @@ def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, mo
 
 
 @pytest.mark.large
-def test_a_tab_that_closes_in_mid_computation_ends_it_and_frees_its_memory(browser, studio):
-    tab = Tab(browser, studio)
-    session = tab.session
-    begin_endless(tab)
-    tab.context.close()
-    assert session.settle(PATIENCE)
-    assert session.reach is None
-    with all_cores:
-        pass
-
-
-@pytest.mark.large
 def test_what_is_shown_of_the_design_before_is_marked(tab, monkeypatch):
     go, made = threading.Event(), stages.compute_cloud
 
@@ -114,19 +89,3 @@ def test_a_hundred_bundles_show_a_cloud_and_say_what_is_left_out(tab):
     tab.page.get_by_text("60 more bundles have no slider here").wait_for()
     tab.session.cancel()
     tab.settle()
-
-
-def test_an_upload_of_5_mb_is_refused_in_one_line(tab, tmp_path):
-    path = tmp_path / "state.json"
-    path.write_bytes(b" " * 5_000_000)
-    tab.open("Export")
-    tab.load(path)
-    tab.page.get_by_text("state.json = 5 MB: must be at most 2 MB").wait_for()
-
-
-@pytest.mark.large
-def test_an_export_says_that_it_works_and_what_it_wrote(tab, tmp_path):
-    tab.open("Export")
-    tab.choose("data", "cloud (.parquet)")
-    tab.save("Save data", tmp_path)
-    tab.page.get_by_text("cloud.parquet is written").wait_for()

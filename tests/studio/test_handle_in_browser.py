@@ -9,7 +9,6 @@ import pytest
 
 import softreach as sr
 from softreach.rod import tip_map
-from softreach.studio import StudioState
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 
 
@@ -190,25 +189,6 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
 
 
 @pytest.mark.large
-def test_the_arm_comes_back_from_the_boundary_on_its_branch(inverse_tab):
-    tab = inverse_tab
-    begin = pose(tab, START)
-    there = np.array(screen(tab, begin))
-    mouse = tab.page.mouse
-    mouse.move(*there)
-    tab.page.wait_for_timeout(100)
-    mouse.down()
-    for up in (40, 100, 200, 300, 200, 100, 40, 0):
-        mouse.move(there[0], there[1] - up, steps=3)
-        tab.page.wait_for_timeout(60)
-        tab.settle()
-    mouse.up()
-    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
-    tab.settle()
-    np.testing.assert_allclose(tab.session.state.activation, START, atol=0.02)
-
-
-@pytest.mark.large
 def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_tab):
     tab = inverse_tab
     tab.session.look_from("oblique")
@@ -261,19 +241,3 @@ def test_a_click_on_the_cloud_sets_a_target_only_where_the_tab_says_so(inverse_t
     tab.wait(lambda: not tab.drawn("/grip").visible, "the ball is out of the way")
     tab.click_at(point)
     tab.wait(lambda: tab.session.state.target is not None, "the click is taken")
-
-
-@pytest.mark.large
-def test_the_handle_can_be_taken_away(inverse_tab):
-    tab = inverse_tab
-    tab.choose("mouse", "turns the view alone")
-    tab.wait(lambda: not tab.drawn("/grip").visible, "the ball is gone")
-    assert not tab.session.state.appearance.handle
-    tab.choose("mouse", "drags the tip")
-    tab.wait(lambda: tab.drawn("/grip").visible, "the ball is back")
-
-
-@pytest.mark.large
-def test_a_state_without_a_handle_is_saved_as_such():
-    state = StudioState(design=sr.designs.minimal_trunk()).showing(mouse="none")
-    assert StudioState.from_json(state.to_json()) == state

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.cli.app import run
 
 ACTIVATION = (-1.0, -0.2, -0.5)
 
@@ -101,23 +100,6 @@ def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
     tab.wait(lambda: tab.session.state.path is None, "the path is gone")
     tab.settle()
     assert not tab.drawn("/path")
-
-
-@pytest.mark.large
-def test_the_saved_table_is_that_of_the_command_line(tab, tmp_path):
-    found = circled(tab, tmp_path)
-    table = tab.save("Save the path (CSV)", tmp_path)
-    state, points = tab.session.state, tmp_path / "points.csv"
-    np.savetxt(points, found.position, "%.17g", ",")
-    state.design.save(tmp_path / "arm.toml")
-    start = ",".join(map(str, ACTIVATION))
-    out = tmp_path / "cli.csv"
-    arguments = ["track", f"{tmp_path}/arm.toml", str(points), "--out", str(out)]
-    assert run([*arguments, "--start", start]) == 0
-    saved, ours = (path.read_text().splitlines() for path in (table, out))
-    assert saved[0] == ours[0]
-    values = [np.loadtxt(lines[1:], delimiter=",") for lines in (saved, ours)]
-    np.testing.assert_allclose(values[0][:, :3], values[1][:, :3], atol=1e-4)
 
 
 def lowest(tab, points, count=2):

@@ -59,17 +59,6 @@ def test_a_line_stands_at_the_value_of_the_slider_and_follows_it(tab):
     assert {*known.value} < {*after.value}  # nothing was computed twice
 
 
-@pytest.mark.large
-def test_a_sweep_in_progress_is_dropped_for_that_of_another_design(tab):
-    settings = PlotSettings(shown=("sweep",), parameter="revolution")
-    tab.session.update(lambda s: s.showing(plots=settings))
-    tab.wait(lambda: "sweep" in tab.session.figures.plots, "the sweep begins")
-    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.02})))
-    tab.settle()
-    assert tab.session.figures.plots["sweep"].arm == tab.session.state.design
-    assert tab.session.figures.plots["sweep"].complete
-
-
 def test_names_in_a_chart_are_text(tab):
     from softreach.studio.plots.plot import Chart, Curve
 

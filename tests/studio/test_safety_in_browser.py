@@ -39,15 +39,8 @@ RING = design_with(
 STATES = {
     "level": state_with(look__level=STRIKE),
     "color": state_with(look__color=STRIKE),
-    "mouse": state_with(look__mouse=STRIKE),
-    "switch": state_with(look__cloud=STRIKE),
-    "axis": state_with(slice__axis=STRIKE),
-    "unknown": state_with(**{"look__" + STRIKE: 1}),
-    "version": state_with(softreach_studio=STRIKE),
-    "target": state_with(target=[STRIKE] * 3),
     "design": state_with(design=STRIKE),
     "reference": state_with(design=RING, reference=NAMED, side_by_side=True),
-    "no state": STRIKE,
 }
 NAMELESS = f"{STRIKE.replace('/', '')}.toml"
 FILES = {f"{name}.json": text for name, text in STATES.items()} | {

@@ -55,24 +55,3 @@ def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_des
     finally:
         sys.setprofile(None)
     assert len(calls) < 10  # all sliders took a hundred
-
-
-def test_a_panel_is_told_of_what_it_follows_and_of_nothing_else(session):
-    told: dict[str, int] = {}
-
-    class Listener:
-        def __init__(self, *follows: str) -> None:
-            self.follows = follows
-
-        def show(self, session: Session) -> None:
-            del session
-            told[self.follows] = told.get(self.follows, 0) + 1
-
-    session.panels = [Listener("state.activation"), Listener("state.design", "note"), Listener()]
-    session.show()
-    session.update(lambda state: state.replace(activation=(-0.1, 0.0, 0.0)))
-    session.say("something new")
-    assert session.settle()
-    assert told["state.activation",] == 2
-    assert told["state.design", "note"] == 2
-    assert told[()] >= 3

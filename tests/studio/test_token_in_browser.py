@@ -23,12 +23,3 @@ def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, guard
     assert tab.session.reach is not None
     assert tab.errors == []
     tab.close()
-
-
-def test_the_address_without_it_opens_nothing(browser, guarded):
-    page = browser.new_page()
-    response = page.goto(guarded.url.split("?")[0])
-    assert response.status == 403
-    page.get_by_text("lacks the token").wait_for()
-    assert not guarded.sessions
-    page.close()

@@ -1,6 +1,6 @@
 """The one place where text becomes markup: nothing that is said to the reader is rendered.
 
-Names, file names and messages may come from a link or a file of someone else. Whoever shows text
+Names, file names and messages may come from a file of someone else. Whoever shows text
 makes it here; nobody else escapes, and nobody else writes tags around what is not a constant.
 """
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from softreach.plot.coloring import BundleKey, ScalarKey
 
-_MOST = 17  # level: a page of some 2 MB
 # The scene has what the caption under it leaves.
 _LAYOUT = (
     "<style>body{display:flex;flex-direction:column;height:100dvh;margin:0}"
@@ -72,7 +71,7 @@ def _look(server: ViserServer, scene: Scene, state: StudioState) -> None:
 
 
 def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
-    look = state.showing(level=min(_MOST, state.appearance.level)).appearance
+    look = state.appearance
     scene.draw_axes(reach)
     if look.arm:
         scene.draw_arm(state.design, state.activation)

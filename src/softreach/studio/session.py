@@ -6,7 +6,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from operator import attrgetter, is_not
+from operator import attrgetter
 from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -46,11 +46,7 @@ _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
 
 class Panel(Protocol):
-    """Widgets of one concept; they call `Session.update` and are notified of changes.
-
-    Those that name in `follows` attributes of the session, such as ("state.design", "reach"), are
-    notified only when one of these is another object than before.
-    """
+    """Widgets of one concept; they call `Session.update` and are notified of changes."""
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the session; called from any thread, one at a time."""
@@ -156,8 +152,6 @@ class Session:
         """True once there is anything to keep."""
         self.state: StudioState = start.state
         self.panels: list[Panel] = []
-        self._shown: dict[Panel, list[object]] = {}
-        """Values that each panel follows, as it was notified of them last."""
         self.note = ""
         """Text for the reader."""
         self.revision = 0
@@ -351,14 +345,7 @@ class Session:
         """Notify all panels."""
         with self._showing:
             for panel in self.panels:
-                if self._has_news(panel):
-                    panel.show(self)
-
-    def _has_news(self, panel: Panel) -> bool:
-        names = getattr(panel, "follows", ())
-        now, before = [attrgetter(name)(self) for name in names], self._shown.get(panel)
-        self._shown[panel] = now
-        return not names or before is None or any(map(is_not, now, before))
+                panel.show(self)
 
     @property
     def busy(self) -> bool:
@@ -432,7 +419,6 @@ class Session:
         self.reach = self.free = self.reference = self.answer = None
         self.panels, self.figures, self.bench = [], Figures(), None
         self.check = self.slopes = None
-        self._shown.clear()
         return_memory_soon()
 
     def _rested(self) -> None:
@@ -447,7 +433,7 @@ class Session:
         if isinstance(error, SoftreachError | OSError):
             self.say(_shortened(str(error)))
         elif isinstance(error, MemoryError):
-            self.say("There is not enough memory for that: show fewer points, or close other tabs.")
+            self.say("There is not enough memory for that: close other tabs.")
         else:
             self.say(_shortened(f"{type(error).__name__}: {error}"))
             threading.excepthook(

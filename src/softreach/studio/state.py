@@ -153,7 +153,10 @@ class Appearance:
             raise InvalidInput("cut", self.cut, f"one of {', '.join(CUTS)}")
         if self.mouse not in MOUSE:
             raise InvalidInput("mouse", self.mouse, f"one of {', '.join(MOUSE)}")
-        _check_plain("appearance", self)
+        for each in fields(self):  # in a state that came from elsewhere too
+            content, kind = getattr(self, each.name), {"bool": bool, "str": str}.get(str(each.type))
+            if kind is not None and not isinstance(content, kind):
+                raise InvalidInput(f"appearance.{each.name}", content, f"a {kind.__name__}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,15 +293,6 @@ def vector(values: Iterable[float]) -> Vector:
 def _check_number(name: str, value: object, low: float, high: float) -> None:
     if not Range(low, high).admits(value):
         raise InvalidInput(name, value, f"{low:g} to {high:g}")
-
-
-def _check_plain(name: str, value: Appearance) -> None:
-    """Texts are texts and switches are switches, in a state that came from elsewhere too."""
-    for attribute in fields(value):
-        content = getattr(value, attribute.name)
-        kind = {"bool": bool, "str": str}.get(str(attribute.type))
-        if kind is not None and not isinstance(content, kind):
-            raise InvalidInput(f"{name}.{attribute.name}", content, f"a {kind.__name__}")
 
 
 def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...]:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.fields import Fields
 from softreach.studio.reach import Reach
-from softreach.studio.widgets import PictureFrame
 from softreach.studio.work import StaleCheck
 
 if TYPE_CHECKING:
@@ -177,9 +176,7 @@ def _series(curve: Curve) -> Any:
     return {"label": curve.name, "stroke": curve.color, "width": 2, "points": points}
 
 
-_WIDTH = 4.3  # [inch], about as wide as a panel
 _PAPER, _INK = "#242424", "#c9c9c9"  # of a dark page
-_DPI = 200  # sharp where a page has two pixels per point
 
 
 class Picture(NamedTuple):
@@ -190,25 +187,6 @@ class Picture(NamedTuple):
     """RGB, shape (rows, columns, 3)."""
     text: str = ""
     """Its content in words."""
-
-
-class PicturePlot(Plot):
-    """Plot whose results are pictures."""
-
-    def __init__(self, gui: GuiApi, folder: Any) -> None:
-        self._frame = PictureFrame(gui, folder)
-
-    def show(self, result: Picture) -> str:
-        """Show the picture."""
-        self._frame.show(result.image)
-        return result.text
-
-
-def blank_figure(height: float, width: float = _WIDTH, dpi: int = _DPI) -> Figure:
-    """An empty figure of that size [inch], away from pyplot, which belongs to one thread."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), dpi=dpi, layout="constrained")
 
 
 def pixels(figure: Figure, *, dark: bool = False) -> NDArray[np.uint8]:

@@ -7,7 +7,7 @@ its folds.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,13 @@ from softreach.plot.slice import plot_slice
 from softreach.studio.multiplicity import counts_at
 from softreach.studio.plots.plot import (
     Picture,
-    PicturePlot,
-    blank_figure,
+    Plot,
     complete_reach,
     pixels,
 )
 from softreach.studio.reach import Reach
 from softreach.studio.state import Slice, solvable_rod
+from softreach.studio.widgets import PictureFrame
 from softreach.studio.work import StaleCheck, all_cores
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
@@ -32,6 +32,7 @@ from softreach.workspace import ReachableSolid, ReachableSurface
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from viser import GuiApi
 
     from softreach.arm.manipulator import Manipulator
     from softreach.studio.session import Session
@@ -41,6 +42,8 @@ Array = NDArray[np.float64]
 
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
 _BOUNDARY = "#16324f"
+_SIZE = 4.3, 4.6  # [inch], about as wide as a panel
+_DPI = 200  # sharp where a page has two pixels per point
 _CELLS, _CELLS_LOADED = 120, 40  # along the longer side: under loads each place costs much
 
 
@@ -121,7 +124,9 @@ def section_picture(
         curves = section_curves(reach, cut)
     closed = isinstance(reach.exact, ReachableSolid) and bool(curves)
     grid = plane_counts(reach, curves, axis, check) if closed else None
-    figure = blank_figure(4.6)
+    from matplotlib.figure import Figure  # away from pyplot, which belongs to one thread
+
+    figure = Figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
     ax = figure.subplots()
     view = _VIEWS[plane.axis]
     if grid is not None:
@@ -189,7 +194,7 @@ def _described(curves: list[Array], plane: Slice, where: str, arm: Manipulator) 
     return f"{where}: {parts}, {shown}" if closed else f"{where}: {len(curves)} curves"
 
 
-class SectionPlot(PicturePlot):
+class SectionPlot(Plot):
     """Picture of the section by the plane of the slice."""
 
     name = "section"
@@ -201,6 +206,9 @@ class SectionPlot(PicturePlot):
     depends_on = ("appearance.slice.axis", "appearance.slice.center", "appearance.dark")
     of_reach = True
 
+    def __init__(self, gui: GuiApi, folder: Any) -> None:
+        self._frame = PictureFrame(gui, folder)
+
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:
         """Cut and draw it, once the exact set is complete."""
@@ -208,3 +216,8 @@ class SectionPlot(PicturePlot):
         if reach is not None:
             with session.working("cutting the reachable set"):
                 yield section_picture(reach, look.slice, check, dark=look.dark)
+
+    def show(self, result: Picture) -> str:
+        """Show the picture."""
+        self._frame.show(result.image)
+        return result.text
