@@ -66,8 +66,7 @@ def test_where_there_is_nothing_to_redo_the_page_says_so_and_no_tab_jumps(tab):
     redo = tab.page.get_by_role("button", name="Redo", exact=True)
     tab.session.update(lambda s: s.replace(activation=(-0.1, 0.0, 0.0)))
     tab.wait(redo.is_disabled, "Redo is gray")
-    tab.page.locator("canvas").first.focus()
-    tab.page.keyboard.press("Control+Shift+z")
+    tab.session.step(back=False)
     tab.page.get_by_text("There is nothing to redo.").wait_for()
     assert tab.page.get_by_role("tablist").first.bounding_box() == bar
     tab.press("Undo")

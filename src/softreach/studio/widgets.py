@@ -111,6 +111,8 @@ class TextKind(NamedTuple):
     """From a text; None if it is no such value."""
     text: Callable[[Any], str]
     """From a value, as a person would type it."""
+    has_unit: Callable[[str], bool] = lambda _: False
+    """True for a text in whose place its value is shown once it is applied."""
 
 
 def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
@@ -121,20 +123,33 @@ def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
         length: L [m] of the arm, which is a unit of lengths.
     """
     demand = "a number" + _with_units(_units(unit, length()))
-    return TextKind(demand, lambda text: _number(text, _units(unit, length())), number_text)
+    return TextKind(
+        demand,
+        lambda text: _number(text, _units(unit, length())),
+        number_text,
+        lambda text: number_of(text) is None,
+    )
 
 
 def vector_kind(unit: str, length: Callable[[], float]) -> TextKind:
     """Three of them, as `number_kind`."""
 
     def value(text: str) -> tuple[float, ...] | None:
-        mark = next((mark for mark in ";," if mark in text), None)
-        parts = [_number(part, _units(unit, length())) for part in text.split(mark)]
+        parts = [_number(part, _units(unit, length())) for part in _parts(text)]
         finite = tuple(part for part in parts if part is not None)
         return finite if len(parts) == len(finite) == 3 else None
 
     demand = "three numbers, such as 0, 0, -9.81" + _with_units(_units(unit, length()))
-    return TextKind(demand, value, lambda vector: ", ".join(map(number_text, vector)))
+    return TextKind(
+        demand,
+        value,
+        lambda vector: ", ".join(map(number_text, vector)),
+        lambda text: None in map(number_of, _parts(text)),
+    )
+
+
+def _parts(text: str) -> list[str]:
+    return text.split(next((mark for mark in ";," if mark in text), None))
 
 
 def _number(text: str, units: Mapping[str, float]) -> float | None:
@@ -223,7 +238,7 @@ class TypedField:
             self._value = value
             self.warn("")
         self._apply(event)
-        if not self._is_refused and number_of(text) is None:  # typed with a unit
+        if not self._is_refused and self._kind.has_unit(text):
             self._text.value = self._kind.text(self._value)
 
     def _apply(self, event: Any) -> None:
