@@ -190,7 +190,6 @@ def test_what_cannot_be_fitted_is_said_in_one_line_and_nothing_changes(session):
         (SimpleNamespace(name="a.csv", content=b"\x00\xff\xfe,\n1,2"), "must be"),
         (SimpleNamespace(name="a.csv", content=b"a,b,c\n1,2,3"), "places of markers"),
         (SimpleNamespace(name="a.parquet", content=b"a,b,c\n1,2,3"), "a.parquet"),
-        (SimpleNamespace(name="a.csv", content=bytes(20_000_001)), "at most 20 MB"),
         (file(markers=("one",)), "markers of the data"),
     ],
 )

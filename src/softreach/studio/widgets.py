@@ -111,8 +111,8 @@ class TextKind(NamedTuple):
     """From a text; None if it is no such value."""
     text: Callable[[Any], str]
     """From a value, as a person would type it."""
-    has_unit: Callable[[str], bool] = lambda _: False
-    """True for a text in whose place its value is shown once it is applied."""
+    has_units: bool = False
+    """True if a text may have a unit, in whose place its value is shown once it is applied."""
 
 
 def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
@@ -122,39 +122,28 @@ def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
         unit: Of what has none; "" for plain numbers.
         length: L [m] of the arm, which is a unit of lengths.
     """
-    demand = "a number" + _with_units(_units(unit, length()))
-    return TextKind(
-        demand,
-        lambda text: _number(text, _units(unit, length())),
-        number_text,
-        lambda text: number_of(text) is None,
-    )
+    demand = "a number" + _with_units(unit, length())
+    return TextKind(demand, lambda text: _number(text, unit, length()), number_text, True)
 
 
 def vector_kind(unit: str, length: Callable[[], float]) -> TextKind:
     """Three of them, as `number_kind`."""
 
     def value(text: str) -> tuple[float, ...] | None:
-        parts = [_number(part, _units(unit, length())) for part in _parts(text)]
-        finite = tuple(part for part in parts if part is not None)
-        return finite if len(parts) == len(finite) == 3 else None
+        parts = tuple(_number(part, unit, length()) for part in _parts(text))
+        return None if len(parts) != 3 or None in parts else parts  # pyright: ignore
 
-    demand = "three numbers, such as 0, 0, -9.81" + _with_units(_units(unit, length()))
-    return TextKind(
-        demand,
-        value,
-        lambda vector: ", ".join(map(number_text, vector)),
-        lambda text: None in map(number_of, _parts(text)),
-    )
+    demand = "three numbers, such as 0, 0, -9.81" + _with_units(unit, length())
+    return TextKind(demand, value, lambda vector: ", ".join(map(number_text, vector)), True)
 
 
 def _parts(text: str) -> list[str]:
     return text.split(next((mark for mark in ";," if mark in text), None))
 
 
-def _number(text: str, units: Mapping[str, float]) -> float | None:
+def _number(text: str, unit: str, length: float) -> float | None:
     """The number that a text is in the unit of a field; None for anything else."""
-    text = text.strip()
+    text, units = text.strip(), _units(unit, length)
     name = next((name for name in sorted(units, key=len)[::-1] if text.endswith(name)), "")
     number = number_of(text.removesuffix(name))
     # 2 deg are 2.0 deg, whatever their sizes in rad
@@ -163,16 +152,15 @@ def _number(text: str, units: Mapping[str, float]) -> float | None:
 
 def _units(unit: str, length: float) -> Mapping[str, float]:
     """Units that may be typed, with their sizes in that of a field."""
-    if not unit:
-        return {}
-    if unit == "L":
-        return {"L": 1.0} | {name: size / length for name, size in sizes_in("m").items()}
-    sizes = sizes_in(unit)
-    return sizes | {"L": length * sizes["m"]} if "m" in sizes else sizes
+    sizes = sizes_in(unit) if unit else {}
+    meter = 1 / length if unit == "L" else sizes.get("m")
+    if meter is None:
+        return sizes
+    return {"L": length * meter} | {name: size * meter for name, size in sizes_in("m").items()}
 
 
-def _with_units(units: Mapping[str, float]) -> str:
-    return f", without a unit or in {', '.join(units)}" if units else ""
+def _with_units(unit: str, length: float) -> str:
+    return f", without a unit or in {', '.join(_units(unit, length))}" if unit else ""
 
 
 class TypedField:
@@ -238,7 +226,7 @@ class TypedField:
             self._value = value
             self.warn("")
         self._apply(event)
-        if not self._is_refused and self._kind.has_unit(text):
+        if not self._is_refused and self._kind.has_units and None in map(number_of, _parts(text)):
             self._text.value = self._kind.text(self._value)
 
     def _apply(self, event: Any) -> None:

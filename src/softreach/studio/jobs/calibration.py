@@ -17,7 +17,7 @@ from softreach.studio.jobs.reach import FollowCamera
 from softreach.studio.session import AskedJob, Job
 from softreach.studio.state import StudioState
 from softreach.studio.work import StaleCheck
-from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.errors import no_warnings
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ class FitArm(AskedJob):
         """Fit, and show the calibrated arm."""
         session, bench = self.session, self.session.bench
         if bench is None:
-            raise InvalidInput("measured poses", "none", "loaded before a fit")
+            return
         steps = count(1)
 
         def progress(_: int) -> None:

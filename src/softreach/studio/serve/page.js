@@ -44,8 +44,7 @@ document.documentElement.addEventListener("keydown", function (event) {
   if ((own || scrolls) && !event.ctrlKey && !event.metaKey) event.stopPropagation();
 });
 
-// Keys of the page, in one table: how a key is written, what it does, and what is done here, if
-// anything.
+// Keys of the page, in one table: how a key is written, what it does, and what is done here.
 (function () {
   var keys = [
     ["1 \u2026 8", "choose a tab", /^[1-8]$/, chooseTab],

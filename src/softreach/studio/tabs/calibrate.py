@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-_FILE_SIZE = 20_000_000  # bytes of a table that is loaded
 _ABOUT = {
     "load": "A table with a column for each input and three for each marker, each with its unit: "
     "tension1_N, tip_x_mm",
@@ -80,9 +79,6 @@ class CalibratePanel:
 
     def _read(self, file: UploadedFile) -> None:
         """Take the poses of a file, and move the arm to the first."""
-        if len(file.content) > _FILE_SIZE:
-            size, most = len(file.content) / 1e6, _FILE_SIZE / 1e6
-            raise InvalidInput(file.name, f"{size:.3g} MB", f"at most {most:g} MB")
         arm = self._session.state.design
         data = read_measurements(arm, read_table(io.BytesIO(file.content), file.name))
         self._session.bench = Bench(data=replace(data, source=file.name), arm=arm)
