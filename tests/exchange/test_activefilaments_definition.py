@@ -22,6 +22,7 @@ from softreach.arm import (
     Tendon,
     designs,
 )
+from softreach.arm.parameters import changed
 from softreach.exchange.activefilaments import design_script, read_design
 from softreach.exchange.activefilaments.filament import arm_of, filament_of
 from tests.exchange.julia import json_of
@@ -142,7 +143,7 @@ def test_columns_there_and_back_are_the_same_activations():
 
 def test_a_helical_angle_in_pieces_survives(tmp_path):
     angle = Pieces(stations_over_length=(0, 0.3, 1), values=(0.4, -0.2))
-    arm = tube_of(sr.FiberArchitecture(helical_angle=angle, extent=0.5))
+    arm = changed(tube_of(sr.FiberArchitecture(helical_angle=angle, extent=0.5)), {"length": 0.8})
     again = there_and_back(arm, tmp_path)
     same_tips(arm, again)
     assert again.fibers[0].helical_angle == angle
@@ -237,6 +238,14 @@ def test_a_fault_is_told_with_its_place(place, value, told, tmp_path):
     with pytest.raises(sr.InvalidInput, match=told) as error:
         read(tmp_path, json.dumps(definition))
     assert "\n" not in str(error.value)
+
+
+def test_rings_stand_from_inside_out(tmp_path):
+    definition = json.loads(json_of(design_script(layered())))
+    for name in ("rings", "activation", "γBounds"):
+        definition[name].reverse()
+    with pytest.raises(sr.InvalidInput, match="the innermost first and the outermost last"):
+        read(tmp_path, json.dumps(definition))
 
 
 @given(text=st.text(st.sampled_from('[]{}:,"1e. \nLγ')) | st.just("[" * 100_000))
