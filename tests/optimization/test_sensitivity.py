@@ -111,7 +111,7 @@ def test_indices_of_a_sum_are_shares_of_its_variances():
         problem(ends), goals=(of_design("sum", total), of_design("1", lambda _: Value(1.0)))
     )
     best = Candidate(values={"length": 1.0, "taper": 0.005})
-    shares, constant = sensitivity(asked, best, n=512).variance
+    shares, constant = sensitivity(asked, best, n=128).variance
     expected = np.array([0.8, 0.2])
     for got, error in ((shares.first, shares.first_error), (shares.total, shares.total_error)):
         assert (np.abs(got - expected) < np.maximum(3.0 * error, 0.02)).all()
@@ -121,7 +121,7 @@ def test_indices_of_a_sum_are_shares_of_its_variances():
 
 def test_all_variance_is_that_of_the_only_parameter():
     best = Candidate(values={"taper": 0.01})
-    (shares,) = sensitivity(problem({"taper": (0.0, 0.02)}, maximize="mass"), best, n=256).variance
+    (shares,) = sensitivity(problem({"taper": (0.0, 0.02)}, maximize="mass"), best, n=64).variance
     assert shares.total == pytest.approx(1.0, abs=0.05)
 
 

@@ -34,7 +34,7 @@ def import_file(
 ) -> None:
     """Convert a filament or a cloud of ActiveFilaments.jl.
 
-    A few lines of Julia in the docs write a filament as JSON. A cloud is NAME.csv with
+    The docs show how Julia writes a filament as JSON. A cloud is NAME.csv with
     NAME_gamma.csv beside it; its tips are compared with softreach's own.
 
     Example: softreach import filament.json filament.toml
