@@ -282,9 +282,9 @@ def test_a_stored_cloud_cannot_be_loaded_afterwards(command, folder, capsys):
     assert "payload = 2g: must be left out for a stored cloud" in capsys.readouterr().err
 
 
-def test_a_filament_of_julia_is_pointed_to_the_import(capsys):
-    assert run(["design", "arm.jl"]) == 2
-    assert "softreach import arm.jl arm.toml" in capsys.readouterr().err
+def test_a_filament_in_json_is_pointed_to_the_import(capsys):
+    assert run(["design", "arm.json"]) == 2
+    assert "softreach import arm.json arm.toml" in capsys.readouterr().err
 
 
 def test_every_change_has_an_option(capsys):

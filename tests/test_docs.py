@@ -14,7 +14,7 @@ A fence in `README.md` or `docs/` is one of these, or the test fails:
 - `toml`: read as a design; with `[[reach]]` or `[search]`, as requirements.
 - `text` right after one of these: what it printed. Numbers may differ by 0.1 %; `...` stands for
   anything up to the end of the line.
-- `bibtex`: data.
+- `bibtex`, `julia`: for other programs.
 
 Where no `text` follows, Python and commands are executed with few samples.
 """
@@ -116,7 +116,7 @@ def test_every_notebook_runs_and_is_stored_without_outputs(notebook, tmp_path, m
 
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
 def test_every_fence_is_declared(page):
-    languages = {"python", "bash", "toml", "text", "bibtex"}
+    languages = {"python", "bash", "toml", "text", "bibtex", "julia"}
     found = [match[2].strip() for match in FENCE.finditer(page.read_text(encoding="utf-8"))]
     assert set(found) <= languages
 

@@ -242,11 +242,11 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
 
 
 def _pose_disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
-    """A pose of the base that is not that of the design; clouds made before poses have none."""
+    """A pose of the base that is not that of the design."""
     for name, wanted in _pose(arm).items():
-        values = as_numbers(cloud.attrs.get(name, wanted))
+        values = as_numbers(cloud.attrs.get(name, ()))
         if values.shape != (len(wanted),) or not np.allclose(values, wanted):
-            shown = as_given(cloud.attrs[name])
+            shown = as_given(cloud.attrs.get(name))
             yield InvalidInput(f"cloud.attrs['{name}']", shown, f"{wanted}, as its design says")
 
 
@@ -323,12 +323,12 @@ def _pose(arm: Manipulator) -> dict[str, list[float]]:
 
 
 def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
-    """The frame in which a dataset tells places; the world's, of one made before there were two.
+    """The frame in which a dataset tells places.
 
     Raises:
-        InvalidInput: There is no such frame.
+        InvalidInput: It says none, or there is no such frame.
     """
-    frame = data.attrs.get("frame", "world")
+    frame = data.attrs.get("frame")
     if frame not in ("world", "base"):
         raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
     return frame

@@ -255,21 +255,10 @@ CALLS: dict[str, Call] = {
     "calibration.read_measurements": Call(
         lambda: dict(arm=BENCH, data=poses()), kinds=dict(data="dataset", **OF_COLUMNS), said="data"
     ),
-    "calibration.ladder": Call(
-        lambda: dict(arm=BENCH, data=poses(), free=[["pose.x"]]),
-        kinds=dict(data="dataset", free="words", hold_out=OF_POSES["hold_out"]),
-        fine=dict(seed={"a number of 400 digits", "a number of 5000 digits"}),
-        said="parameter",
-    ),
     "calibration.leave_one_run_out": Call(
         lambda: dict(arm=BENCH, data=runs(), free=["pose.x"]),
         kinds=dict(data="dataset", free="words"),
         said="parameter",
-    ),
-    "calibration.profile": Call(
-        lambda: dict(result=calibration(), name="pose.x", values=[0.0]),
-        kinds=dict(result="dataset"),
-        fine=dict(values={"a list", "a number"}),
     ),
     "calibration.plan_poses": Call(
         lambda: dict(arm=BENCH, free=["pose.x"], n=2, candidates=8),
@@ -361,13 +350,11 @@ CALLS: dict[str, Call] = {
         kinds=dict(
             free="mapping",
             choices="mapping",
-            tolerances="mapping",
             requirements="dataset",
             maximize="words",
             minimize="words",
             designs="whole number",
             polish="flag",
-            robust="flag",
             storage="path",
             follow="function",
         ),

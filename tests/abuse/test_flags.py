@@ -215,8 +215,10 @@ IGNORED = [
     case(
         f"export {TRUNK} a.jl --activation=0,0,0", "activation = 0,0,0: must be left out for a fi"
     ),
-    case("import a.jl a.toml --design b.toml", "design = b.toml: must be left out for a filament"),
-    case("import a.jl a.toml --tol 1e-6", "tol = 1e-06: must be left out for a filament"),
+    case(
+        "import a.json a.toml --design b.toml", "design = b.toml: must be left out for a filament"
+    ),
+    case("import a.json a.toml --tol 1e-6", "tol = 1e-06: must be left out for a filament"),
     case(
         "atlas build a.zarr --space a.toml --design lce_arm", "design = lce_arm: must be left out"
     ),

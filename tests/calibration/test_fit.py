@@ -7,8 +7,8 @@ import pytest
 
 import softreach as sr
 from softreach.calibration.errors import judged, misses, repeatability
-from softreach.calibration.ladder import ladder, leave_one_run_out, profile
 from softreach.calibration.measurements import read_measurements
+from softreach.calibration.runs_left_out import leave_one_run_out
 from softreach.rod.kinematics import marker_positions
 from tests.calibration.arms import hanging_tentacle, pulled_wire, random_inputs, table
 
@@ -128,26 +128,6 @@ def test_bands_are_those_of_the_arms_that_are_as_likely():
     best, spread = result.band(lambda other: marker_positions(other, inputs), count=200)
     np.testing.assert_allclose(best, places, atol=1e-6)
     np.testing.assert_allclose(spread, sigma, rtol=0.3, atol=1e-6)
-
-
-def test_a_ladder_ends_where_more_numbers_tell_nothing():
-    arm = hanging_tentacle()
-    truth = arm.replace(actuators=(arm.actuators[0].replace(distance=0.0095),))
-    steps = [["pose.x"], ["pose.x", "t.distance"], ["pose", "t.distance", "taper"]]
-    rungs = ladder(arm, measured(truth, 24, noise=1e-3), steps)
-    assert rungs.best is rungs.rungs[1]
-    assert "enough" in repr(rungs)
-
-
-def test_a_profile_is_least_at_the_fitted_value():
-    arm = hanging_tentacle()
-    result = sr.calibrate(
-        arm, measured(arm, 10, noise=1e-3), free=FREE[:2], rivals=False, robust=False
-    )
-    value, width = result.values[MODULUS], 3 * result.sigma[MODULUS]
-    errors = profile(result, MODULUS, [value - width, value, value + width])
-    assert errors[1] == pytest.approx(result.train.rms, rel=1e-4)
-    assert errors[0] > errors[1] < errors[2]
 
 
 def test_a_run_left_out_is_predicted_by_the_others():

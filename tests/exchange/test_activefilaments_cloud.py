@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from softreach.exchange.activefilaments import (
     write_design,
 )
 from softreach.support.errors import SoftreachWarning
+from tests.exchange.julia import json_of
 
 ROWS = 200
 
@@ -143,14 +146,16 @@ def test_a_cloud_of_an_arm_that_is_no_filament_is_refused(tmp_path):
 def folder(tmp_path, monkeypatch, filament):
     """An empty folder with a definition and a cloud of the filament."""
     monkeypatch.chdir(tmp_path)
+    filament.save("filament.toml")
     write_design(filament, "filament.jl")
+    Path("filament.json").write_text(json_of(Path("filament.jl").read_text()))
     sr.save_cloud(sr.compute_cloud(filament, n=ROWS), "cloud.zarr")
     return tmp_path
 
 
 def test_the_command_line_goes_there_and_back(folder, filament, capsys):
-    assert run(["import", "filament.jl", "filament.toml"]) == 0
-    assert run(["export", "filament.toml", "again.jl"]) == 0
+    assert run(["import", "filament.json", "again.toml"]) == 0
+    assert run(["export", "again.toml", "again.jl"]) == 0
     assert (folder / "again.jl").read_text() == (folder / "filament.jl").read_text().replace(
         "# sector", "# ring 1"
     )
@@ -165,12 +170,12 @@ def test_the_command_line_goes_there_and_back(folder, filament, capsys):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["import", "nothing.jl", "a.toml"], "a file that exists"),
-        (["import", "cloud.zarr", "a.toml"], ".jl or .csv"),
-        (["import", "filament.jl", "a.zarr"], "ending in .toml"),
-        (["import", "filament.jl.csv", "a.zarr"], "--design"),
-        (["import", "binary.jl", "a.toml"], "text in UTF-8"),
-        (["import", "binary.csv", "a.zarr", "--design", "filament.jl"], "no text"),
+        (["import", "nothing.json", "a.toml"], "a file that exists"),
+        (["import", "cloud.zarr", "a.toml"], ".json or .csv"),
+        (["import", "filament.json", "a.zarr"], "ending in .toml"),
+        (["import", "filament.json.csv", "a.zarr"], "--design"),
+        (["import", "binary.json", "a.toml"], "text in UTF-8"),
+        (["import", "binary.csv", "a.zarr", "--design", "filament.json"], "no text"),
         (["export", "cloud.zarr", "a.csv", "--format", "julia"], "activefilaments"),
         (["export", "cloud.zarr", "a.txt", "--format", "activefilaments"], "ending in .csv"),
         (["export", "filament", "a.csv", "--format", "activefilaments"], "ending in .jl"),
@@ -178,7 +183,7 @@ def test_the_command_line_goes_there_and_back(folder, filament, capsys):
     ],
 )
 def test_wrong_input_costs_one_line(arguments, told, folder, capsys):
-    for name in ("binary.jl", "binary.csv"):
+    for name in ("binary.json", "binary.csv"):
         (folder / name).write_bytes(bytes(range(256)) * 100)
     assert run(arguments) == 2
     message = capsys.readouterr().err

@@ -35,9 +35,6 @@ left.revolution = "-1rad:1rad"
 
 [search.choices]
 left.offset_deg = [50, 60]
-
-[search.tolerances]
-taper_deg = 0.1
 """
 
 
@@ -141,7 +138,6 @@ def test_a_file_says_the_same_as_the_call(folder):
     assert asked.free["left.revolution"] == (-1.0, 1.0)
     assert asked.free["right.revolution"] == "-left.revolution + 5deg"
     assert asked.choices["left.offset"] == pytest.approx(np.radians([50, 60]))
-    assert asked.tolerances == {"taper": pytest.approx(np.radians(0.1))}
     numbers = {"designs": 12, "accuracy": 0.1, "seed": 3, "polish": False}
     assert asked.options == {"maximize": ["mass"], "minimize": [], **numbers}
 
@@ -162,7 +158,6 @@ FAULTS = {
     "left.revolution =": ("left.revolutoin =", "search.free.left.revolutoin: is no parameter"),
     '"-left.revolution + 5deg"': ('"left"', "search.free.right.revolution = 'left': must be"),
     "= [50, 60]": ("= [50, 50]", "search.choices.left.offset_deg = [50, 50]: must be a list of d"),
-    "taper_deg = 0.1": ("taper_deg = -1", "search.tolerances.taper_deg = -1: must be > 0"),
     '"8kg"': ("8", "limits.mass = 8: must have its unit"),
 }
 
@@ -218,7 +213,6 @@ def test_the_exit_code_says_whether_the_best_meets_all(folder, capsys):
         (["--sampler", "luck"], "sampler = 'luck': must be one of auto"),
         (["--storage", "missing/a.journal"], "storage = missing/a.journal: must be a file in a f"),
         (["--out", "arm.toml"], "arm.toml"),
-        (["--robust", "--tolerance", "taper_deg=0"], "tolerances taper_deg = '0': must be > 0"),
     ],
 )
 def test_wrong_options_are_refused_in_one_line(options, said, folder, capsys):

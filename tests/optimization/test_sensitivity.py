@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,10 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.arm.summary import mass
 from softreach.optimization import sensitivity
 from softreach.optimization.free_parameters import free_parameters
-from softreach.optimization.objectives import DesignCase, Objective, Value, goals
+from softreach.optimization.objectives import DesignCase, Goal, Objective, Value, goals
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.robust import moments, robust_goals, spreads_of
-from softreach.optimization.sensitivity import variance_shares
 from softreach.requirements import Limits, Requirements, Target
 from softreach.rod.kinematics import tip_positions
-from softreach.sampling import sample_cube
 from softreach.support.errors import InvalidInput
 from softreach.workspace import reachable_set, volume_gradient
 
@@ -92,66 +90,52 @@ def test_effort_is_differentiated_with_poses_that_follow():
     assert result.gradient[0, 0] == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-3)
 
 
+def of_design(name, compute):
+    """A goal that is a function of the arm."""
+    return Goal(
+        Objective(name=name, unit="1", meaning="", compute=lambda case: compute(case.arm)), 1.0
+    )
+
+
 def test_indices_of_a_sum_are_shares_of_its_variances():
-    cube = sample_cube("sobol", 1024, 4, 1)
-    a, b = cube[:, :2], cube[:, 2:]
-    mixed = [np.stack([b[:, 0], a[:, 1]], 1), np.stack([a[:, 0], b[:, 1]], 1)]
-    values = np.array([x @ [2.0, 1.0] for x in (a, b, *mixed)])
-    shares = variance_shares(values)
+    ends = {"length": (0.9, 1.1), "taper": (0.0, 0.01)}
+    known = {name: find_parameter(ARM, name) for name in ends}
+
+    def total(arm):
+        first, second = (
+            (known[name].value(arm) - low) / (high - low) for name, (low, high) in ends.items()
+        )
+        return Value(2.0 * first + second)
+
+    asked = replace(
+        problem(ends), goals=(of_design("sum", total), of_design("1", lambda _: Value(1.0)))
+    )
+    best = Candidate(values={"length": 1.0, "taper": 0.005})
+    shares, constant = sensitivity(asked, best, n=128).variance
     expected = np.array([0.8, 0.2])
     for got, error in ((shares.first, shares.first_error), (shares.total, shares.total_error)):
         assert (np.abs(got - expected) < np.maximum(3.0 * error, 0.02)).all()
         assert (error < 0.2).all()
+    assert not constant.total.any()
 
 
-def test_designs_that_cannot_exist_are_replaced_and_counted():
+def test_all_variance_is_that_of_the_only_parameter():
+    best = Candidate(values={"taper": 0.01})
+    (shares,) = sensitivity(problem({"taper": (0.0, 0.02)}, maximize="mass"), best, n=64).variance
+    assert shares.total == pytest.approx(1.0, abs=0.05)
+
+
+def test_no_shares_are_said_of_ranges_in_which_a_design_cannot_exist():
     asked = problem({"rings[0].inner_ratio": (0.5, 0.9), "taper": (0.0, 0.12)}, maximize="mass")
     best = Candidate(values={"rings[0].inner_ratio": 0.7, "taper": 0.01})
-    (shares,) = sensitivity(asked, best, n=16).variance
-    assert shares is not None
-    assert shares.rows == 16
-    assert shares.replaced > 0
+    assert sensitivity(asked, best, n=16).variance == (None,)
+    existing = replace(
+        asked,
+        parameters=free_parameters(ARM, {"rings[0].inner_ratio": (0.5, 0.9), "taper": (0.0, 0.02)}),
+    )
+    (shares,) = sensitivity(existing, best, n=16).variance
     assert shares.total[1] > 0.5
     assert shares.total[0] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_robust_goal_is_worse_by_what_its_slope_tells():
-    sigmas = {"taper": 1e-5, "left.revolution": 2e-4}
-    (goal,) = goals("exact_volume", (), Requirements())
-    (robust,) = robust_goals([goal], sigmas)
-    case = DesignCase(ARM, Requirements(), 1e-2)
-    slopes = volume_gradient(ARM, [*sigmas], accuracy=1e-2).volume * [*sigmas.values()]
-    loss = goal.value(case).value - robust.value(case).value
-    assert loss == pytest.approx(1.6448536 * np.linalg.norm(slopes), rel=1e-3)
-    assert robust.objective.sigmas == sigmas
-
-
-@pytest.mark.parametrize("way", ["maximize", "minimize"])
-def test_a_robust_goal_is_the_quantile_of_arms_that_are_made(way):
-    asked = {"maximize": (), "minimize": (), way: "mass"}
-    plain = goals(asked["maximize"], asked["minimize"], Requirements())
-    sigmas = {"outer_radius": 0.05 * find_parameter(ARM, "outer_radius").value(ARM)}
-    (spread,) = spreads_of(plain, ARM, Requirements(), 1e-2, sigmas, 3)
-    (robust,) = robust_goals(plain, sigmas)
-    case = DesignCase(ARM, Requirements(), 1e-2)
-    assert robust.value(case).value == pytest.approx(spread.quantile)
-    assert abs(spread.quantile - spread.made_quantile) < 4.0 * spread.quantile_error
-    assert (spread.quantile < spread.nominal) == (way == "maximize")
-    assert spread.agrees
-
-
-def test_a_robust_goal_sees_the_curvature_where_there_is_no_slope():
-    hill = Objective(
-        name="hill",
-        unit="1",
-        meaning="a hill",
-        compute=lambda case: Value(-((case.arm.length - ARM.length) ** 2)),
-        sigmas={"length": 0.1},
-    )
-    both = moments(hill, DesignCase(ARM, Requirements(), 1e-2))
-    # Of -x² with x of σ: mean -σ², standard deviation √2 σ².
-    assert both.shift == pytest.approx(-0.01)
-    assert both.deviation == pytest.approx(np.sqrt(2.0) * 0.01)
 
 
 def test_a_problem_needs_a_design_and_rows_a_power_of_two():

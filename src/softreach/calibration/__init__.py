@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from softreach.calibration.calibration import Calibration, Rival, calibrate
 from softreach.calibration.errors import Misses, Repeatability, Verdict
-from softreach.calibration.ladder import Ladder, ladder, leave_one_run_out, profile
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.plan import PosePlan, plan_poses
+from softreach.calibration.runs_left_out import leave_one_run_out
 from softreach.calibration.uncertainty import Uncertainty
 
 __all__ = [
     "Calibration",
-    "Ladder",
     "Measurements",
     "Misses",
     "PosePlan",
@@ -20,9 +19,7 @@ __all__ = [
     "Uncertainty",
     "Verdict",
     "calibrate",
-    "ladder",
     "leave_one_run_out",
     "plan_poses",
-    "profile",
     "read_measurements",
 ]

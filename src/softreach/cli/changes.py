@@ -225,11 +225,11 @@ def _unchanged(text: str) -> Manipulator:
     if text in designs.__all__:
         return getattr(designs, text)()
     path = Path(text)
-    is_named = path.exists() and not path.is_dir() and path.suffix != ".jl"
+    is_named = path.exists() and not path.is_dir() and path.suffix != ".json"
     if is_named or path.suffix == ".toml":
         return Manipulator.load(text)  # which refuses what is no file, such as a pipe
-    if text.endswith(".jl"):
-        hint = f"softreach import {text} {text[:-3]}.toml makes one of a filament"
+    if text.endswith(".json"):
+        hint = f"softreach import {text} {text[:-5]}.toml makes one of a filament"
     else:
         hint = did_you_mean(text, designs.__all__)
     allowed = f"a .toml file, or one of {', '.join(designs.__all__)}"

@@ -16,12 +16,12 @@ from softreach.support.errors import InvalidInput
 
 
 def import_file(
-    source: Annotated[Path, Parameter(help="Filament (.jl), or cloud: NAME.csv of two files.")],
+    source: Annotated[Path, Parameter(help="Filament (.json), or cloud: NAME.csv of two files.")],
     out: Annotated[Path, Parameter(help="Design (.toml) or cloud (.zarr) to write.")],
     /,
     *,
     design: Annotated[
-        str | None, Parameter(help="Design that a cloud belongs to: .toml, .jl or built-in.")
+        str | None, Parameter(help="Design that a cloud belongs to: .toml, .json or built-in.")
     ] = None,
     tol: Annotated[
         float | None,
@@ -34,18 +34,18 @@ def import_file(
 ) -> None:
     """Convert a filament or a cloud of ActiveFilaments.jl.
 
-    Definitions of filaments are read, not run. A cloud is NAME.csv with
+    The docs show how Julia writes a filament as JSON. A cloud is NAME.csv with
     NAME_gamma.csv beside it; its tips are compared with softreach's own.
 
-    Example: softreach import filament.jl filament.toml
+    Example: softreach import filament.json filament.toml
     """
-    if source.suffix == ".jl":
+    if source.suffix == ".json":
         refuse("left out for a filament: it is of clouds", design=design, tol=tol)
         _design(source, out, overwrite, unit, json)
     elif source.suffix == ".csv":
         _cloud(source, out, design, 1e-6 if tol is None else tol, overwrite, unit, json)
     else:
-        raise InvalidInput("source", source, "a file name ending in .jl or .csv")
+        raise InvalidInput("source", source, "a file name ending in .json or .csv")
 
 
 def _design(source: Path, out: Path, overwrite: bool, unit: str | None, json: bool) -> None:
@@ -80,7 +80,7 @@ def _cloud(
     if design is None:
         allowed = "the design that the cloud was computed for"
         raise InvalidInput("design", None, allowed, "pass --design filament.toml")
-    arm = read_design(design) if design.endswith(".jl") else design_from(design)
+    arm = read_design(design) if design.endswith(".json") else design_from(design)
     check_output(out, cloud_store(arm), overwrite)
     lengths = Lengths.of(arm, unit)
     cloud = read_cloud(arm, source, tol=tol)

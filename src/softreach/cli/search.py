@@ -82,18 +82,6 @@ def search(
             negative="--no-polish", group=_ASKED, help="Improve designs by their derivatives."
         ),
     ] = None,
-    tolerance: Annotated[
-        list[str] | None,
-        Parameter(
-            group=_ASKED,
-            help="Standard deviation of a parameter of arms as they are made: taper_deg=0.1. May "
-            "be repeated.",
-        ),
-    ] = None,
-    robust: Annotated[
-        bool | None,
-        Parameter(group=_ASKED, help="Objectives are what 5 % of the arms made are worse than."),
-    ] = None,
     storage: Annotated[
         Path | None,
         Parameter(
@@ -129,9 +117,7 @@ def search(
         "minimize": None if minimize is None else minimize.split(","),
         "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2"),
         "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4"),
-        "tolerances": pairs_in("tolerance", tolerance, "NAME=DEVIATION, such as taper_deg=0.1"),
         "polish": polish,
-        "robust": robust,
         **options,
     }
     given = {name: value for name, value in given.items() if value is not None}
@@ -152,7 +138,6 @@ def search(
             asked.free,
             asked.requirements,
             choices=asked.choices,
-            tolerances=asked.tolerances,
             storage=storage,
             follow=watch,
             progress=step,

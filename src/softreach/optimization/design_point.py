@@ -12,9 +12,8 @@ from softreach.arm.parameters import find_parameters
 from softreach.arm.parameters.changes import parameters_by_every_name
 from softreach.arm.summary import load_number, mass
 from softreach.optimization.free_parameters import Values
-from softreach.optimization.objectives import SETS, DesignCase, Goal
+from softreach.optimization.objectives import SETS, DesignCase
 from softreach.optimization.problem import Problem
-from softreach.optimization.robust import margin
 from softreach.requirements.regions import Region
 from softreach.rod.rods import in_steps, refined, tip_map
 from softreach.rod.tip_map import TipMap
@@ -34,8 +33,6 @@ OF_ARM: dict[str, Callable[[Manipulator], float]] = {
 }
 _TOL = 1e-7  # of tips at the targets, in L
 STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
-_WIDESTEP = 0.02  # of a range, for what is rough
-_WIDE_STEP = 0.02  # of a range, for what is rough
 _PLACES = 8192  # of a region, whose share is covered
 
 
@@ -138,29 +135,6 @@ class DesignPoint:
         of = OF_ARM[name]
         slopes = [(of(ahead) - of(behind)) / step for step, ahead, behind in self.neighbors]
         return np.array(slopes)
-
-    def margin(self, goal: Goal) -> float:
-        """Distance of a robust goal from that of the design itself."""
-        if goal.name not in self._margins:
-            self._margins[goal.name] = goal.sense * margin(goal, self.case)
-        return self._margins[goal.name]
-
-    def margin_slope(self, goal: Goal) -> Array:
-        """Its derivatives by the reals: differences to one side."""
-        parameters = self.problem.parameters
-        reals, (low, high) = parameters.reals(self.values), parameters.bounds.T
-        slopes = []
-        for k, step in enumerate(_WIDE_STEP * (high - low)):
-            moved = reals.copy()
-            moved[k] += step if reals[k] + step <= high[k] else -step
-            case = self.problem.case(parameters.moved(self.values, moved), self.accuracy)
-            change = goal.sense * margin(goal, case) - self.margin(goal)
-            slopes.append(change / (moved[k] - reals[k]) * (high - low)[k])
-        return np.array(slopes)
-
-    @lazy
-    def _margins(self) -> dict[str, float]:
-        return {}
 
     @lazy
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -122,10 +122,6 @@ class Objective:
     """Part of the requirements that it is about: "targets" or "regions"; "" for none."""
     smooth: bool = False
     """A polish knows its derivatives."""
-    sigmas: Mapping[str, float] = field(default_factory=dict)
-    """Deviations of the arm under which it is a quantile; none for the design itself."""
-    nominal: Objective | None = None
-    """That of the design itself, for a quantile."""
 
 
 class Goal(NamedTuple):

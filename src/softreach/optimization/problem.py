@@ -100,11 +100,7 @@ class Problem:
             "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
             "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
             "requirements": self.requirements.to_toml(),
-            "goals": [
-                [goal.name, goal.sense, *([dict(deviates)] if deviates else [])]
-                for goal in self.goals
-                for deviates in [goal.objective.sigmas]
-            ],
+            "goals": [[goal.name, goal.sense] for goal in self.goals],
         }
         text = json.dumps(record, default=str)
         return hashlib.sha256(text.encode()).hexdigest()

@@ -82,7 +82,7 @@ class Point:
             value = self.design.of_set(goal.name)
         else:
             value = self.design.of_arm(goal.name)
-        return -goal.sense * value + (self.design.margin(goal) if goal.objective.sigmas else 0.0)
+        return -goal.sense * value
 
     def _cost_slope(self, goal: Goal) -> Array:
         slope, reals = np.zeros(self._size), slice(0, len(self.reals))
@@ -94,10 +94,7 @@ class Point:
             slope[reals] = self.design.set_slope(goal.name)
         else:
             slope[reals] = self.design.arm_slope(goal.name)
-        slope = -goal.sense * slope
-        if goal.objective.sigmas:
-            slope[reals] += self.design.margin_slope(goal)
-        return slope
+        return -goal.sense * slope
 
     def _effort(self, name: str) -> tuple[float, Array]:
         """Mean of |γ|, each over its largest bound; of a high power for the largest of them."""

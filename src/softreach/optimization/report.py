@@ -153,11 +153,7 @@ def missed_text(search: Search) -> Iterator[str]:
 
 
 def remarks(search: Search) -> Iterator[str]:
-    """Remarks on a search: spreads, and counts of designs by how they were judged."""
-    for spread in search.spreads:
-        word = "robust" if search.robust else "as made"
-        nominal = f"nominal {spread.nominal:.6g}"
-        yield f"{word}: {spread.name} {nominal}; mean {spread}"
+    """Counts of designs by how they were judged."""
     problem, judged = search.problem, search.judged
     ways = [f"{judged['bounds']} by bounds alone"] if judged["bounds"] else []
     ways += [f"{judged['coarse']} on coarse sets (to {problem.coarse:g})"] * bool(judged["coarse"])

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.optimization.deviations import Spread
 from softreach.optimization.objectives import Goal
 from softreach.optimization.problem import Candidate, Problem
 from softreach.requirements.checks import Check
@@ -41,10 +40,6 @@ class Search:
     """All designs that were judged to full accuracy, those of the front among them."""
     candidates: tuple[Candidate, ...]
     """Everything that was judged on the way: by bounds alone, or on coarse sets."""
-    spreads: tuple[Spread, ...] = ()
-    """Goals of arms made after the best, which deviate by the tolerances; none without these."""
-    robust: bool = False
-    """Goals are those that 5 % of the arms are worse than; the nominal ones are in `spreads`."""
     designs: int
     """Designs that were looked at, those of polishes too."""
     seconds: float

@@ -37,10 +37,9 @@ _OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
     "accuracy": lambda name, value: as_number(name, value, ACCURACIES),
     "sampler": lambda name, value: as_one_of(name, value, SAMPLERS),
     "polish": as_flag,
-    "robust": as_flag,
 }
 _SENSES = ("maximize", "minimize")
-_TABLES = ("free", "choices", "tolerances")
+_TABLES = ("free", "choices")
 _KEYS = ("design", *_SENSES, *_OPTIONS, *_TABLES)
 _WRONG: Any = object()
 """In place of a value that has faults."""
@@ -57,8 +56,6 @@ class SearchFile:
     """Parameter -> range [SI unit], or the parameter that it is tied to."""
     choices: Mapping[str, list[Any]]
     """Parameter -> values [SI unit]."""
-    tolerances: Mapping[str, float] = field(default_factory=dict)
-    """Parameter -> standard deviation with which it is made [SI unit]."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Objectives and numbers of the search: further arguments of `search`."""
 
@@ -79,15 +76,13 @@ def read_search(
     [search]
     design = "arm.toml"             # or a named design, or a list of several
     maximize = "exact_volume"
-    designs = 200                   # seed, accuracy, sampler, polish, robust
+    designs = 200                   # seed, accuracy, sampler, polish
     [search.free]
     taper_deg = [0, 3.2]
     "left.revolution_deg" = [-360, 360]
     "right.revolution" = "-left.revolution"
     [search.choices]
     bundles = [3, 4]
-    [search.tolerances]
-    taper_deg = 0.1
     ```
 
     Args:
@@ -106,7 +101,7 @@ def read_search(
         document = {}  # for which the requirements are refused
     reader = _Reader(document.get("search", {}), given or {}, folder, design_from)
     bases = reader.bases()
-    free, choices, tolerances = reader.parameters(bases)
+    free, choices = reader.parameters(bases)
     lengths = {arm.length for arm in bases.values()}
     alike = len(lengths) == 1 and "length" not in {*free, *choices}
     needs, faults = None, ()
@@ -125,7 +120,6 @@ def read_search(
         requirements=needs,
         free=free,
         choices=choices,
-        tolerances=tolerances,
         options=options,
     )
 
@@ -175,10 +169,10 @@ class _Reader:
 
     def parameters(
         self, bases: Mapping[str, Manipulator]
-    ) -> tuple[dict[str, Any], dict[str, list[Any]], dict[str, float]]:
-        """Ranges and ties, choices, and tolerances, by parameter."""
+    ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
+        """Ranges and ties, and choices, by parameter."""
         if not bases:
-            return {}, {}, {}
+            return {}, {}
         choices: dict[str, list[Any]] = {}
         for path, key, value in self._entries("choices"):
             if key in NAMED_CHOICES:
@@ -193,17 +187,7 @@ class _Reader:
             if name := self._name(names, path, key):
                 self._add(path, free, name, self._range(names, path, key, value))
         self._check(bases, names, free, choices)
-        return free, choices, self._tolerances(names)
-
-    def _tolerances(self, names: _Names) -> dict[str, float]:
-        tolerances: dict[str, float] = {}
-        for path, key, value in self._entries("tolerances", names):
-            if name := self._name(names, path, key):
-                numbers = self._numbers(names, path, key, [value], 1)
-                if numbers is not _WRONG and not numbers[0] > 0.0:
-                    numbers = self._refuse(path, value, "must be > 0")
-                self._add(path, tolerances, name, _WRONG if numbers is _WRONG else numbers[0])
-        return tolerances
+        return free, choices
 
     def _check(
         self,
@@ -231,10 +215,6 @@ class _Reader:
             path, value = self._value(name)
             if value is not None:
                 options[name] = self._tried(path, value, partial(convert, name, value))
-        if options.get("robust") and not (
-            self._raw.get("tolerances") or self._given.get(_TABLES[2])
-        ):
-            self._refuse(self._value("robust")[0], True, "needs tolerances")
         if needs is not None and not self.faults:
             try:
                 goals(options["maximize"], options["minimize"], needs)
@@ -308,7 +288,7 @@ class _Reader:
     def _numbers(self, names: _Names, path: str, key: str, values: Any, count: int | None) -> Any:
         """Numbers in SI units; `_WRONG` where some are none or beyond what they may be."""
         parameter = names.by_key[key]
-        wanted = {None: "a list of different numbers", 1: "a number", 2: "a range [low, high]"}
+        wanted = {None: "a list of different numbers", 2: "a range [low, high]"}
         if not isinstance(values, list | tuple) or (count or len(values)) != len(values):
             return self._refuse(path, values, f"must be {wanted[count]}")
         numbers = []
@@ -319,8 +299,6 @@ class _Reader:
                 shown = values if isinstance(values[0], int | float) else value
                 return self._refuse(path, shown, names.allowed(key))
         allowed = parameter.range._replace(whole=False)
-        if count == 1:
-            return numbers  # of a standard deviation
         if wrong := [value for value in numbers if not allowed.admits(value)]:
             shown = allowed.in_degrees() if parameter.unit == "rad" else allowed
             value = values[numbers.index(wrong[0])]

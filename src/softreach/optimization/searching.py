@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from os import PathLike
 from typing import Any
@@ -13,13 +12,11 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metric import Metric
-from softreach.optimization.deviations import deviations_of
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.objectives import goals
 from softreach.optimization.polish import MOST_DESIGNS, Polished, can_polish, polished
 from softreach.optimization.problem import Candidate, Problem
 from softreach.optimization.result import Search
-from softreach.optimization.robust import robust_goals, spreads_of
 from softreach.optimization.study import SAMPLERS, Sampler, Study
 from softreach.requirements.requirements import Requirements
 from softreach.support import parallel
@@ -28,13 +25,11 @@ from softreach.support.arguments import (
     as_function,
     as_instance,
     as_integer,
-    as_mapping,
     as_number,
     as_one_of,
     as_path,
 )
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES
 
@@ -65,8 +60,6 @@ def search(
     accuracy: float = 3e-3,
     polish: bool = True,
     sampler: Sampler = "auto",
-    tolerances: Mapping[str, float] | None = None,
-    robust: bool = False,
     seed: int = 0,
     storage: str | PathLike[str] | None = None,
     follow: Callable[[Candidate], object] | None = None,
@@ -98,11 +91,6 @@ def search(
         polish: Whether designs are polished, where objectives have derivatives.
         sampler: Sampler of Optuna: "cma", "tpe", "nsga2", "nsga3", "sobol", "random"; "auto"
             chooses.
-        tolerances: Parameter -> standard deviation of arms as they are made [SI unit]; the result
-            then says how the goals of arms made after the best design spread.
-        robust: Whether an objective is what 5 % of these arms are worse than instead of that of the
-            design itself, to second order by arms one deviation away. Requirements are those of
-            the design itself.
         seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
             number of threads.
         storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
@@ -122,16 +110,10 @@ def search(
     as_instance("requirements", needs, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     targets = goals(maximize, minimize, needs)
-    sigmas = {} if tolerances is None else as_mapping("tolerances", tolerances, as_number)
-    if as_flag("robust", robust) and not sigmas:
-        raise InvalidInput("tolerances", "none", "given for a robust search")
-    parameters = free_parameters(base, free, choices)
-    if sigmas:
-        deviations_of(next(iter(parameters.bases.values())), sigmas)
     problem = Problem(
-        parameters=parameters,
+        parameters=free_parameters(base, free, choices),
         requirements=needs,
-        goals=robust_goals(targets, sigmas) if robust else targets,
+        goals=targets,
         accuracy=accuracy,
         coarse=min(_COARSER * accuracy, max(accuracy, _COARSEST)),
     )
@@ -150,11 +132,7 @@ def search(
         seed=seed,
         first=run.first,
     )
-    result = run.result(study)
-    if sigmas and result.best.is_feasible:
-        spreads = spreads_of(targets, result.arm, needs, accuracy, sigmas, seed)
-        result = replace(result, spreads=spreads, robust=robust)
-    return result
+    return run.result(study)
 
 
 class _Run:

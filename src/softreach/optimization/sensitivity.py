@@ -33,9 +33,7 @@ _ACTIVE = 1e-3  # room below which a requirement may decide
 _AT_END = 1e-6  # of a range
 _CONFIDENCE = 0.95
 _RESAMPLES = 400
-_LEAST_ROWS = 8
 _MOST = 1 << 16
-_MOST_DRAWN = 4  # times as many rows, until all designs of enough of them exist
 
 
 class Multiplier(NamedTuple):
@@ -59,11 +57,6 @@ class VarianceShares(NamedTuple):
     total: Array
     """With all that it does together with others: the total index."""
     total_error: Array
-    rows: int
-    """Rows of designs that exist, of which the indices are."""
-    replaced: int
-    """Rows that were drawn again, as one of their designs cannot exist or has no such number: the
-    indices are those among designs that exist, where parameters are not quite independent."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -87,7 +80,7 @@ class Sensitivity:
     residual: float
     """Part of the goal's slope that no requirement explains: 0 at an optimum, NaN without any."""
     variance: tuple[VarianceShares | None, ...]
-    """For each goal; None if too few designs exist."""
+    """For each goal; None if one of the designs cannot exist or has no such number."""
     designs: int
     """Designs that were looked at."""
 
@@ -97,7 +90,7 @@ class Sensitivity:
 
         count = len(self.parameters)
         lacks = np.full(count, math.nan)
-        empty = VarianceShares(lacks, lacks, lacks, lacks, 0, 0)
+        empty = VarianceShares(lacks, lacks, lacks, lacks)
         shares = [each or empty for each in self.variance]
         fields = ("first", "first_error", "total", "total_error")
         at = ("goal", "parameter")
@@ -114,8 +107,6 @@ class Sensitivity:
                     for name in fields
                 },
                 "multiplier": ("requirement", [each.value for each in self.multipliers]),
-                "rows": ("goal", [each.rows for each in shares]),
-                "rows_replaced": ("goal", [each.replaced for each in shares]),
             },
             {
                 "goal": list(self.goals),
@@ -145,8 +136,7 @@ class Sensitivity:
                     f"({share.total[j]:.2f} ± {share.total_error[j]:.2f})"
                     for j in order
                 )
-                replaced = f", {share.replaced} more replaced" if share.replaced else ""
-                lines.append(f"  variance alone (in all), {share.rows} rows{replaced}: {each}")
+                lines.append(f"  variance alone (in all): {each}")
         for each in self.multipliers:
             unit = f" per {each.unit}" if each.unit else " per unit"
             lines.append(f"decides: {each.name}, {each.value:.4g} {self.goal_units[0]}{unit}")
@@ -202,7 +192,9 @@ def sensitivity(
     with no_warnings():
         gradient, error = _gradients(problem, candidate)
         multipliers, residual = _multipliers(problem, candidate)
-        variance = _variances(problem, n, seed, progress) if n else (None,) * len(problem.goals)
+        variance = (None,) * len(problem.goals)
+        if n and variance:
+            variance = _variances(problem, n, seed, progress)
     parameters = problem.parameters
     return Sensitivity(
         goals=tuple(goal.name for goal in problem.goals),
@@ -327,43 +319,35 @@ def _variances(
     problem: Problem, n: int, seed: int, progress: Progress
 ) -> tuple[VarianceShares | None, ...]:
     """Shares of variance of each goal, of designs on coarse sets."""
-    from scipy.stats import qmc
+    from scipy.stats import sobol_indices, uniform
 
-    free, known, drawn = problem.parameters.free, [], 0
-    sampler = qmc.Sobol(2 * len(free), rng=np.random.default_rng(seed))
-    while drawn < _MOST_DRAWN * n and (count := sum(each.shape[1] for each in known)) < n:
-        with np.errstate(all="ignore"):
-            cube = sampler.random(n if not drawn else min(n, 4 * (n - count)))
-        values = _rows(problem, cube, progress)
-        known.append(values[:, np.isfinite(values).all(axis=(0, 2))])
-        drawn += len(cube)
-    values = np.concatenate(known, axis=1)
-    count = values.shape[1]
-    if count < _LEAST_ROWS:
-        return (None,) * len(problem.goals)
-    used = min(n, 1 << (count.bit_length() - 1))
+    free, known = problem.parameters.free, []
+
+    def at(cube: Array) -> Array:
+        tasks = (
+            partial(_values, problem, {p.name: p.at(x) for p, x in zip(free, place, strict=True)})
+            for place in cube.T.tolist()
+        )
+        for row in parallel.in_order(tasks):
+            known.append([*row, 0.0])  # SciPy fails at one goal of one parameter
+            progress(1)
+        return np.array(known[-cube.shape[1] :]).T
+
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what does not depend on a parameter
+        indices = sobol_indices(
+            func=at, n=n, dists=[uniform()] * len(free), rng=np.random.default_rng(seed)
+        )
+        again = indices.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
+    ends = (each.confidence_interval for each in (again.first_order, again.total_order))
+    first, total = (0.5 * np.nan_to_num(np.subtract(each.high, each.low)) for each in ends)
+    parts = np.array([indices.first_order, first, indices.total_order, total])
+    shares = parts.reshape(4, -1, len(free))  # SciPy drops axes of one
+    values = np.array(known)
     return tuple(
-        variance_shares(values[:, :used, k], drawn - count, seed) for k in range(len(problem.goals))
+        VarianceShares(*shares[:, k]) if np.isfinite(values[:, k]).all() else None
+        for k in range(len(problem.goals))
     )
-
-
-def _rows(problem: Problem, cube: Array, progress: Progress) -> Array:
-    """Goals at A, B and, for each parameter, A with that of B: (parameters + 2, n, goals)."""
-    free = problem.parameters.free
-    d = len(free)
-    first, second = cube[:, :d], cube[:, d:]
-    mixed = np.repeat(first[None], d, axis=0)
-    for j in range(d):
-        mixed[j, :, j] = second[:, j]
-    tasks = (
-        partial(_values, problem, {p.name: p.at(float(x)) for p, x in zip(free, at, strict=True)})
-        for at in np.concatenate([first, second, mixed.reshape(-1, d)])
-    )
-    rows = []
-    for row in parallel.in_order(tasks):
-        rows.append(row)
-        progress(1)
-    return np.array(rows).reshape(d + 2, len(cube), len(problem.goals))
 
 
 def _values(problem: Problem, values: Mapping[str, Any]) -> list[float]:
@@ -374,40 +358,3 @@ def _values(problem: Problem, values: Mapping[str, Any]) -> list[float]:
             return [goal.value(case).value for goal in problem.goals]
         except (InvalidDesign, InvalidInput, MetricFailed):
             return [math.nan] * len(problem.goals)
-
-
-def variance_shares(values: Array, replaced: int = 0, seed: int = 0) -> VarianceShares:
-    """Sobol's indices of a number of designs, with errors by bootstrap.
-
-    Args:
-        values: At the designs A, B and, for each parameter, A with that of B: (parameters + 2, n),
-            n a power of two.
-        replaced: Rows that others stand for.
-        seed: Of the bootstrap.
-    """
-    from scipy.stats import sobol_indices
-
-    mixed = values[2:, None, :]
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what does not depend on a parameter
-        indices = sobol_indices(
-            func={"f_A": values[:1], "f_B": values[1:2], "f_AB": mixed},  # pyright: ignore
-            n=values.shape[1],
-            rng=np.random.default_rng(seed),
-        )
-        again = indices.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
-    first, total = (
-        0.5
-        * np.nan_to_num(
-            np.subtract(each.confidence_interval.high, each.confidence_interval.low)
-        ).ravel()
-        for each in (again.first_order, again.total_order)
-    )
-    return VarianceShares(
-        np.ravel(indices.first_order),
-        first,
-        np.ravel(indices.total_order),
-        total,
-        values.shape[1],
-        replaced,
-    )

@@ -1,7 +1,6 @@
-"""ActiveFilaments.jl: definitions of filaments as Julia source, and its clouds as headerless CSV.
+"""ActiveFilaments.jl: filaments from JSON and as Julia source, and its clouds as headerless CSV.
 
-[ActiveFilamentsJl] is the program of the theory's authors. Definitions are read as numbers and
-constructors and never run.
+[ActiveFilamentsJl] is the program of the theory's authors.
 """
 
 from __future__ import annotations
