@@ -107,21 +107,8 @@ def _start(
     if quiet and verbose:
         raise InvalidInput("quiet", quiet, "left out with --verbose")
     console.set(quiet=quiet, verbose=verbose)
-    if not imports:
+    with importing(imports or ()):
         return app(words, result_action="return_value")
-    with importing(imports):
-        _check_kinds()
-        return app(words, result_action="return_value")
-
-
-def _check_kinds() -> None:
-    """See that the kinds of the user have names of their own."""
-    from softreach.arm.actuators import Actuator
-    from softreach.arm.design_file.keys import own_kinds
-    from softreach.arm.profile import Profile
-
-    for of in (Actuator, Profile):
-        own_kinds(of)
 
 
 def run(arguments: list[str]) -> int:
