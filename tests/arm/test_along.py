@@ -180,8 +180,8 @@ TWO = {"stations_over_length": (0, 1)}
         ),
         (
             fiber,
-            {"angle": 0.1, "end_over_length": 1e-300},
-            "end_over_length = 1e-300: must be above start_over_length = 0 by 1e-09 L at least",
+            {"angle": 0.1, "end_over_length": 1e-10},
+            "end_over_length = 1e-10: must be above start_over_length = 0",
         ),
         (fiber, {"angle": 0.1, "end_over_length": 1.1}, "end_over_length = 1.1: .*<= 1"),
         (fiber, {"angle": 0.1, "start_over_length": -0.1}, "start_over_length = -0.1: .*>= 0"),

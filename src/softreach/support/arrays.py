@@ -1,6 +1,7 @@
 """Arrays that users pass: converted and checked in one place, and names for them by what they hold.
 
-Numbers are what NumPy takes for whole or real numbers; masked entries are none.
+Numbers are what NumPy takes for whole or real numbers; masked entries are none. What cannot be
+converted raises `InvalidInput`, which names the argument.
 """
 
 from __future__ import annotations
@@ -84,16 +85,7 @@ def read_only(values: Array) -> Array:
 
 
 def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
-    """The values as a float array in memory order, of any shape; NaN and infinity are numbers.
-
-    Args:
-        name: What errors call them.
-        values: Numbers: an array, a sequence, or one number.
-        allowed: What errors ask for.
-
-    Raises:
-        InvalidInput: No numbers, rows of different lengths, or masked entries.
-    """
+    """Numbers as a float array in memory order, of any shape; NaN and infinity are numbers."""
     if type(values) is np.ndarray and values.dtype == np.float64:
         return np.ascontiguousarray(values).reshape(values.shape)
     array = _array(name, values, allowed)
@@ -103,11 +95,7 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
 
 
 def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
-    """Finite numbers of shape (n, columns); one row may stand alone.
-
-    Raises:
-        InvalidInput: No numbers, another shape, or rows that are not finite.
-    """
+    """Finite numbers of shape (n, columns); one row may stand alone."""
     rows = as_floats(name, values, allowed)
     rows = rows[None] if rows.shape == (columns,) else rows
     if rows.ndim != 2 or rows.shape[1] != columns:
@@ -116,11 +104,7 @@ def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
 
 
 def as_points(name: str, values: object) -> Points:
-    """Finite positions [m], shape (n, 3); one may stand alone, and nothing at all is none of them.
-
-    Raises:
-        InvalidInput: No numbers, another shape, or rows that are not finite.
-    """
+    """Finite positions [m], shape (n, 3); one may stand alone, and an empty array is none."""
     allowed = "of shape (n, 3), positions in m"
     points = as_floats(name, values, allowed)
     if points.size == 0 and points.ndim <= 2:
@@ -129,11 +113,7 @@ def as_points(name: str, values: object) -> Points:
 
 
 def check_finite(name: str, values: Array) -> Array:
-    """The array itself, if no number in it is NaN or infinite.
-
-    Raises:
-        InvalidInput: There are such; the first is told.
-    """
+    """The array itself, if no number in it is NaN or infinite; the first such row is named."""
     # The extremes take a third of the time of isfinite, and no memory.
     if not values.size or np.isfinite([values.min(), values.max()]).all():
         return values
@@ -146,11 +126,7 @@ def check_finite(name: str, values: Array) -> Array:
 
 
 def as_stations(name: str, values: object) -> Array:
-    """Finite numbers of shape (station,), of which one may stand alone.
-
-    Raises:
-        InvalidInput: No numbers, more dimensions, or some that are not finite.
-    """
+    """Finite numbers of shape (station,), of which one may stand alone."""
     stations = np.atleast_1d(as_floats(name, values))
     if stations.ndim > 1:
         raise InvalidInput(f"{name}.shape", stations.shape, "of shape (station,)")
@@ -158,18 +134,9 @@ def as_stations(name: str, values: object) -> Array:
 
 
 def as_directions(name: str, values: object, count: int | None = None) -> Array:
-    """Unit vectors along vectors of any length.
+    """Unit vectors along vectors of shape (3,) or (n, 3) and any length but 0.
 
-    Args:
-        name: What errors call them.
-        values: Shape (3,) or (n, 3).
-        count: How many there must be, of which one may stand for all; None for any number.
-
-    Returns:
-        Shape (count, 3); that of the values without a count.
-
-    Raises:
-        InvalidInput: Another shape, numbers that are not finite, or a vector without length.
+    With a count, shape (count, 3): one vector may stand for all. Else that of the values.
     """
     vectors = as_floats(name, values)
     rows = "n" if count is None else count
@@ -184,11 +151,7 @@ def as_directions(name: str, values: object, count: int | None = None) -> Array:
 
 
 def as_shares(name: str, values: object) -> Array:
-    """Numbers from 0 to 1, shape (k,), one at least.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """Numbers from 0 to 1, shape (k,), one at least."""
     shares = as_floats(name, values)
     if shares.ndim == 1 and shares.size and ((shares >= 0) & (shares <= 1)).all():
         return shares
@@ -196,28 +159,14 @@ def as_shares(name: str, values: object) -> Array:
 
 
 def as_indices(name: str, values: object, count: int, what: str) -> Index:
-    """Indices from 0 to count - 1, shape (k,).
-
-    Args:
-        name: What errors call them.
-        values: Whole numbers.
-        count: How many things there are.
-        what: What they count, such as "samples of the cloud".
-
-    Raises:
-        InvalidInput: Other numbers, or of another shape.
-    """
+    """Indices from 0 to count - 1 of things such as "samples of the cloud", shape (k,)."""
     allowed = f"one-dimensional, of whole numbers from 0 to {count - 1:,}, {what}"
     indices = _array(name, values, allowed)
     return _within(name, indices, indices.ndim == 1, count, allowed).astype(np.intp)
 
 
 def as_faces(name: str, values: object, count: int) -> Faces:
-    """Triangles whose corners are indices from 0 to count - 1, shape (f, 3).
-
-    Raises:
-        InvalidInput: Other numbers, or of another shape.
-    """
+    """Triangles whose corners are indices from 0 to count - 1, shape (f, 3)."""
     allowed = f"of shape (f, 3), whole numbers from 0 to {count - 1:,}"
     faces = _array(name, values, allowed)
     faces = faces if faces.size else np.empty((0, 3), np.int64)

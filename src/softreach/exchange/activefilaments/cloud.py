@@ -178,5 +178,4 @@ def _reason(error: Exception) -> str:
     text = str(error).partition(";")[0] or type(error).__name__
     if match := _NO_NUMBER.search(text):
         text = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
-    shown = "".join(character if character.isprintable() else "?" for character in text)
-    return shown if len(shown) < 120 else f"{shown[:60]} ... {shown[-40:]}"
+    return text
