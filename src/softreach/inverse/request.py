@@ -13,7 +13,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.quantity import shortened, unit_names
+from softreach.support.quantity import unit_names
 from softreach.support.units import TYPED, lengths_in
 
 _HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\])])")
@@ -130,7 +130,7 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
     if values is None:
         units = TYPED if length is None else f"{TYPED}, L"
         allowed = f"three comma-separated numbers x,y,z in m, or each with its unit ({units})"
-        raise InvalidInput(name, shortened(text) or "''", allowed)
+        raise InvalidInput(name, text or "''", allowed)
     return values
 
 
@@ -141,7 +141,7 @@ def _header_units(line: str, source: str) -> list[str]:
         match = _HEADER.fullmatch(name.strip().strip('"'))
         unit = "" if match is None else match[1] or match[2] or ""
         if match is not None and match[2] and unit not in (*unit_names("m"), "L"):
-            raise InvalidInput(f"{source}, header", shortened(line), f"in {TYPED} or L")
+            raise InvalidInput(f"{source}, header", line, f"in {TYPED} or L")
         units.append({"over_length": "L"}.get(unit, unit))
     return units
 

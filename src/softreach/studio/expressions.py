@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple, NoReturn
 
 from softreach.studio.widgets import TextKind, number_of, number_text, vector_of
-from softreach.support.quantity import shortened, sizes_in
+from softreach.support.quantity import sizes_in
 
 __all__ = ["number_kind", "unit_in", "vector_kind"]
 
@@ -149,7 +149,7 @@ class _Expression:
                 "something is missing at its end" if self._text else "nothing is typed"
             )
         word = _NAME.match(self._rest) or _NUMBER.match(self._rest)
-        raise ValueError(f"{shortened(word[0] if word else self._rest[0])} is not expected there")
+        raise ValueError(f"{word[0] if word else self._rest[0]} is not expected there")
 
     def _sum(self) -> _Value:
         total = self._product()

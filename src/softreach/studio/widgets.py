@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
-from softreach.support.quantity import shortened
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -179,7 +178,7 @@ class TypedField:
         except ValueError as error:
             value, wrong = None, f"; {error}"
         if value is None:
-            self._message.warn(f"{shortened(text)!r}: must be {self._kind.demand}{wrong}")
+            self._message.warn(f"{text!r}: must be {self._kind.demand}{wrong}")
             return
         with self._lock:
             self._value = value

@@ -14,7 +14,6 @@ __all__ = [
     "read_number",
     "read_quantity",
     "read_whole_number",
-    "shortened",
     "sizes_in",
     "unit_names",
 ]
@@ -25,7 +24,6 @@ _FINEST = 1e-9  # of the value: what follows is rounding
 _DECIMAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(rf"\s*({_DECIMAL})\s*(.*?)\s*", re.ASCII)
 _GROUPED = re.compile(r"[+-]?\d+(?:_\d+)+", re.ASCII)
-_SHOWN = 60  # characters of what was typed
 _LARGEST = 30  # power of ten of a whole number
 _UNITS = {
     "kg": {"kg": "1", "g": "1e-3", "mg": "1e-6"},
@@ -99,12 +97,6 @@ def numbers_in(text: str, count: int | None = None) -> list[float] | None:
     except ValueError:
         return None
     return values if count in (None, len(values)) else None
-
-
-def shortened(text: str) -> str:
-    """Typed text, such that it fits into a line and can be printed."""
-    plain = "".join(character if character.isprintable() else "?" for character in text)
-    return plain if len(plain) <= _SHOWN else f"{plain[: _SHOWN // 2]}...{plain[-_SHOWN // 4 :]}"
 
 
 def unit_names(unit: str) -> tuple[str, ...]:
