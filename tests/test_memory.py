@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
 
 import pytest
 
+import softreach as sr
 from softreach.support import memory
 
 VERSION_2 = {
@@ -45,6 +47,19 @@ def test_files_that_a_container_keeps_only_to_read_count_as_free(container, file
 def test_without_a_limit_the_system_says_what_is_free(container, files):
     container(files)
     assert memory.free_memory() == 1e6
+
+
+def test_a_cloud_for_which_there_is_no_memory_is_refused():
+    with pytest.raises(sr.InvalidInput, match=r"^n = 10.*of memory, of which .* GB are free$"):
+        sr.compute_cloud(sr.designs.minimal_trunk(), 10**12)
+
+
+def test_cells_for_which_there_is_no_memory_are_refused(trunk, monkeypatch):
+    image = dataclasses.replace(sr.reachable_set(trunk, accuracy=0.05).image)  # nothing counted
+    monkeypatch.setattr(memory, "_NOTICED", 0)
+    monkeypatch.setattr(memory, "free_memory", lambda: 100.0)
+    with pytest.raises(sr.InvalidInput, match="cells of the lattice = "):
+        _ = image.counts
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems take freed memory themselves")

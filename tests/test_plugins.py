@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
-import subprocess
 import sys
 
 import pytest
@@ -12,9 +10,6 @@ import pytest
 import softreach as sr
 from softreach.arm import designs
 from softreach.cli.app import run
-from softreach.support import plugins
-from tests.atlas.families import assert_same
-from tests.cable import Cable
 
 WIRE = """
 from dataclasses import dataclass
@@ -26,7 +21,7 @@ from tests.cable import Cable
 
 
 @dataclass(frozen=True, kw_only=True)
-class {name}(Cable):
+class {kind}(Cable):
     '''A cable that pulls so many times as strongly.'''
 
     gain: float = 1.0
@@ -46,17 +41,6 @@ def lowest(tips):
 """
 
 
-@pytest.fixture(scope="module")
-def wire(tmp_path_factory):
-    """A module with an actuator and a metric, and a design with that actuator."""
-    folder = tmp_path_factory.mktemp("own")
-    module, design = folder / "own_wire.py", folder / "wire.toml"
-    module.write_text(WIRE.format(name="OwnWire", metric="lowest_tip"), encoding="utf-8")
-    design.write_text(designed("OwnWire"), encoding="utf-8")
-    yield str(module), str(design)
-    sys.modules.pop("own_wire", None)
-
-
 def designed(kind: str) -> str:
     """A design file of two fibers and an actuator of this kind."""
     trunk = designs.minimal_trunk()
@@ -65,226 +49,169 @@ def designed(kind: str) -> str:
     return f"{text}\n[[actuators]]\n{wire}\n"
 
 
-def printed_json(capsys, *words):
-    assert run([*words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
+@pytest.fixture(scope="module")
+def wire(tmp_path_factory):
+    """A module with an actuator and a metric, and a design with that actuator."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "own_wire.py").write_text(WIRE.format(kind="OwnWire", metric="lowest_tip"))
+    (folder / "wire.toml").write_text(designed("OwnWire"))
+    yield ["--import", str(folder / "own_wire.py")], str(folder / "wire.toml")
+    sys.modules.pop("own_wire", None)
 
 
-class TestImport:
-    def test_every_field_is_a_parameter_that_can_be_set(self, wire, capsys, tmp_path):
-        module, design = wire
-        own = {"wire.gain=2", "wire.lean_deg=30", "wire.place[1]=0.02", "wire.upper_n=2e-4"}
-        words = [word for one in own for word in ("--set", one)]
-        records = printed_json(capsys, "list", "parameters", design, *words, "--import", module)
-        values = {one["parameter"]: one["value"] for one in records}
-        for one in own:
-            name, _, value = one.partition("=")
-            assert values[name] == pytest.approx(float(value), rel=1e-12)
+@pytest.fixture
+def printed(capsys):
+    """What a command prints as JSON."""
 
-    def test_a_changed_design_keeps_it_in_its_file(self, wire, capsys, tmp_path):
-        module, design = wire
-        out = str(tmp_path / "other.toml")
-        words = ["--set", "wire.gain=2.5", "--out", out, "--import", module]
-        assert run(["design", design, *words]) == 0
-        assert sr.Manipulator.load(out).actuators[2].gain == 2.5
+    def of(*words):
+        capsys.readouterr()
+        assert run([*words, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
 
-    def test_what_it_pulls_counts(self, wire, capsys):
-        """Twice the gain is twice the tension."""
-        module, design = wire
-        command = ["design", design, "--import", module]
-        strong = printed_json(capsys, *command, "--set", "wire.gain=2")
-        tense = printed_json(capsys, *command, "--set", "wire.upper_n=2e-4")
-        for key in ("extension", "curvature_times_L"):
-            assert strong[key] == pytest.approx(tense[key], rel=1e-12)
-
-    def test_an_atlas_varies_its_fields_in_worker_processes_too(self, wire, capsys, tmp_path):
-        module, design = wire
-        stores = [str(tmp_path / name) for name in ("a.zarr", "b.zarr")]
-        vary = ["--vary", "wire.gain=1,2", "--vary", "wire.place[0]=0,0.03"]
-        command = [*vary, "--design", design, "--metrics", "extent,lowest_tip", "-n", "200"]
-        for store, more in zip(stores, ([], ["--workers", "1"]), strict=True):
-            assert run(["atlas", "build", store, *command, *more, "--import", module]) == 0
-        alone, worked = (sr.open_atlas(store).load() for store in stores)
-        assert_same(worked, alone)
-        assert alone.lowest_tip.dims == ("wire.gain", "wire.place[0]")
-        assert (alone.lowest_tip == alone.z_min).all()
-        assert run(["atlas", "best", stores[0], "lowest_tip", "--import", module]) == 0
-
-    def test_it_is_listed(self, wire, capsys):
-        module, _ = wire
-        metrics = printed_json(capsys, "list", "metrics", "--import", module)
-        assert metrics[-1] == {
-            "metric": "lowest_tip",
-            "group": "lowest_tip",
-            "unit": "m",
-            "meaning": "lowest tip",
-        }
-        kinds = printed_json(capsys, "list", "actuators", "--import", module)
-        assert {"fiber", "tendon", "OwnWire"} <= {one["kind"] for one in kinds}
-
-    def test_it_is_imported_once_and_known_for_one_command(self, wire, capsys):
-        module, _ = wire
-        assert run(["list", "metrics", "--import", module, "--import", module]) == 0
-        assert capsys.readouterr().out.count("lowest_tip  m") == 1
-        assert run(["list", "metrics"]) == 0
-        assert "lowest_tip" not in capsys.readouterr().out
-
-    def test_a_module_that_python_finds_is_called_by_its_name(self, tmp_path, monkeypatch, capsys):
-        (tmp_path / "own_found.py").write_text(WIRE.format(name="FoundWire", metric="found_tip"))
-        monkeypatch.syspath_prepend(tmp_path)
-        assert run(["list", "metrics", "--import", "own_found"]) == 0
-        assert "found_tip" in capsys.readouterr().out
-        del sys.modules["own_found"]
+    return of
 
 
-FAULTY = {
-    "x = (": r"SyntaxError: '(' was never closed (own_faulty.py, line 1)",
-    "\nimport own_nowhere": "ModuleNotFoundError: No module named 'own_nowhere' (own_faulty.py, l",
-    "raise SystemExit": "must be a module that can be imported; SystemExit (own_faulty.py, line 1)",
-    "import softreach as sr\nsr.Base(points='x', position=(0, 0, 'a'), turn='b')": "(own_faulty.py",
-}
+@pytest.fixture
+def refused(capsys):
+    """The one line that a command is refused with."""
+
+    def of(*words):
+        capsys.readouterr()
+        assert run([*words]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        return error
+
+    return of
 
 
-@pytest.mark.parametrize(("text", "said"), FAULTY.items(), ids=range(len(FAULTY)))
-def test_a_module_that_fails_is_refused_with_its_line(text, said, tmp_path, capsys):
-    module = tmp_path / "own_faulty.py"
-    module.write_text(text)
-    assert run(["list", "designs", "--import", str(module)]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith(f"error: import = {module}: must be a module that can be imported; ")
-    assert said in error
-    assert error.count("\n") == 1
-    assert "own_faulty" not in sys.modules
+def test_every_field_is_a_parameter_that_can_be_set(wire, printed):
+    module, design = wire
+    own = {"wire.gain": 2, "wire.lean_deg": 30, "wire.place[1]": 0.02, "wire.upper_n": 2e-4}
+    words = [word for name, value in own.items() for word in ("--set", f"{name}={value}")]
+    records = printed("list", "parameters", design, *words, *module)
+    values = {one["parameter"]: one["value"] for one in records}
+    assert {name: values[name] for name in own} == pytest.approx(own, rel=1e-12)
 
 
-def test_a_file_with_the_name_of_another_module_is_refused(tmp_path, capsys):
-    for name in ("random", "colorsys", "own-wire"):
-        (tmp_path / f"{name}.py").write_text("raise AssertionError")
-        assert run(["list", "designs", "--import", str(tmp_path / f"{name}.py")]) == 2
-        assert "must be a file" in capsys.readouterr().err
+def test_a_changed_design_keeps_its_parts_in_its_file(wire, tmp_path):
+    module, design = wire
+    out = str(tmp_path / "other.toml")
+    assert run(["design", design, "--set", "wire.gain=2.5", "--out", out, *module]) == 0
+    assert sr.Manipulator.load(out).actuators[2].gain == 2.5
+
+
+def test_twice_the_gain_is_twice_the_tension(wire, printed):
+    module, design = wire
+    strong = printed("design", design, *module, "--set", "wire.gain=2")
+    tense = printed("design", design, *module, "--set", "wire.upper_n=2e-4")
+    for key in ("extension", "curvature_times_L"):
+        assert strong[key] == pytest.approx(tense[key], rel=1e-12)
+
+
+def test_an_atlas_varies_its_fields_and_computes_its_metric(wire, tmp_path):
+    module, design = wire
+    store = str(tmp_path / "a.zarr")
+    vary = ["--vary", "wire.gain=1,2", "--vary", "wire.place[0]=0,0.03", "-n", "200"]
+    asked = [*vary, "--design", design, "--metrics", "extent,lowest_tip", *module]
+    assert run(["atlas", "build", store, *asked]) == 0
+    atlas = sr.open_atlas(store)
+    assert atlas.lowest_tip.dims == ("wire.gain", "wire.place[0]")
+    assert (atlas.lowest_tip == atlas.z_min).all()
+    assert run(["atlas", "best", store, "lowest_tip", *module]) == 0
+
+
+def test_it_is_listed_once_and_known_for_one_command(wire, printed):
+    module, _ = wire
+    metrics = [one["metric"] for one in printed("list", "metrics", *module, *module)]
+    assert (metrics[-1], metrics.count("lowest_tip")) == ("lowest_tip", 1)
+    kinds = {one["kind"] for one in printed("list", "actuators", *module)}
+    assert {"fiber", "tendon", "OwnWire"} <= kinds
+    assert metrics[:-1] == [one["metric"] for one in printed("list", "metrics")]
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "said"),
+    ("text", "said"),
     [
-        ("tendon", "OwnFirst", "class tendon of the module own_1 = tendon: must be another name, "),
-        ("Chamber", "OwnFirst", "as softreach has a kind Chamber"),
-        ("OwnFirst", "OwnFirst", "must be another name, as the module own_1 has a kind OwnFirst"),
+        ("x = (", "SyntaxError: '(' was never closed (own_faulty.py, line 1)"),
+        ("\nimport own_nowhere", "No module named 'own_nowhere' (own_faulty.py, line 2)"),
+        ("raise SystemExit", "SystemExit (own_faulty.py, line 1)"),
+        ("import softreach as sr\nsr.Base(turn='b')", "(own_faulty.py, line 2)"),
     ],
 )
-def test_a_kind_that_is_taken_is_refused(first, second, said, tmp_path):
-    words = []
-    for k, name in enumerate((first, second), 1):
-        (tmp_path / f"own_{k}.py").write_text(WIRE.format(name=name, metric=f"metric_{k}"))
-        words += ["--import", str(tmp_path / f"own_{k}.py")]
-    command = [sys.executable, "-m", "softreach", "list", "actuators", *words]  # classes stay
-    ended = subprocess.run(command, capture_output=True, text=True)
-    assert ended.returncode == 2
-    assert said in ended.stderr
-    assert ended.stderr.count("\n") == 1
+def test_a_module_that_fails_is_refused_with_its_line(text, said, tmp_path, refused):
+    (module := tmp_path / "own_faulty.py").write_text(text)
+    assert said in refused("list", "designs", "--import", str(module))
+    assert "own_faulty" not in sys.modules
 
 
-@pytest.mark.parametrize("name", ["extent", "volume"])
-def test_a_metric_of_a_name_that_is_taken_is_refused(name, tmp_path, capsys):
-    module = tmp_path / f"own_{name}.py"
-    module.write_text(WIRE.format(name=f"Wire_{name}", metric=name))
-    assert run(["list", "metrics", "--import", str(module)]) == 2
-    assert f"name of a metric = {name}: must be a name that no other" in capsys.readouterr().err
-    del sys.modules[module.stem]
+@pytest.mark.parametrize("name", ["", "own_nowhere", "..own", "own_nowhere.py", "colorsys.py"])
+def test_what_is_no_module_or_has_the_name_of_another_is_refused(
+    name, tmp_path, monkeypatch, refused
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "colorsys.py").write_text("raise AssertionError")
+    assert "import = " in refused("list", "designs", "--import", name)
 
 
-def test_what_a_worker_cannot_import_is_told_when_it_is_needed():
-    arrived = pickle.loads(pickle.dumps(plugins.Imports(["own_nowhere"])))
-    assert "import = own_nowhere: must be a module that Python finds" in arrived.fault
-    assert not pickle.loads(pickle.dumps(plugins.Imports.needed_by([Cable(place=(0, 0))]))).fault
-
-
-class TestNothingElseRunsCode:
-    def test_an_unknown_kind_imports_nothing_and_says_what_does(
-        self, tmp_path, monkeypatch, capsys
-    ):
-        (tmp_path / "OwnUnheard.py").write_text("raise AssertionError")
-        (tmp_path / "arm.toml").write_text(designed("OwnUnheard"))
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.chdir(tmp_path)
-        assert run(["design", "arm.toml"]) == 2
-        said = capsys.readouterr().err
-        assert "actuators[2].kind = 'OwnUnheard': must be one of fiber" in said
-        assert said.rstrip().endswith("on the command line by --import")
-        assert "OwnUnheard" not in sys.modules
-
-    def test_an_unknown_metric_says_what_imports_one(self, tmp_path, capsys):
-        store = str(tmp_path / "a.zarr")
-        vary = ["--vary", "taper_deg=0,1"]
-        assert run(["atlas", "build", store, *vary, "--metrics", "own_unheard"]) == 2
-        said = capsys.readouterr().err
-        assert "metrics = 'own_unheard': must be some of extent" in said
-        assert "--import" in said
+def test_an_unknown_kind_or_metric_imports_nothing_and_says_what_does(
+    tmp_path, monkeypatch, capsys
+):
+    (tmp_path / "OwnUnheard.py").write_text("raise AssertionError")
+    (tmp_path / "arm.toml").write_text(designed("OwnUnheard"))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    vary = ["--vary", "taper_deg=0,1", "--metrics", "OwnUnheard"]
+    for words in (["design", "arm.toml"], ["atlas", "build", "a.zarr", *vary]):
+        assert run(words) == 2
+        assert "by --import" in capsys.readouterr().err
+    assert "OwnUnheard" not in sys.modules
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """A maker of installed packages that declare entry points, as a folder has them."""
+    """A maker of an installed package that declares an actuator and a metric."""
 
-    def installed(name, text, entries):
+    def installed(name, text, kind, metric):
         (tmp_path / f"{name}.py").write_text(text)
-        info = tmp_path / f"{name}-1.0.dist-info"
-        info.mkdir()
+        (info := tmp_path / f"{name}-1.0.dist-info").mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-        lines = [f"[{group}]\n{key} = {value}\n" for group, key, value in entries]
+        entries = {"actuators": kind, "metrics": metric}
+        lines = [f"[softreach.{group}]\n{one} = {name}:{one}\n" for group, one in entries.items()]
         (info / "entry_points.txt").write_text("".join(lines))
+        (tmp_path / "arm.toml").write_text(designed(kind))
         monkeypatch.syspath_prepend(tmp_path)
-        made.append(name)
+        monkeypatch.delitem(sys.modules, name, raising=False)
 
-    made: list[str] = []
-    yield installed
-    for name in made:
-        sys.modules.pop(name, None)
+    return installed
 
 
-class TestEntryPoints:
-    def test_they_are_loaded_when_they_are_met_and_not_before(self, package, tmp_path, capsys):
-        text = WIRE.format(name="DeclaredWire", metric="declared_tip")
-        package(
-            "own_declared",
-            text,
-            [
-                (plugins.ACTUATORS, "DeclaredWire", "own_declared:DeclaredWire"),
-                (plugins.METRICS, "declared_tip", "own_declared:declared_tip"),
-            ],
-        )
-        (tmp_path / "arm.toml").write_text(designed("DeclaredWire"))
-        for words in (["--help"], ["list", "designs"], ["design", "minimal_trunk"]):
-            assert run(words) == 0
-            assert "own_declared" not in sys.modules
-        assert run(["design", str(tmp_path / "arm.toml")]) == 0
-        assert "own_declared" in sys.modules
-        capsys.readouterr()
-        assert printed_json(capsys, "list", "metrics")[-1]["metric"] == "declared_tip"
-        space = sr.DesignSpace.grid(designs.minimal_trunk(), taper=[0.0])
-        atlas = sr.build_atlas(space, tmp_path / "a.zarr", 50, metrics=["declared_tip"])
-        assert atlas.declared_tip.attrs["units"] == "m"
+def test_entry_points_are_loaded_when_they_are_met_and_not_before(package, tmp_path, printed):
+    package(
+        "own_declared",
+        WIRE.format(kind="DeclaredWire", metric="declared_tip"),
+        "DeclaredWire",
+        "declared_tip",
+    )
+    for words in (["--help"], ["list", "designs"], ["design", "minimal_trunk"]):
+        assert run(words) == 0
+    assert "own_declared" not in sys.modules
+    assert run(["design", str(tmp_path / "arm.toml")]) == 0
+    assert "own_declared" in sys.modules
+    assert printed("list", "metrics")[-1]["metric"] == "declared_tip"
+    space = sr.DesignSpace.grid(designs.minimal_trunk(), taper=[0.0])
+    atlas = sr.build_atlas(space, tmp_path / "a.zarr", 50, metrics=["declared_tip"])
+    assert atlas.declared_tip.attrs["units"] == "m"
 
-    def test_what_a_package_does_not_have_is_refused_in_one_line(self, package, tmp_path, capsys):
-        package(
-            "own_broken",
-            "import own_nowhere",
-            [
-                (plugins.ACTUATORS, "BrokenWire", "own_broken:BrokenWire"),
-                (plugins.METRICS, "broken_tip", "own_broken:broken_tip"),
-            ],
-        )
-        (tmp_path / "arm.toml").write_text(designed("BrokenWire"))
-        assert run(["design", str(tmp_path / "arm.toml")]) == 2
-        said = capsys.readouterr().err
-        assert said.startswith("error: entry point BrokenWire of own_broken = own_broken:BrokenWir")
-        assert said.count("\n") == 1
 
-    @pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
-    def test_a_broken_package_does_not_keep_the_others_from_a_list(self, package, capsys):
-        entry = (plugins.METRICS, "lost_tip", "own_lost:lost_tip")
-        package("own_lost", "import own_nowhere", [entry])
-        assert run(["list", "metrics"]) == 0
-        printed = capsys.readouterr()
-        assert "warning: entry point lost_tip of own_lost" in printed.err
-        assert "exact_volume" in printed.out
+@pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
+def test_a_broken_package_is_refused_in_one_line_and_missing_in_a_list(
+    package, tmp_path, refused, capsys
+):
+    package("own_broken", "import own_nowhere", "BrokenWire", "broken_tip")
+    said = refused("design", str(tmp_path / "arm.toml"))
+    assert said.startswith("error: entry point BrokenWire = own_broken:BrokenWire: must be")
+    assert run(["list", "metrics"]) == 0
+    printed = capsys.readouterr()
+    assert "warning: entry point broken_tip = own_broken" in printed.err
+    assert "exact_volume" in printed.out

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 
 import numpy as np
@@ -41,338 +40,286 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-class TestUnit:
-    @pytest.mark.parametrize(
-        ("name", "lengths", "areas", "volumes"),
-        [("m", 1.0, "m²", "m³"), ("cm", 100.0, "cm²", "liters"), ("mm", 1e3, "mm²", "mL")],
-    )
-    def test_volumes_have_units_of_their_own(self, name, lengths, areas, volumes):
-        unit = as_unit(name)
-        assert float(unit.of(1.0)) == pytest.approx(lengths)
-        assert (unit.symbol(2), unit.symbol(3)) == (areas, volumes)
-        assert unit.label("V", 3) == f"V [{volumes}]"
+@pytest.fixture
+def printed(capsys):
+    """What a command prints as JSON."""
 
-    def test_a_liter_is_a_cube_of_ten_centimeters(self):
-        cube = 0.1**3
-        assert float(as_unit("cm").of(cube, 3)) == pytest.approx(1.0)
-        assert float(as_unit("mm").of(cube, 3)) == pytest.approx(1e3)
-        assert float(as_unit("L", 0.1).of(cube, 3)) == pytest.approx(1.0)
+    def of(*words):
+        capsys.readouterr()
+        assert run([*words, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
 
-    def test_a_value_ends_with_the_first_digit_of_its_error(self):
-        assert as_unit("mm").text(6.322431e-4, 3, 2.4e-7) == "632.2 ± 0.2 mL"
-        assert as_unit("L", 2.0).text(0.25) == "0.125 L"
+    return of
 
-    @pytest.mark.parametrize("name", ["", "M", "inch", "um", "mL", None, 1, ["mm"]])
-    def test_other_units_are_refused(self, name):
+
+@pytest.mark.parametrize(
+    ("name", "lengths", "areas", "volumes", "liters"),
+    [
+        ("m", 1.0, "m²", "m³", 1e-3),
+        ("cm", 1e2, "cm²", "liters", 1.0),
+        ("mm", 1e3, "mm²", "mL", 1e3),
+    ],
+)
+def test_areas_and_volumes_have_units_of_their_own(name, lengths, areas, volumes, liters):
+    unit = as_unit(name)
+    assert float(unit.of(1.0)) == pytest.approx(lengths)
+    assert float(unit.of(0.1**3, 3)) == pytest.approx(liters)
+    assert (unit.symbol(2), unit.symbol(3)) == (areas, volumes)
+    assert unit.label("V", 3) == f"V [{volumes}]"
+
+
+def test_a_value_ends_with_the_first_digit_of_its_error():
+    assert as_unit("mm").text(6.322431e-4, 3, 2.4e-7) == "632.2 ± 0.2 mL"
+    assert as_unit("L", 2.0).text(0.25) == "0.125 L"
+
+
+def test_other_units_are_refused_and_l_without_an_arm():
+    for name in ("M", "mL", None, ["mm"]):
         with pytest.raises(InvalidInput, match=r"unit = .*: must be one of m, cm, mm, L"):
             as_unit(name, 1.0)
-
-    def test_l_needs_an_arm(self):
-        with pytest.raises(InvalidInput, match="one of m, cm, mm; the length L of the arm is not"):
-            as_unit("L")
+    with pytest.raises(InvalidInput, match="one of m, cm, mm; the length L of the arm is not"):
+        as_unit("L")
 
 
-class TestTyped:
-    @given(value=st.floats(-1e6, 1e6), place=st.sampled_from(["", " "]))
-    def test_a_length_with_its_unit_is_that_without(self, value, place):
-        assert read_length(f"{value!r}{place}m") == read_length(repr(value)) == value
-        for unit, size in (("cm", 1e-2), ("mm", 1e-3)):
-            assert read_length(f"{value!r}{place}{unit}") == pytest.approx(value * size, rel=1e-15)
-        assert read_length(f"{value!r}{place}L", 2.0) == 2.0 * value
+# What is typed
 
-    @pytest.mark.parametrize(
-        "text",
-        ["80mm,50mm,-240", "80,50,-240mm", "1ft,2ft,3ft", "1mm,2mm", "1mm,2mm,3mm,4mm", "mm,mm,mm"],
-    )
-    def test_a_vector_has_all_units_or_none(self, text):
+
+@given(value=st.floats(-1e6, 1e6), place=st.sampled_from(["", " "]))
+def test_a_length_with_its_unit_is_that_without(value, place):
+    assert read_length(f"{value!r}{place}m") == read_length(repr(value)) == value
+    for unit, size in (("cm", 1e-2), ("mm", 1e-3)):
+        assert read_length(f"{value!r}{place}{unit}") == pytest.approx(value * size, rel=1e-15)
+    assert read_length(f"{value!r}{place}L", 2.0) == 2.0 * value
+
+
+def test_a_vector_has_all_units_or_none():
+    assert lengths_in("80mm, 5cm, -0.24m", 3) == [0.08, 0.05, -0.24]
+    assert lengths_in("1L,2L,3L", 3, 0.5) == [0.5, 1.0, 1.5]
+    for text in (
+        "80mm,50mm,-240",
+        "80,50,-240mm",
+        "1ft,2ft,3ft",
+        "1mm,2mm",
+        "mm,mm,mm",
+        "1L,2L,3L",
+    ):
         assert lengths_in(text, 3) is None
 
-    def test_each_number_may_have_a_unit_of_its_own(self):
-        assert lengths_in("80mm, 5cm, -0.24m", 3) == [0.08, 0.05, -0.24]
-        assert lengths_in("1L,2L,3L", 3, 0.5) == [0.5, 1.0, 1.5]
-        assert lengths_in("1L,2L,3L", 3) is None
 
-    @pytest.mark.parametrize("typed", ["30mm,20mm,60mm", "3cm,20mm,0.06m", "0.6L,0.4L,1.2L"])
-    def test_a_target_is_the_same_in_any_unit(self, typed, folder, capsys):
-        sr.designs.minimal_trunk(length=0.05).save("arm.toml")
-        records = []
-        for text in (typed, "0.03,0.02,0.06"):
-            assert run(["solve", "arm.toml", "--target", text, "--json"]) == 0
-            records.append(json.loads(capsys.readouterr().out)[0])
-        assert records[0]["target_m"] == pytest.approx(records[1]["target_m"], rel=1e-15)
-        assert records[0]["gap_m"] == pytest.approx(records[1]["gap_m"])
-
-    @pytest.mark.parametrize(
-        "header", ["x_mm,y_mm,z_mm", "x [mm],y [mm],z [mm]", '"x_mm","y_mm","z_mm"', "x,y,z"]
+@pytest.mark.parametrize("typed", ["30mm,20mm,60mm", "3cm,20mm,0.06m", "0.6L,0.4L,1.2L"])
+def test_a_target_is_the_same_in_any_unit(typed, folder, printed):
+    sr.designs.minimal_trunk(length=0.05).save("arm.toml")
+    told, plain = (
+        printed("solve", "arm.toml", "--target", text)[0] for text in (typed, "0.03,0.02,0.06")
     )
-    def test_a_file_says_its_unit_in_its_header(self, header, folder, capsys):
-        row = "30,20,60" if "mm" in header else "30mm,20mm,60mm"
-        (folder / "places.csv").write_text(f"{header}\n{row}\n")
-        assert run(["solve", "lce_arm", "--targets", "places.csv", "--json"]) == 0
-        assert json.loads(capsys.readouterr().out)[0]["target_m"] == [0.03, 0.02, 0.06]
-
-    @pytest.mark.parametrize("alpha", ["40cm", "400mm", "0.4", "0.4m", "0.4L"])
-    def test_a_radius_is_the_same_in_any_unit(self, alpha, folder, capsys):
-        assert run(["volume", "minimal_trunk", "--n", "3000", "--alpha", alpha, "--json"]) == 0
-        assert json.loads(capsys.readouterr().out)["alpha_m"] == 0.4
+    assert told["target_m"] == pytest.approx(plain["target_m"], rel=1e-15)
+    assert told["gap_m"] == pytest.approx(plain["gap_m"])
 
 
-def numbers_of(path) -> np.ndarray:
-    """Vertices of a mesh, or places of a table."""
-    if path.suffix == ".csv":
-        return np.loadtxt(path, delimiter=",", skiprows=1)[:, :3]
-    if path.suffix == ".npz":
-        with np.load(path) as arrays:
-            return arrays["tip"]
-    if path.suffix in (".vtu", ".vtk", ".parquet"):
-        if path.suffix == ".parquet":
-            table = pytest.importorskip("pyarrow.parquet").read_table(path)
-            return np.stack([table[name].to_numpy() for name in "xyz"], axis=1)
-        return pytest.importorskip("meshio").read(path).points
-    loaded = pytest.importorskip("trimesh").load(path)
-    return np.asarray(loaded.bounds)
+@pytest.mark.parametrize(
+    "header", ["x_mm,y_mm,z_mm", "x [mm],y [mm],z [mm]", '"x_mm","y_mm","z_mm"', "x,y,z"]
+)
+def test_a_file_says_its_unit_in_its_header(header, folder, printed):
+    row = "30,20,60" if "mm" in header else "30mm,20mm,60mm"
+    (folder / "places.csv").write_text(f"{header}\n{row}\n")
+    (one,) = printed("solve", "lce_arm", "--targets", "places.csv")
+    assert one["target_m"] == [0.03, 0.02, 0.06]
 
 
-class TestWritten:
-    @pytest.mark.parametrize("suffix", [".ply", ".stl", ".obj", ".glb", ".vtu", ".vtk"])
-    def test_a_mesh_in_mm_is_a_thousand_times_one_in_m(self, suffix, lce, shape, tmp_path):
-        pytest.importorskip("trimesh")
-        hull = sr.convex_hull(shape["position"].values + np.random.default_rng(0).random((1, 3)))
-        for write, given_in in ((export.export_arm, (lce, shape)), (export.export_mesh, (hull,))):
-            places = {}
-            for unit in ("m", "mm"):
-                path = tmp_path / f"{unit}{suffix}"
-                write(*given_in, path, unit=unit, overwrite=True)
-                places[unit] = numbers_of(path)
-            np.testing.assert_allclose(places["mm"], 1e3 * places["m"], rtol=1e-6, atol=1e-6)
-
-    @pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet", ".vtu", ".ply"])
-    def test_a_table_in_mm_is_a_thousand_times_one_in_m(self, suffix, cloud, tmp_path):
-        pytest.importorskip("pyarrow")
-        for unit in ("m", "mm"):
-            export.export_cloud(cloud, tmp_path / f"{unit}{suffix}", unit=unit)
-        mm, m = (numbers_of(tmp_path / f"{unit}{suffix}") for unit in ("mm", "m"))
-        np.testing.assert_allclose(mm, 1e3 * m, rtol=1e-12)
-
-    @pytest.mark.parametrize(
-        ("unit", "name"), [("m", "x"), ("cm", "x_cm"), ("mm", "x_mm"), ("L", "x_over_length")]
-    )
-    def test_a_table_says_its_unit_and_replaces_one_in_another(self, unit, name, cloud, tmp_path):
-        pytest.importorskip("pyarrow")
-        for before in UNITS:
-            export.export_cloud(cloud, tmp_path / "cloud.csv", unit=before)
-            export.export_cloud(cloud, tmp_path / "cloud.csv", unit=unit)
-        assert (tmp_path / "cloud.csv").read_text().startswith(f'"{name}",')
-        export.export_cloud(cloud, tmp_path / "cloud.npz", unit=unit)
-        with np.load(tmp_path / "cloud.npz") as arrays:
-            assert str(arrays["tip_units"]) == unit
-
-    @pytest.mark.parametrize(
-        ("options", "unit", "size"), [([], "m", 1.0), (["--unit", "mm"], "mm", 1e3)]
-    )
-    def test_the_command_line_writes_meters_unless_asked_and_says_so(
-        self, options, unit, size, folder, shape, capsys
-    ):
-        trimesh = pytest.importorskip("trimesh")
-        arguments = ["export", "lce_arm", "arm.stl", "--activation=-1,0,-0.4", *options]
-        assert run(arguments) == 0
-        streams = capsys.readouterr()
-        assert (streams.out, streams.err) == ("arm.stl\n", f"arm.stl: lengths in {unit}\n")
-        top = trimesh.load("arm.stl").bounds[1, 2]
-        assert top == pytest.approx(size * float(shape.position[:, 2].max()), rel=0.1)
-
-    def test_a_mesh_alone_has_no_l(self, tmp_path):
-        mesh = (np.eye(3), [[0, 1, 2]])
-        with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
-            export.export_mesh(mesh, tmp_path / "a.stl", unit="L")
+@pytest.mark.parametrize("alpha", ["40cm", "400mm", "0.4", "0.4m", "0.4L"])
+def test_a_radius_is_the_same_in_any_unit(alpha, printed):
+    assert printed("volume", "minimal_trunk", "--n", "3000", "--alpha", alpha)["alpha_m"] == 0.4
 
 
-FIGURES = ("arm", "cloud", "slab", "views", "hull", "slice", "slices")
-FIGURES += ("section", "equilibria", "compliance")
+# What is written
 
 
-def drawings(arm, shape, cloud):
-    """Figures with axes of lengths, as functions of the unit."""
+@pytest.mark.parametrize("suffix", [".ply", ".glb"])
+def test_a_mesh_in_mm_is_a_thousand_times_one_in_m(suffix, lce, shape, cloud, tmp_path):
+    trimesh = pytest.importorskip("trimesh")
     hull = sr.convex_hull(cloud.tip)
-    reached = sr.reachable_set(arm, accuracy=0.2).grid
-    return {
-        "arm": lambda unit: plot.plot_arm(arm, shape, unit=unit),
-        "cloud": lambda unit: plot.plot_cloud(cloud, unit=unit),
-        "slab": lambda unit: plot.plot_slab(cloud, thickness=0.02, unit=unit),
-        "views": lambda unit: plot.plot_views(cloud, arm, shape, unit=unit).axes[0],
-        "hull": lambda unit: plot.plot_hull(hull, unit=unit),
-        "slice": lambda unit: plot.plot_slice(reached, unit=unit),
-        "slices": lambda unit: plot.plot_slices(reached, unit=unit).axes[1],
-        "section": lambda unit: plot.plot_cross_section(arm, unit=unit),
-        "equilibria": lambda unit: plot.plot_equilibria(sr.equilibria(arm, [0, 0, 0]), unit=unit),
-        "compliance": lambda unit: plot.plot_compliance(arm, shape, 1e-2 * np.eye(3), unit=unit),
-    }
+    for write, given_in in ((export.export_arm, (lce, shape)), (export.export_mesh, (hull,))):
+        bounds = {}
+        for unit in ("m", "mm"):
+            write(*given_in, path := tmp_path / f"{unit}{suffix}", unit=unit, overwrite=True)
+            bounds[unit] = trimesh.load(path).bounds
+        np.testing.assert_allclose(bounds["mm"], 1e3 * bounds["m"], rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "name"), [("m", "x"), ("cm", "x_cm"), ("mm", "x_mm"), ("L", "x_over_length")]
+)
+def test_a_table_says_its_unit_and_is_in_it(unit, name, cloud, tmp_path):
+    pytest.importorskip("pyarrow")
+    export.export_cloud(cloud, tmp_path / "cloud.csv", unit=unit)
+    assert (tmp_path / "cloud.csv").read_text().startswith(f'"{name}",')
+    written = np.loadtxt(tmp_path / "cloud.csv", delimiter=",", skiprows=1)[:, :3]
+    size = as_unit(unit, float(cloud.tip.attrs["length"])).size
+    np.testing.assert_allclose(written, cloud.tip / size, rtol=1e-12)
+    export.export_cloud(cloud, tmp_path / "cloud.npz", unit=unit)
+    with np.load(tmp_path / "cloud.npz") as arrays:
+        assert str(arrays["tip_units"]) == unit
+
+
+@pytest.mark.parametrize(
+    ("options", "unit", "size"), [([], "m", 1.0), (["--unit", "mm"], "mm", 1e3)]
+)
+def test_the_command_line_writes_meters_unless_asked_and_says_so(
+    options, unit, size, folder, shape, capsys
+):
+    trimesh = pytest.importorskip("trimesh")
+    assert run(["export", "lce_arm", "arm.stl", "--activation=-1,0,-0.4", *options]) == 0
+    streams = capsys.readouterr()
+    assert (streams.out, streams.err) == ("arm.stl\n", f"arm.stl: lengths in {unit}\n")
+    top = trimesh.load("arm.stl").bounds[1, 2]
+    assert top == pytest.approx(size * float(shape.position[:, 2].max()), rel=0.1)
+
+
+def test_a_mesh_alone_has_no_l(tmp_path):
+    with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
+        export.export_mesh((np.eye(3), [[0, 1, 2]]), tmp_path / "a.stl", unit="L")
+
+
+# What is drawn
 
 
 @pytest.fixture(scope="module")
 def figures(lce, shape, cloud):
-    return drawings(lce, shape, cloud)
+    """Figures with axes of lengths, as functions of the unit."""
+    hull = sr.convex_hull(cloud.tip)
+    reached = sr.reachable_set(lce, accuracy=0.2).grid
+    return {
+        "arm": lambda unit: plot.plot_arm(lce, shape, unit=unit),
+        "cloud": lambda unit: plot.plot_cloud(cloud, unit=unit),
+        "slab": lambda unit: plot.plot_slab(cloud, thickness=0.02, unit=unit),
+        "views": lambda unit: plot.plot_views(cloud, lce, shape, unit=unit).axes[0],
+        "hull": lambda unit: plot.plot_hull(hull, unit=unit),
+        "slice": lambda unit: plot.plot_slice(reached, unit=unit),
+        "slices": lambda unit: plot.plot_slices(reached, unit=unit).axes[1],
+        "section": lambda unit: plot.plot_cross_section(lce, unit=unit),
+        "equilibria": lambda unit: plot.plot_equilibria(sr.equilibria(lce, [0, 0, 0]), unit=unit),
+        "compliance": lambda unit: plot.plot_compliance(lce, shape, 1e-2 * np.eye(3), unit=unit),
+    }
 
 
-class TestDrawn:
-    @pytest.mark.parametrize("name", FIGURES)
-    def test_a_picture_in_mm_is_a_thousand_times_one_in_m(self, name, figures):
-        limits = {}
-        for unit in ("m", "mm"):
-            ax = figures[name](unit)
-            limits[unit] = np.array([ax.get_xlim(), ax.get_ylim()])
-            assert ax.get_xlabel() == f"x [{unit}]"
-        np.testing.assert_allclose(limits["mm"], 1e3 * limits["m"], rtol=1e-9)
-
-    def test_curvature_is_per_unit_of_length(self, lce, cloud):
-        statistics = {"arm": sr.curvature.curvature_statistics(cloud)}
-        tops = {unit: plot.plot_curvature(statistics, unit=unit) for unit in ("m", "mm", "L")}
-        assert tops["mm"].get_ylabel() == "κ [1/mm]"
-        top = {unit: ax.get_ylim()[1] for unit, ax in tops.items()}
-        assert top["m"] == pytest.approx(1e3 * top["mm"])
-        assert top["L"] == pytest.approx(lce.length * top["m"])
-
-    def test_volumes_are_drawn_in_milliliters(self):
-        ax = plot.plot_volume_curve({"cloud": [1e-4, 2e-4]}, [0.01, 0.02], unit="mm")
-        assert ax.get_ylabel() == "V [mL]"
-        np.testing.assert_allclose(ax.lines[0].get_xydata(), [[10.0, 100.0], [20.0, 200.0]])
-
-    def test_pictures_in_different_units_do_not_share_axes(self, cloud, lce, shape):
-        ax = plot.plot_cloud(cloud, unit="mm")
-        plot.plot_arm(lce, shape, ax=ax, unit="mm")
-        with pytest.raises(InvalidInput, match="ax = counted in mm: must be in cm"):
-            plot.plot_arm(lce, shape, ax=ax, unit="cm")
-
-    def test_a_cloud_that_does_not_know_its_length_has_no_l(self, cloud):
-        del (unknown := cloud.copy())["tip"].attrs["length"]
-        assert plot.plot_cloud(unknown).get_xlabel() == "x [m]"
-        with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
-            plot.plot_cloud(unknown, unit="L")
+def test_a_picture_in_mm_is_a_thousand_times_one_in_m(figures):
+    for draw in figures.values():
+        mm, m = draw("mm"), draw("m")
+        assert (mm.get_xlabel(), m.get_xlabel()) == ("x [mm]", "x [m]")
+        limits = [np.array([ax.get_xlim(), ax.get_ylim()]) for ax in (mm, m)]
+        np.testing.assert_allclose(limits[0], 1e3 * limits[1], rtol=1e-9)
 
 
-COMMANDS = [
-    ["design", "lce_arm"],
-    ["reach", "lce_arm"],
-    ["cloud", "lce_arm", "--n", "10"],
-    ["volume", "lce_arm"],
-    ["payload", "lce_arm", "--gravity", "down"],
-    ["solve", "lce_arm", "--target", "0,0,0.05"],
-    ["track", "lce_arm", "path.csv"],
-    ["equilibria", "lce_arm"],
-    ["show", "lce_arm"],
-    ["export", "lce_arm", "arm.stl"],
-    ["demo"],
-]
+def test_curvatures_are_per_unit_and_volumes_in_milliliters(lce, cloud):
+    statistics = {"arm": sr.curvature.curvature_statistics(cloud)}
+    tops = {unit: plot.plot_curvature(statistics, unit=unit) for unit in ("m", "mm", "L")}
+    assert tops["mm"].get_ylabel() == "κ [1/mm]"
+    top = {unit: ax.get_ylim()[1] for unit, ax in tops.items()}
+    assert top["m"] == pytest.approx(1e3 * top["mm"])
+    assert top["L"] == pytest.approx(lce.length * top["m"])
+    ax = plot.plot_volume_curve({"cloud": [1e-4, 2e-4]}, [0.01, 0.02], unit="mm")
+    assert ax.get_ylabel() == "V [mL]"
+    np.testing.assert_allclose(ax.lines[0].get_xydata(), [[10.0, 100.0], [20.0, 200.0]])
 
 
-class TestCommands:
-    @pytest.mark.parametrize("arguments", COMMANDS, ids=lambda words: words[0])
-    @pytest.mark.parametrize("unit", ["ft", "mL"])
-    def test_a_unit_that_does_not_exist_costs_one_line(self, arguments, unit, folder, capsys):
-        assert run([*arguments, "--unit", unit]) == 2
+def test_pictures_in_different_units_do_not_share_axes(cloud, lce, shape):
+    ax = plot.plot_cloud(cloud, unit="mm")
+    plot.plot_arm(lce, shape, ax=ax, unit="mm")
+    with pytest.raises(InvalidInput, match="ax = counted in mm: must be in cm"):
+        plot.plot_arm(lce, shape, ax=ax, unit="cm")
+
+
+# Commands and files of designs
+
+
+def test_a_unit_that_does_not_exist_costs_one_line(folder, capsys):
+    for command in ("design", "reach", "cloud", "volume", "payload", "equilibria", "show", "demo"):
+        words = [command, "lce_arm"][: 1 if command == "demo" else 2]
+        assert run([*words, "--unit", "ft"]) == 2
         streams = capsys.readouterr()
-        assert streams.err == f"error: unit = '{unit}': must be one of m, cm, mm, L\n"
+        assert streams.err == "error: unit = 'ft': must be one of m, cm, mm, L\n"
         assert streams.out == ""
-        assert not list(folder.iterdir())
+    assert not list(folder.iterdir())
 
-    @pytest.mark.parametrize("target", ["80mm,50mm,-240", "0,0,5inch", "1mm,2mm"])
-    def test_mixed_or_unknown_units_cost_one_line(self, target, capsys):
-        assert run(["solve", "lce_arm", "--target", target]) == 2
+
+def test_mixed_or_unknown_units_of_targets_cost_one_line(folder, capsys):
+    (folder / "places.csv").write_text("x [inch],y [inch],z [inch]\n1,2,3\n")
+    for words, said in {
+        ("--target", "80mm,50mm,-240"): "target = 80mm,50mm,-240: must be three comma-separated",
+        ("--target", "0,0,5inch"): "or each with its unit (m, cm, mm, um, µm, L)",
+        ("--targets", "places.csv"): "error: places.csv, header = x [inch]",
+    }.items():
+        assert run(["solve", "lce_arm", *words]) == 2
         error = capsys.readouterr().err
-        assert error.startswith(f"error: target = {target}: must be three comma-separated numbers")
-        assert "or each with its unit (m, cm, mm, um, µm, L)" in error
+        assert said in error
         assert error.count("\n") == 1
 
-    def test_a_header_with_an_unknown_unit_costs_one_line(self, folder, capsys):
-        (folder / "places.csv").write_text("x [inch],y [inch],z [inch]\n1,2,3\n")
-        assert run(["solve", "lce_arm", "--targets", "places.csv"]) == 2
-        error = capsys.readouterr().err
-        assert error.startswith("error: places.csv, header = x [inch]")
-        assert error.count("\n") == 1
 
-    def test_numbers_for_machines_do_not_depend_on_the_unit(self, capsys):
-        facts = {}
-        for unit in UNITS:
-            arguments = [
-                "volume",
-                "lce_arm",
-                "--n",
-                "3000",
-                "--alpha",
-                "0.4L",
-                "--json",
-                "--unit",
-                unit,
-            ]
-            assert run(arguments) == 0
-            facts[unit] = json.loads(capsys.readouterr().out)
-            assert facts[unit] == facts["m"]
-        cube = sr.designs.lce_arm().length ** 3
-        assert facts["m"]["volume_m3"] == pytest.approx(cube * facts["m"]["volume_L3"])
-
-    @pytest.mark.parametrize(
-        ("length", "options", "shown"),
-        [
-            (0.999, [], "999 mm"),
-            (1.0, [], "1 m"),
-            (0.3, ["--unit", "cm"], "30 cm"),
-            (2.0, ["--unit", "L"], "1 L"),
-        ],
-    )
-    def test_a_length_is_shown_in_a_handy_unit_or_the_one_asked_for(
-        self, length, options, shown, folder, capsys
-    ):
-        sr.designs.minimal_trunk(length=length).save("arm.toml")
-        assert run(["design", "arm.toml", *options]) == 0
-        assert re.search(rf"^  length +{shown}$", capsys.readouterr().out, re.MULTILINE)
-
-    def test_the_volume_is_shown_with_its_error(self, capsys):
-        assert run(["reach", "lce_arm", "--accuracy", "0.05"]) == 0
-        text = capsys.readouterr().out
-        assert re.search(r"^  volume +\d+(\.\d+)? ± \d+(\.\d+)? mL$", text, re.MULTILINE)
-        assert "volume error" not in text
+def test_numbers_for_machines_do_not_depend_on_the_unit(lce, printed):
+    asked = ["volume", "lce_arm", "--n", "3000", "--alpha", "0.4L", "--unit"]
+    facts, *others = (printed(*asked, unit) for unit in UNITS)
+    assert others == [facts] * 3
+    assert facts["volume_m3"] == pytest.approx(lce.length**3 * facts["volume_L3"])
 
 
-class TestDesignFile:
-    def test_the_unit_of_a_file_is_that_of_what_is_shown_and_written(self, folder, capsys):
-        trimesh = pytest.importorskip("trimesh")
-        assert run(["design", "lce_arm", "--unit", "cm", "--out", "arm.toml"]) == 0
-        assert (folder / "arm.toml").read_text().endswith('\n[display]\nunit = "cm"\n')
-        capsys.readouterr()
-        assert run(["design", "arm.toml"]) == 0
-        assert re.search(r"^  length +9 cm$", capsys.readouterr().out, re.MULTILINE)
-        assert run(["export", "arm.toml", "arm.stl", "--activation", "0,0,0"]) == 0
-        assert trimesh.load("arm.stl").bounds[1, 2] == pytest.approx(9.0)
-        assert "lengths in cm" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("length", "options", "shown"),
+    [
+        (0.999, [], "999 mm"),
+        (1.0, [], "1 m"),
+        (0.3, ["--unit", "cm"], "30 cm"),
+        (2.0, ["--unit", "L"], "1 L"),
+    ],
+)
+def test_a_length_is_shown_in_a_handy_unit_or_the_one_asked_for(
+    length, options, shown, folder, capsys
+):
+    sr.designs.minimal_trunk(length=length).save("arm.toml")
+    assert run(["design", "arm.toml", *options]) == 0
+    assert re.search(rf"^  length +{shown}$", capsys.readouterr().out, re.MULTILINE)
 
-    def test_the_unit_is_no_part_of_the_design(self, lce, tmp_path):
-        shown = lce.replace(display_unit="mm")
-        assert shown == lce
-        assert hash(shown) == hash(lce)
-        assert shown.to_toml() == lce.to_toml()
-        shown.save(tmp_path / "arm.toml")
-        again = sr.Manipulator.load(tmp_path / "arm.toml")
-        assert (again, again.display_unit) == (lce, "mm")
-        assert again.replace(loads=None).display_unit == "mm"
 
-    @pytest.mark.parametrize(
-        ("table", "fault"),
-        [
-            ('[display]\nunit = "ft"', "display.unit = 'ft': must be one of m, cm, mm, L"),
-            ("[display]\nunit = 3", "display.unit = 3: must be one of m, cm, mm, L"),
-            ('[display]\nunits = "mm"', "display.units = 'mm': unknown key"),
-            ("display = 1", "display = 1: must be a table"),
-        ],
-    )
-    def test_other_units_and_keys_are_refused(self, table, fault, lce):
-        text = lce.to_toml()
-        text = f"{text}\n{table}\n" if table.startswith("[") else f"{table}\n{text}"
-        with pytest.raises(InvalidDesign, match=re.escape(fault)):
-            sr.Manipulator.from_toml(text)
+def test_the_volume_is_shown_with_its_error(capsys):
+    assert run(["reach", "lce_arm", "--accuracy", "0.05"]) == 0
+    text = capsys.readouterr().out
+    assert re.search(r"^  volume +\d+(\.\d+)? ± \d+(\.\d+)? mL$", text, re.MULTILINE)
+    assert "volume error" not in text
 
-    def test_a_design_is_shown_in_no_other_unit(self, lce):
-        with pytest.raises(InvalidDesign, match="display_unit = 'ft': must be one of"):
-            lce.replace(display_unit="ft")
+
+def test_the_unit_of_a_file_is_that_of_what_is_shown_and_written(folder, capsys):
+    trimesh = pytest.importorskip("trimesh")
+    assert run(["design", "lce_arm", "--unit", "cm", "--out", "arm.toml"]) == 0
+    assert (folder / "arm.toml").read_text().endswith('\n[display]\nunit = "cm"\n')
+    capsys.readouterr()
+    assert run(["design", "arm.toml"]) == 0
+    assert re.search(r"^  length +9 cm$", capsys.readouterr().out, re.MULTILINE)
+    assert run(["export", "arm.toml", "arm.stl", "--activation", "0,0,0"]) == 0
+    assert trimesh.load("arm.stl").bounds[1, 2] == pytest.approx(9.0)
+    assert "lengths in cm" in capsys.readouterr().err
+
+
+def test_the_unit_is_no_part_of_the_design(lce, tmp_path):
+    shown = lce.replace(display_unit="mm")
+    assert (shown, hash(shown), shown.to_toml()) == (lce, hash(lce), lce.to_toml())
+    shown.save(tmp_path / "arm.toml")
+    again = sr.Manipulator.load(tmp_path / "arm.toml")
+    assert (again, again.display_unit) == (lce, "mm")
+    assert again.replace(loads=None).display_unit == "mm"
+
+
+@pytest.mark.parametrize(
+    ("table", "fault"),
+    [
+        ('unit = "ft"', "display.unit = 'ft': must be one of m, cm, mm, L"),
+        ('units = "mm"', "display.units = 'mm': unknown key"),
+    ],
+)
+def test_other_units_and_keys_of_a_file_are_refused(table, fault, lce):
+    with pytest.raises(InvalidDesign, match=re.escape(fault)):
+        sr.Manipulator.from_toml(f"{lce.to_toml()}\n[display]\n{table}\n")
+
+
+# Sizes that are likely mistakes
 
 
 def straight(length, radius):
@@ -383,41 +330,37 @@ def straight(length, radius):
     )
 
 
-class TestScale:
-    @pytest.mark.parametrize("name", sr.designs.__all__)
-    def test_named_designs_are_of_a_size_that_arms_have(self, name):
+def test_sizes_that_arms_have_are_not_warned_of():
+    for name in sr.designs.__all__:
         arm = getattr(sr.designs, name)()
         assert scale_warnings(arm.profile, arm.section) == ()
+    assert not any("slender" in line for line in design_warnings(straight(0.3, 0.06)))
 
-    @pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
-    @pytest.mark.parametrize(
-        ("length", "radius", "cause"),
-        [
-            (300.0, 12.0, r"the arm is 300 m long; if that is meant in mm: .* 300 mm are 0\.3"),
-            (0.3, 12.0, r"0\.025 times as long .* if that is meant in mm: .* 12 mm are 0\.012"),
-            (0.3, 0.061, r"4\.92 times as long as its outer radius .* is it a diameter\?"),
-        ],
+
+@pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
+@pytest.mark.parametrize(
+    ("length", "radius", "cause"),
+    [
+        (300.0, 12.0, r"the arm is 300 m long; if that is meant in mm: .* 300 mm are 0\.3"),
+        (0.3, 12.0, r"0\.025 times as long .* if that is meant in mm: .* 12 mm are 0\.012"),
+        (0.3, 0.061, r"4\.92 times as long as its outer radius .* is it a diameter\?"),
+    ],
+)
+def test_a_file_with_a_likely_mistake_is_told_its_cause_once(length, radius, cause, folder, capsys):
+    arm = straight(length, radius)
+    arm.save("arm.toml")
+    with pytest.warns(SoftreachWarning, match=rf"arm\.toml: .*{cause}") as told:
+        assert sr.Manipulator.load("arm.toml") == arm
+    assert len(told) == 1
+    for command in (["design", "arm.toml"], ["solve", "arm.toml", "--target", "0,0,0"]):
+        assert run(command) == 0
+        assert len(re.findall(cause, capsys.readouterr().err)) == 1
+
+
+def test_what_weighs_as_a_mountain_is_told_its_mass(lce):
+    text = lce.to_toml().replace("length_m = 0.09", "length_m = 90.0")
+    text = text.replace("outer_radius_m = 0.0045", "outer_radius_m = 4.5")
+    assert re.search(
+        r"90 m long and weighs \d\.\d\de\+0\d kg",
+        design_warnings(sr.Manipulator.from_toml(text))[0],
     )
-    def test_a_file_with_a_likely_mistake_is_told_its_cause_once(
-        self, length, radius, cause, folder, capsys
-    ):
-        arm = straight(length, radius)
-        arm.save("arm.toml")
-        with pytest.warns(SoftreachWarning, match=rf"arm\.toml: .*{cause}") as told:
-            assert sr.Manipulator.load("arm.toml") == arm
-        assert len(told) == 1
-        for command in (["design", "arm.toml"], ["solve", "arm.toml", "--target", "0,0,0"]):
-            assert run(command) == 0
-            error = capsys.readouterr().err
-            assert len(re.findall(cause, error)) == 1
-
-    def test_what_weighs_as_a_mountain_is_told_its_mass(self, lce):
-        text = lce.to_toml().replace("length_m = 0.09", "length_m = 90.0")
-        text = text.replace("outer_radius_m = 0.0045", "outer_radius_m = 4.5")
-        (line,) = design_warnings(sr.Manipulator.from_toml(text))[:1]
-        assert re.search(r"90 m long and weighs \d\.\d\de\+0\d kg", line)
-
-    def test_slender_arms_are_not_warned_of(self):
-        arm = straight(0.3, 0.06)
-        assert math.isclose(arm.length / 0.06, 5.0)
-        assert not any("slender" in line for line in design_warnings(arm))

@@ -12,7 +12,6 @@ import softreach as sr
 from softreach.rod import tip_map
 from softreach.sampling import sample_cube
 from softreach.support.errors import SoftreachWarning, no_warnings, warn
-from softreach.support.memory import check_room
 from tests.bodies import rubber
 
 
@@ -33,13 +32,6 @@ def test_a_warning_names_the_line_of_the_caller(cause):
     with pytest.warns(SoftreachWarning) as caught:
         cause()
     assert {warning.filename for warning in caught} == {__file__}
-
-
-def test_room_that_is_nearly_all_there_is_is_told_to_the_caller(monkeypatch):
-    monkeypatch.setattr("softreach.support.memory.free_memory", lambda: 1e8)
-    with pytest.warns(SoftreachWarning) as caught:
-        check_room("n", 10**7, 1)
-    assert caught[0].filename == __file__
 
 
 def test_what_one_thread_silences_another_still_says():

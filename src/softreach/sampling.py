@@ -13,7 +13,6 @@ import numpy as np
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.memory import check_room
 
 __all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
 
@@ -21,7 +20,6 @@ Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 
 
-_LARGEST_SHOWN = 10**30  # more than any memory holds; larger ones would fill an error
 _LARGEST_SEED = 2**63 - 1  # what stores hold as a number
 
 
@@ -45,11 +43,9 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
         seed: Seed of random samplers.
 
     Raises:
-        InvalidInput: An unknown sampler, an n that the sampler cannot spread, or more points than
-            fit into memory.
+        InvalidInput: An unknown sampler, or an n that the sampler cannot spread.
     """
     n, seed = check_sampler(sampler, n, dim, seed)
-    check_room("n", n, dim)
     return next(cube_blocks(sampler, n, dim, seed, size=n))
 
 
@@ -68,8 +64,6 @@ def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
     """
     as_one_of("sampler", sampler, SAMPLERS)
     n = as_integer("n", n, 1)
-    if n > _LARGEST_SHOWN:
-        check_room("n", n, max(dim, 1))
     seed = as_integer("seed", seed, 0, _LARGEST_SEED)
     if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import resource
 import sys
@@ -15,7 +14,7 @@ import softreach as sr
 from softreach.exchange.activefilaments import write_cloud, write_design
 from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.plot import plot_3d, save_figure
-from softreach.support.errors import InvalidInput, NotWritten, SoftreachWarning
+from softreach.support.errors import NotWritten
 from softreach.support.files.atomic import writing
 from softreach.support.files.documents import sealed
 from softreach.support.files.kinds import PICTURES
@@ -377,68 +376,3 @@ def test_missing_extras_are_named_all_at_once(words, said, tmp_path, monkeypatch
     for library in ("trimesh", "matplotlib", "skimage", "jinja2"):
         monkeypatch.setitem(sys.modules, library, None)
     assert said in refusal_of(words.split(), capsys, tmp_path)
-
-
-def test_more_than_half_of_the_memory_is_announced(monkeypatch):
-    from softreach.support.memory import check_memory
-
-    monkeypatch.setattr("softreach.support.memory.free_memory", lambda: 1e9)
-    check_memory("n", 5, 4e8)
-    with pytest.warns(SoftreachWarning, match="n = 6 takes 600 MB of memory, of which 1 GB are"):
-        check_memory("n", 6, 6e8)
-    with pytest.raises(InvalidInput, match="n = 7: must be smaller: it takes 2 GB of memory"):
-        check_memory("n", 7, 2e9)
-
-
-LARGE = [name for name in WRITERS if name.startswith(("cloud.", "mesh.", "arm.", "pair."))]
-
-
-@pytest.mark.parametrize("name", LARGE)
-def test_an_output_that_the_disk_cannot_hold_is_not_begun(name, things, tmp_path, monkeypatch):
-    monkeypatch.setattr("softreach.support.memory._NOTICED", 0)
-    monkeypatch.setattr("softreach.support.memory.free_disk", lambda path: 100.0)
-    error = raised_by(lambda: WRITERS[name](things, tmp_path / "new" / name))
-    assert "of disk space, of which 100 bytes are free" in str(error)
-    assert not any(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", LARGE)
-def test_an_output_that_takes_most_of_the_disk_is_announced_and_written(
-    name, things, tmp_path, monkeypatch
-):
-    def free(path):
-        """Half as much again as is asked for, which the frame above knows."""
-        return 1.5 * sys._getframe(1).f_locals["needed"]
-
-    monkeypatch.setattr("softreach.support.memory._NOTICED", 0)
-    monkeypatch.setattr("softreach.support.memory.free_disk", free)
-    with pytest.warns(SoftreachWarning, match="of disk space, of which"):
-        WRITERS[name](things, tmp_path / name)
-    assert (tmp_path / name).exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (f"cloud {TRUNK} --n 1e6", "n = 1000000: must be smaller: it takes 49 MB of disk"),
-        ("demo --n 1e6", "n = 1000000: must be smaller: it takes 100 MB of disk space"),
-        ("paper", "out = paper/report.html: must be smaller: it takes 685 MB of disk space"),
-    ],
-)
-def test_a_command_says_first_what_the_disk_cannot_hold(
-    words, expected, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("softreach.support.memory.free_disk", lambda path: 2e7)
-    assert expected in refusal_of(words.split(), capsys, tmp_path)
-
-
-def test_cells_of_a_reachable_set_that_memory_cannot_hold_are_told_by_their_number(
-    trunk, monkeypatch
-):
-    image = dataclasses.replace(sr.reachable_set(trunk, accuracy=0.05).image)  # nothing counted
-    monkeypatch.setattr("softreach.support.memory._NOTICED", 0)
-    monkeypatch.setattr("softreach.support.memory.free_memory", lambda: 100.0)
-    error = raised_by(lambda: image.counts)
-    assert "cells of the lattice = " in str(error)
-    assert "of memory, of which 100 bytes are free" in str(error)

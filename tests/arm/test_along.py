@@ -163,7 +163,6 @@ TWO = {"stations_over_length": (0, 1)}
         (Samples, {**TWO, "values": (1, math.nan)}, r"values = \(1, nan\): must be 2 finite"),
         (Samples, {**TWO, "values": (True, False)}, r"values = \(True, False\): must be 2"),
         (Samples, {**TWO, "values": "01"}, "values = '01': must be 2"),
-        (Samples, {**TWO, "values": (0, 10**400)}, r"values = \(0, 1000.*must be 2"),
         (Samples, {"stations_over_length": (1, 0), "values": (1, 2)}, "rise from 0"),
         (Samples, {"stations_over_length": (0,), "values": (1,)}, "two or more"),
         (Samples, {**TWO, "values": (1, 2), "interpolation": "spline"}, "must be one of cubic, l"),
@@ -171,7 +170,6 @@ TWO = {"stations_over_length": (0, 1)}
         (fiber, {"angle": Samples(values=(0, 2), **TWO)}, "helical_angle = 2: "),
         (fiber, {"angle": (0.1, 0.2)}, r"helical_angle = \(0.1, 0.2\)"),
         (fiber, {"angle": True}, "helical_angle = True"),
-        (fiber, {"angle": 10**400}, "helical_angle = 1000"),
         (fiber, {"angle": 0.1, "revolution": 0.2}, "give exactly one of helical_angle and revol"),
         (
             fiber,
@@ -180,8 +178,8 @@ TWO = {"stations_over_length": (0, 1)}
         ),
         (
             fiber,
-            {"angle": 0.1, "end_over_length": 1e-300},
-            "end_over_length = 1e-300: must be above start_over_length = 0 by 1e-09 L at least",
+            {"angle": 0.1, "end_over_length": 1e-10},
+            "end_over_length = 1e-10: must be above start_over_length = 0",
         ),
         (fiber, {"angle": 0.1, "end_over_length": 1.1}, "end_over_length = 1.1: .*<= 1"),
         (fiber, {"angle": 0.1, "start_over_length": -0.1}, "start_over_length = -0.1: .*>= 0"),

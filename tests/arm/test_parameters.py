@@ -413,10 +413,10 @@ def test_all_that_is_helical_turns_in_its_own_sense():
         ({"pull.lower": -1.0}, ["pull.lower = -1: must be at least 0 N"]),
         ({"left.bundles": -1}, ["left.bundles = -1: must be a whole number >= 1"]),
         ({"left.bundles": 1, "left.lower[1]": -1.0}, ["left.lower[1] = -1: has no bundle"]),
-        ({"profile.radii[1]": -1.0}, ["profile.radii[1] = -1: must be a finite number >= 1e-12"]),
+        ({"profile.radii[1]": -1.0}, ["profile.radii[1] = -1: must be a finite number > 0 m"]),
         (
             {"outer_radius": 0.0},
-            ["outer_radius = 0: must be a finite number >= 1e-12"],
+            ["outer_radius = 0: must be a finite number > 0 m"],
         ),
         (
             {"left.helical_angle.stations_over_length[1]": 1.0},

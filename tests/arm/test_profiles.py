@@ -199,8 +199,7 @@ def test_a_profile_is_a_value(kind):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"length": 0.0}, "length = 0: .*>= 1e-09"),
-        ({"length": 10**400}, "length = 1000.*>= 1e-09"),
+        ({"length": 0.0}, "length = 0: .*> 0"),
         (
             {"stations_over_length": (0, 0.5, 0.5, 1)},
             "must be two or more numbers that rise from 0",
@@ -217,10 +216,7 @@ def test_a_profile_is_a_value(kind):
         ({"radii": (0.1, 0.1)}, r"radii = .*must be 3 finite numbers, one for each station"),
         ({"radii": (0.1, math.inf, 0.1)}, "3 finite numbers"),
         ({"radii": (0.1, "0.1", 0.1)}, "3 finite numbers"),
-        (
-            {"radii": (0.1, 0.0, 0.1)},
-            r"radii\[1\] = 0: must be a finite number >= 1e-12 and <= 1e\+09 m",
-        ),
+        ({"radii": (0.1, 0.0, 0.1)}, r"radii\[1\] = 0: must be a finite number > 0 m"),
         ({"radii": (0.1, -0.1, 0.1)}, r"radii\[1\] = -0.1: must be"),
         ({"radii": None}, "radii: must be 3 finite numbers"),
     ],

@@ -68,7 +68,7 @@ SOUND = {
 
 GIVEN = [
     *(None, True, False, math.nan, math.inf, -math.inf, "0.1", "x", -1, 0, -0.5, 1.5),
-    *(1e308, 1e-308, 10**400, [], (), (1,), (0, 1), (1, 0), (0, 0.5, 0.5, 1), (0, math.nan, 1)),
+    *([], (), (1,), (0, 1), (1, 0), (0, 0.5, 0.5, 1), (0, math.nan, 1)),
     *(("a", "b"), {}, object(), 1j, np.array([1.0, 2.0]), np.array(0.3), np.float32(0.3)),
     *([[0, 1]], [[0, 1]] * 3, (None, 1), ((0, 1), (0,)), range(3), RUBBER, RING),
     Samples(stations_over_length=(0, 1), values=(0.1, 0.2)),

@@ -264,7 +264,6 @@ def test_a_tendon_is_measured_in_newtons():
         ({"distance": (0.01, 0.02, 0.03)}, "must be .*, or two at its ends, or Samples"),
         ({"distance": True}, "distance = True"),
         ({"distance": "1cm"}, "distance = '1cm'"),
-        ({"distance": 10**400}, "distance = 1000"),
         (
             {"distance": Samples(stations_over_length=(0, 1), values=(0.1, -0.1))},
             "distance = -0.1: must be a finite number >= 0 m",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import pickle
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from importlib import import_module
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -20,9 +20,7 @@ from softreach.atlas import (
     atlas_status,
     best_designs,
     build_atlas,
-    worker_processes,
 )
-from softreach.atlas.metrics import chosen_metrics
 from softreach.atlas.store import AtlasStore
 from softreach.rod.tip_map import TipMap
 from softreach.support.errors import InvalidInput, SoftreachWarning
@@ -115,9 +113,6 @@ def test_what_metrics_share_is_computed_once_for_each_design(tmp_path, monkeypat
     assert calls == dict.fromkeys([*shared, "reachable_set", "tips_and_status"], 4)
 
 
-# Metrics that cannot be had
-
-
 @pytest.mark.parametrize(
     ("compute", "message"),
     [
@@ -168,23 +163,6 @@ def test_metrics_that_cannot_be_told_apart_are_refused(tmp_path, metrics, messag
     assert not (tmp_path / "a.zarr").exists()
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"name": "mean height"}, "name of the metric = mean height: must be letters"),
-        ({"needs": ("tips",)}, "needs of metric mean_height = .*: must be some of Need.ARM"),
-        ({"compute": 3}, "compute of metric mean_height = 3: must be a function"),
-        ({"over": ("sample",)}, "over of metric mean_height = .*: must be"),
-    ],
-)
-def test_faulty_metrics_are_refused_when_they_are_made(change, message):
-    with pytest.raises(InvalidInput, match=message):
-        replace(MEAN_HEIGHT, **change)
-
-
-# Metrics and stores
-
-
 def test_a_call_with_other_metrics_does_not_resume(tmp_path):
     store = tmp_path / "a.zarr"
     asked = SMALL | {"metrics": ("extent", MEAN_HEIGHT)}
@@ -215,40 +193,28 @@ def test_a_store_is_read_without_the_functions_of_its_metrics(tmp_path):
         height.value({Need.TIPS: np.zeros((1, 3))}, {})
 
 
-def test_workers_can_get_the_functions_of_all_metrics():
-    tips = np.arange(6.0).reshape(2, 3)
-    for metric in chosen_metrics([*METRIC_GROUPS, MEAN_HEIGHT]):
-        sent = pickle.loads(pickle.dumps(metric))
-        assert sent.to_dict() == metric.to_dict()
-        if metric.needs == (Need.TIPS,):
-            assert sent.value({Need.TIPS: tips}, {}) == metric.value({Need.TIPS: tips}, {})
+def process() -> ProcessPoolExecutor:
+    """One that has imported nothing of this one."""
+    return ProcessPoolExecutor(1, mp_context=get_context("spawn"))
 
 
-def test_lambdas_are_refused_in_one_line_where_workers_compute_them(tmp_path):
+def test_lambdas_are_refused_in_one_line_where_processes_compute_them(tmp_path):
     typed = replace(MEAN_HEIGHT, compute=lambda tips: 0.0)
-    options = SMALL | {"metrics": [typed], "executor": worker_processes(1)}
-    with pytest.raises(InvalidInput, match=r"compute of metric mean_height = .*lambda") as caught:
-        build_atlas(small_space(), tmp_path / "a.zarr", **options)
-    assert "\n" not in str(caught.value)
+    options = SMALL | {"metrics": [typed]}
+    with process() as pool, pytest.raises(InvalidInput, match=r"compute of metric .*lambda"):
+        build_atlas(small_space(), tmp_path / "a.zarr", executor=pool, **options)
     with ThreadPoolExecutor(1) as threads:
-        atlas = build_atlas(small_space(), tmp_path / "a.zarr", **options | {"executor": threads})
+        atlas = build_atlas(small_space(), tmp_path / "a.zarr", executor=threads, **options)
     assert (atlas.mean_height == 0).all()
 
 
-def test_worker_processes_read_actuators_of_ones_own(tmp_path):
-    """The module of the class travels with the task."""
+def test_processes_know_the_modules_of_actuators_and_metrics(tmp_path):
     trunk = sr.designs.minimal_trunk()
     cable = Cable(place=(0.03, 0.0), name="cable", activation_bounds=(0.0, 1e-4))
     base = trunk.replace(actuators=(*trunk.actuators[:2], cable))
     space = sr.DesignSpace.grid(base, **{"cable.place[0]": [0.01, 0.03]})
-    pool = worker_processes(1)
-    atlas = build_atlas(space, tmp_path / "a.zarr", 50, metrics=["extent"], executor=pool)
-    assert atlas_status(atlas).done == 2
-
-
-def test_worker_processes_compute_metrics_of_ones_own(tmp_path):
     options = SMALL | {"metrics": ("convex", MEAN_HEIGHT)}
-    alone = build_atlas(small_space(), tmp_path / "a.zarr", **options).load()
-    pool = worker_processes(1)
-    found = build_atlas(small_space(), tmp_path / "b.zarr", executor=pool, **options).load()
+    alone = build_atlas(space, tmp_path / "a.zarr", **options).load()
+    with process() as pool:
+        found = build_atlas(space, tmp_path / "b.zarr", executor=pool, **options).load()
     assert_same(found, alone)

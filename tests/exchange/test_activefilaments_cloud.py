@@ -129,12 +129,6 @@ def test_a_missing_half_is_named(tips, filament):
         read_cloud(filament, tips)
 
 
-def test_a_file_larger_than_the_memory_is_refused_unread(tips, filament, monkeypatch):
-    monkeypatch.setattr("softreach.exchange.activefilaments.cloud.free_memory", lambda: 1000.0)
-    with pytest.raises(sr.InvalidInput, match="half of the free memory"):
-        read_cloud(filament, tips)
-
-
 def test_a_cloud_of_an_arm_that_is_no_filament_is_refused(tmp_path):
     cloud = sr.compute_cloud(designs.three_chamber_arm(), n=10)
     with pytest.raises(sr.InvalidInput, match=r"ActiveFilaments\.jl"):

@@ -33,7 +33,6 @@ HOSTILE = {
     "many bundles.toml": design_with(
         'name = "longitudinal"', 'name = "longitudinal"\nbundles = 1000000'
     ),
-    "nested.toml": "a = " + "[" * 100_000 + "]" * 100_000,
     "nested.json": "[" * 100_000,
     "50 MB.json": " " * 50_000_000,
     "mouse.json": look_with(mouse=["tip"]),

@@ -39,8 +39,6 @@ _ALLOWED = (
     f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z), "
     "or a rotation vector (three numbers [rad])"
 )
-_FARTHEST = 1e6
-"""Farthest from the origin [m]: beyond, rounding of places in the world is too coarse."""
 _NEAR = 1e-6
 """Largest error of the numbers of a rotation: what is typed with seven digits."""
 
@@ -75,10 +73,6 @@ class Base(Part):
     def _faults(self) -> list[Fault]:
         wrong = _as_rotation(self.points).wrong
         faults = [Fault("points", self.points, wrong)] if wrong else []
-        place = np.abs(as_numbers(self.position)).ravel()
-        if _FARTHEST < place.max(initial=0.0) < np.inf:
-            allowed = f"must be within {_FARTHEST:g} m of the origin"
-            faults.append(Fault("position", self.position, allowed))
         return super()._faults() + faults
 
     @lazy

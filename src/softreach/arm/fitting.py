@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from softreach.arm.actuators import (
     Actuator,
 )
-from softreach.arm.actuators.actuator import MOST_BUNDLES, distance_faults
+from softreach.arm.actuators.actuator import MOST_BUNDLES
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads
 from softreach.arm.marker import Marker
@@ -143,7 +143,6 @@ def fit_faults(arm: Manipulator) -> Iterator[Fault]:
     for actuator in arm.actuators:
         parts = arm.profile, arm.section
         faults = actuator.place_faults(arm.length) or actuator.section_faults(*parts)
-        faults = faults or distance_faults(actuator, *parts)
         yield from (
             fault
             if fault.path.startswith(("rings", "core"))

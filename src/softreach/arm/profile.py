@@ -31,10 +31,6 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEWTON_STEPS = 60
 _CHECKED = 65
 """Places at which a radius is seen to be positive."""
-_SLIMMEST = 1e-12
-"""R2(L) over R2(0), below which the radius of a tip is mostly rounding."""
-
-# Ranges keep fourth powers of radii and cubes of lengths far from where doubles end.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +41,7 @@ class Profile(Part, ABC):
     these are not smooth.
     """
 
-    length: float = number("L", "m", "length before activation", low=1e-9, high=1e9)
+    length: float = number("L", "m", "length before activation", low=0.0, open_low=True)
     """L, from base to tip before activation [m]."""
 
     def __post_init__(self) -> None:
@@ -161,7 +157,7 @@ class LinearTaper(Profile):
         default=0.0,
     )
     """φ, taper angle [rad]; negative widens toward the tip."""
-    outer_radius: float = number("R2(0)", "m", "outer radius at the base", low=1e-12, high=1e9)
+    outer_radius: float = number("R2(0)", "m", "outer radius at the base", low=0.0, open_low=True)
     """R2(0), outer radius at the base [m]."""
 
     def __init__(
@@ -216,9 +212,9 @@ class LinearTaper(Profile):
         if faults := super()._faults():
             return faults
         tip = self.outer_radius - self.length * math.tan(self.taper)
-        if tip >= _SLIMMEST * self.outer_radius:
+        if tip > 0.0:
             return []
-        limit = math.atan((1.0 - _SLIMMEST) * self.outer_radius / self.length)
+        limit = math.atan(self.outer_radius / self.length)
         why = f"leaves no tip (R2(L) = {tip:.4g} m, R2(0) = {self.outer_radius:.4g} m)"
         return [Fault("taper", self.taper, Range(high=limit, unit="rad", open_high=True, why=why))]
 
@@ -246,7 +242,7 @@ class _RadiiAtStations(Profile):
     stations_over_length: tuple[float, ...] = stations("station of a radius")
     """Z/L of the radii [-], from 0 to 1, rising."""
     radii: tuple[float, ...] = number(
-        "R2", "m", "outer radius at a station", shape="series", low=1e-12, high=1e9
+        "R2", "m", "outer radius at a station", shape="series", low=0.0, open_low=True
     )
     """R2 at these stations before activation [m]."""
 

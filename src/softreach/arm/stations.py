@@ -190,10 +190,9 @@ class Span(Located):
         start, end = self.span(length)
         if faults or end - start >= _SHORTEST * length:
             return faults
-        least = _least(start, end)
         if self.end is None:
-            return [Fault("start", start, f"must be below its end at Z = {end:g} m{least}")]
-        return [Fault("end", end, f"must be above its start at Z = {start:g} m{least}")]
+            return [Fault("start", start, f"must be below its end at Z = {end:g} m")]
+        return [Fault("end", end, f"must be above its start at Z = {start:g} m")]
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
@@ -202,13 +201,8 @@ class Span(Located):
         blamed = any(fault.path.endswith("_over_length") for fault in faults)
         if in_meters or blamed or end - start >= _SHORTEST:
             return faults
-        allowed = f"must be above start_over_length = {start:g}{_least(start, end)}"
+        allowed = f"must be above start_over_length = {start:g}"
         return [*faults, Fault("end_over_length", end, allowed)]
-
-
-def _least(start: float, end: float) -> str:
-    """Least distance of ends in the right order, for a refusal."""
-    return f" by {_SHORTEST:g} L at least" if end > start else ""
 
 
 def placed(part: Made, stations: Mapping[str, float]) -> Made:

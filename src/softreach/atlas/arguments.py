@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from softreach.support.arguments import as_given, as_number, as_path, plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import numbers_in, shortened
+from softreach.support.quantity import numbers_in
 
 __all__ = ["a_store", "an_atlas", "an_interval", "column", "constraint", "shard_of"]
 
@@ -119,5 +119,5 @@ def constraint(text: str) -> tuple[str, tuple[float, float]]:
     values = numbers_in(number, 1)
     if values is None:
         allowed = "a name, <= or >=, and a finite number"
-        raise InvalidInput("where", shortened(text) or "''", allowed)
+        raise InvalidInput("where", text or "''", allowed)
     return name.strip(), (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -23,7 +21,7 @@ from softreach.sampling import check_sampler
 from softreach.support.arguments import POSITIVE, as_flag, as_function, as_instance, as_number
 from softreach.support.errors import counted, warn
 from softreach.support.files.interruption import remarking
-from softreach.support.memory import check_disk, check_memory
+from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, bar
 from softreach.workspace.reach import ACCURACIES
 
@@ -32,11 +30,6 @@ if TYPE_CHECKING:
     from zarr.storage import StoreLike
 
 
-STORED = 6.2
-"""Size of a stored tip [bytes]."""
-
-_ON_DISK = 4096  # bytes that the smallest file takes
-_FILES = 5  # of a design without tips: status, message, checksum, metrics, curvature
 _SAMPLE_MEMORY = 700  # bytes of memory of a sample and its share of the triangulation
 
 
@@ -119,7 +112,7 @@ def build_atlas(
     check_names(chosen, space)
     numbers = range(shard[0], space.size, shard[1])
     check_sampler(sampler, n, 0, seed)
-    _check_demand(space, len(numbers), n, store, keep_clouds=keep_clouds)
+    check_memory("n", n, _SAMPLE_MEMORY * n)
     with bar("looking at all designs", space.size) as shown:
         space.survey(shown)
     command = Command(
@@ -145,27 +138,6 @@ def build_atlas(
     _warn_of_unstable(built)
     _warn_of_sparse(built)
     return built
-
-
-def _check_demand(
-    space: DesignSpace, designs: int, n: int, store: StoreLike, *, keep_clouds: bool
-) -> None:
-    """Refuse an atlas that cannot fit, and announce one that takes much.
-
-    No design is made for it; of a store that exists, nobody knows how much is done.
-
-    Raises:
-        InvalidInput: One design does not fit into memory, or all do not fit on the disk.
-
-    Warns:
-        SoftreachWarning: It takes more than half of what is free.
-    """
-    check_memory("n", n, _SAMPLE_MEMORY * n)
-    local = isinstance(store, str | os.PathLike) and "://" not in str(store)
-    if local and not Path(str(store)).exists():
-        of_each = STORED * n * keep_clouds + _FILES * _ON_DISK
-        amount = f"{n} samples of {designs} designs"
-        check_disk("n", amount, of_each * designs + 8 * n * space.base.bundles, str(store))
 
 
 def _run(

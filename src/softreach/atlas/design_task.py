@@ -17,7 +17,6 @@ from softreach.rod.tip_map import no_equilibrium_message
 from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.files.damage import StoreFailed
-from softreach.support.plugins import Imports
 
 Values = dict[str, Array]
 Outcome = tuple[int, str]
@@ -52,13 +51,13 @@ class Remote:
     """Task as it travels to a worker elsewhere that computes designs of a store.
 
     It travels to the worker instead of arrays: the worker reads the activations from the store and
-    writes its results there. The metrics' functions are in no store, so they travel along, behind
-    the modules that they and the kinds of the design's parts are in.
+    writes its results there. The metrics' functions and the kinds of the design's parts are in no
+    store, so they travel along, by the names of their modules.
     """
 
     def __init__(self, store: AtlasStore) -> None:
         base = store.command.space.base
-        self._imports = Imports.needed_by([base.profile, *base.actuators])  # unpickled first
+        self._kinds = {type(part) for part in (base.profile, *base.actuators)}
         self._store: AtlasStore | None = store
         self.metrics = store.command.metrics
         self._durable = store.durable
@@ -73,8 +72,6 @@ class Remote:
 
         if self._store is not None:
             return self._store
-        if self._imports.fault:
-            raise StoreFailed(f"in a worker process: {self._imports.fault}")
         if isinstance(self._location, dict | MemoryStore):
             raise StoreFailed("the store is in the memory of another process; use a path or a URL")
         key = repr(self._location), self._origin

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from importlib.metadata import EntryPoint
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -67,54 +66,36 @@ def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
 
 
 def own_metrics() -> dict[str, Metric]:
-    """Metrics that are not softreach's and have been imported for it, or are declared for it.
-
-    Raises:
-        InvalidInput: The name of an imported one is taken.
-    """
+    """Metrics that are not softreach's: of modules that the user named, or declared for it."""
     own = _imported_metrics()
-    for name, entry in plugins.declared(plugins.METRICS).items():
+    for name in plugins.declared(plugins.METRICS).keys() - own.keys():
         try:
-            own.setdefault(name, _declared_metric(entry))
+            own[name] = _declared_metric(name)
         except InvalidInput as error:  # the others can be used
             warn(str(error))
     return own
 
 
 def _own_metric(name: str) -> Metric | None:
-    """The metric of this name that is not softreach's, from an installed package if need be."""
-    known = _imported_metrics()
-    if name in known:
+    if name in (known := _imported_metrics()):
         return known[name]
-    entry = plugins.declared(plugins.METRICS).get(name)
-    return None if entry is None else _declared_metric(entry)
+    return _declared_metric(name) if name in plugins.declared(plugins.METRICS) else None
 
 
 def _imported_metrics() -> dict[str, Metric]:
-    """Metrics in the modules that the user named."""
-    own: dict[str, Metric] = {}
-    for module in plugins.imported():
-        for metric in vars(module).values():
-            if isinstance(metric, Metric) and _KNOWN.get(metric.name) != metric:
-                _check_free(metric, own)
-                own[metric.name] = metric
-    return own
+    return {
+        metric.name: metric
+        for module in plugins.imported()
+        for metric in vars(module).values()
+        if isinstance(metric, Metric) and _KNOWN.get(metric.name) != metric
+    }
 
 
-def _declared_metric(entry: EntryPoint) -> Metric:
-    metric = plugins.loaded(entry)
-    if not isinstance(metric, Metric) or metric.name != entry.name:
-        allowed = f"a Metric of the name {entry.name}"
-        raise InvalidInput(f"entry point {entry.name}", entry.value, allowed)
-    _check_free(metric, {})
-    return metric
-
-
-def _check_free(metric: Metric, others: Mapping[str, Metric]) -> None:
-    """Refuse a name that another metric or a group has."""
-    if metric.name in (*METRIC_GROUPS, *_KNOWN) or others.get(metric.name, metric) != metric:
-        allowed = "a name that no other metric and no group has"
-        raise InvalidInput("name of a metric", metric.name, allowed)
+def _declared_metric(name: str) -> Metric:
+    entry = plugins.declared(plugins.METRICS)[name]
+    if isinstance(metric := plugins.loaded(entry), Metric):
+        return metric
+    raise InvalidInput(f"entry point {name}", entry.value, "a Metric")
 
 
 def _lowest(axis: int, tips: Array) -> float:

@@ -15,7 +15,7 @@ from cyclopts import App, CycloptsError, Group, Parameter
 
 from softreach.cli.console import HelpConsole, console
 from softreach.cli.signals import INTERRUPTED
-from softreach.support.errors import InvalidInput, NotWritten, SoftreachError, with_short_words
+from softreach.support.errors import InvalidInput, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
@@ -107,21 +107,8 @@ def _start(
     if quiet and verbose:
         raise InvalidInput("quiet", quiet, "left out with --verbose")
     console.set(quiet=quiet, verbose=verbose)
-    if not imports:
+    with importing(imports or ()):
         return app(words, result_action="return_value")
-    with importing(imports):
-        _check_kinds()
-        return app(words, result_action="return_value")
-
-
-def _check_kinds() -> None:
-    """See that the kinds of the user have names of their own."""
-    from softreach.arm.actuators import Actuator
-    from softreach.arm.design_file.keys import own_kinds
-    from softreach.arm.profile import Profile
-
-    for of in (Actuator, Profile):
-        own_kinds(of)
 
 
 def run(arguments: list[str]) -> int:
@@ -154,4 +141,4 @@ def _message(error: Exception) -> str:
         error = error.__cause__
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; ask for fewer samples or less accuracy"
-    return with_short_words(str(error)) or type(error).__name__
+    return str(error) or type(error).__name__

@@ -22,7 +22,7 @@ from softreach.cli.options import (
 )
 from softreach.cli.values import WHOLE, as_read
 from softreach.support.errors import InvalidInput, MissingExtra
-from softreach.support.quantity import numbers_in, shortened
+from softreach.support.quantity import numbers_in
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -277,12 +277,12 @@ def _over_length(text: str) -> float:
     values = numbers_in(text.removesuffix("L"), 1) if text.endswith("L") else None
     if not values or values[0] <= 0:
         allowed = "a radius > 0 over the length of each design, like 0.05L"
-        raise InvalidInput("alpha", shortened(text) or "''", allowed)
+        raise InvalidInput("alpha", text or "''", allowed)
     return values[0]
 
 
 def _shard(text: str) -> tuple[int, int]:
     first, _, count = text.partition("/")
     if not (text.isascii() and first.isdigit() and count.isdigit() and len(text) < 20):
-        raise InvalidInput("shard", shortened(text) or "''", "i/k with 0 <= i < k")
+        raise InvalidInput("shard", text or "''", "i/k with 0 <= i < k")
     return int(first), int(count)

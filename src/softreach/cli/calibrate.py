@@ -25,7 +25,6 @@ from softreach.cli.options import (
 )
 from softreach.cli.values import NUMBER, WHOLE, as_read
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import shortened
 
 if TYPE_CHECKING:
     from softreach.calibration import Calibration, Misses
@@ -175,7 +174,7 @@ def read_noise(text: str) -> float:
     except ValueError:
         noise = 0.0
     if not noise > 0:
-        raise InvalidInput("noise", shortened(text), f"a length > 0 such as 0.2mm ({TYPED})")
+        raise InvalidInput("noise", text, f"a length > 0 such as 0.2mm ({TYPED})")
     return noise
 
 

@@ -50,16 +50,14 @@ def cloud(
     """
     from time import perf_counter
 
-    from softreach.cloud.clouds import cloud_store, compute_cloud, sample_bytes, save_cloud
+    from softreach.cloud.clouds import cloud_store, compute_cloud, save_cloud
     from softreach.rod.rods import tip_map
-    from softreach.support.memory import check_disk
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     out = out or Path(f"{Path(design).stem}.zarr")
     check_output(out, cloud_store(arm), overwrite)
     arguments = sampling.arguments
-    check_disk("n", sampling.count, sample_bytes(arm.inputs) * sampling.count, out)
     start = perf_counter()
     dataset = compute_cloud(arm, **arguments, tol=tol)
     seconds = perf_counter() - start

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
 
-_BYTES = 100  # of a sample in the cloud and in the PLY
 _FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
 
 
@@ -43,14 +42,12 @@ def demo(
     from softreach.cloud.volume import Hull, concave_hull, convex_hull
     from softreach.rod.kinematics import configuration
     from softreach.support import parallel
-    from softreach.support.memory import check_disk
 
     start = perf_counter()
     arm = designs.minimal_trunk()
     lengths = Lengths.of(arm, unit)
     _check(out, arm, overwrite)
     check_hull_memory(n)
-    check_disk("n", n, _BYTES * n, out)
     cloud = compute_cloud(arm, n)
     computed = perf_counter() - start
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import shortened
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -42,7 +41,7 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
         name, sign, value = (part.strip() for part in text.rpartition("="))
         if not sign or not name or not value:
             allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
-            raise InvalidInput("prior", shortened(text), allowed)
+            raise InvalidInput("prior", text, allowed)
         plain = names.tied(name)
         result[plain] = tuple(names.value(name, part) for part in value.split(":"))
     return result
@@ -80,7 +79,7 @@ class _Names:
             known = self.written if self._has_unit(first) else self.plain
             if first not in known:
                 allowed = "of a number that is free, by its full name"
-                raise InvalidInput("prior", shortened(name), allowed)
+                raise InvalidInput("prior", name, allowed)
             unit = known[first].unit
         try:
             if self._has_unit(first):
@@ -89,4 +88,4 @@ class _Names:
         except ValueError:
             units = "" if self._has_unit(first) else ", ".join(unit_names(unit))
             allowed = f"a finite number with its unit ({units})" if units else "a finite number"
-            raise InvalidInput(f"prior of {name}", shortened(text), allowed) from None
+            raise InvalidInput(f"prior of {name}", text, allowed) from None

@@ -16,7 +16,7 @@ from softreach.cli.lengths import Lengths, check_unit
 from softreach.cli.values import WHOLE
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import MEGABYTE, read_text
-from softreach.support.quantity import numbers_in, shortened
+from softreach.support.quantity import numbers_in
 from softreach.support.units import TYPED, read_length
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def activation_of(text: str | None, arm: Manipulator) -> list[float]:
     values = numbers_in(text, arm.inputs)
     if values is None:
         allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
-        raise InvalidInput("activation", shortened(text), allowed)
+        raise InvalidInput("activation", text, allowed)
     return values
 
 
@@ -182,9 +182,9 @@ def pairs_in(name: str, texts: list[str] | None, allowed: str) -> dict[str, str]
     for text in texts:
         key, sign, value = (part.strip() for part in text.rpartition("="))
         if not sign or not key or not value:
-            raise InvalidInput(name, shortened(text), allowed)
+            raise InvalidInput(name, text, allowed)
         if key in pairs:
-            raise InvalidInput(name, shortened(text), f"given once for {key}")
+            raise InvalidInput(name, text, f"given once for {key}")
         pairs[key] = value
     return pairs
 
@@ -199,7 +199,7 @@ def radius_of(text: str, length: float) -> float | str:
         radius = 0.0
     if not 0.0 < radius < math.inf:
         allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
-        raise InvalidInput("alpha", shortened(text) or "''", allowed)
+        raise InvalidInput("alpha", text or "''", allowed)
     return radius
 
 

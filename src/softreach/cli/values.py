@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Parameter, Token
 
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import read_number, read_whole_number, shortened
+from softreach.support.quantity import read_number, read_whole_number
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -24,7 +24,7 @@ def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
             return read(tokens[0].value)
         except ValueError:
             name = (tokens[0].keyword or "number").lstrip("-").replace("-", "_")
-            raise InvalidInput(name, shortened(tokens[0].value) or "''", allowed) from None
+            raise InvalidInput(name, tokens[0].value or "''", allowed) from None
 
     return Parameter(converter=convert)
 

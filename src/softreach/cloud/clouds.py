@@ -37,7 +37,7 @@ from softreach.support.files.stores import (
     list_arrays,
     opened_root,
 )
-from softreach.support.memory import check_room
+from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, bar
 
 if TYPE_CHECKING:
@@ -90,15 +90,12 @@ def compute_cloud(
     Raises:
         InvalidInput: An argument out of range, or more samples than fit into memory; the message
             says what to use instead.
-
-    Warns:
-        SoftreachWarning: The samples take more than half of the free memory.
     """
     report = None if progress is None else as_function("progress", progress)
     rod = _of_all_bundles(tip_map(arm, tol, frame=frame))
     bundles = rod.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
-    check_room("n", n, bundles + 3)
+    check_memory("n", n, 8 * (bundles + 3) * n)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if rod.supports_unstable else 0, np.int8)
     show_bar = report is None and n > _LONG
@@ -134,10 +131,10 @@ def save_cloud(
     """
     place = as_path("path", path)
     overwrite, durable = as_flag("overwrite", overwrite), as_flag("durable", durable)
-    size = schema.check_stored_cloud(cloud).nbytes
+    schema.check_stored_cloud(cloud)
     kind = cloud_store(design_of(cloud))[".zarr"]
     with (
-        replacing(place, kind, takes=size, overwrite=overwrite, durable=durable) as partial_path,
+        replacing(place, kind, overwrite=overwrite, durable=durable) as partial_path,
         _few_chunks_at_a_time(),
     ):
         _write(schema.storable(cloud), partial_path)
@@ -177,11 +174,6 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     arm = design_of(cloud)
     return tip_map(arm, float(cloud.attrs["tol"]), frame=schema.frame_of(cloud))
-
-
-def sample_bytes(bundles: int) -> int:
-    """Memory of a sample [bytes]: its tip, its activation and its status."""
-    return 8 * (3 + bundles) + 1
 
 
 def _fill(

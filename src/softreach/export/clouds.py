@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 
 _BLOCK = 1 << 18
-_BYTES = 12  # of a number in a file: 8, or about 18 in text, which few formats are
 _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 
 
@@ -170,8 +169,7 @@ def export_cloud(
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     cloud = a_cloud("cloud", cloud)
     table = arrays_of(cloud, as_unit(unit, _length(cloud)))
-    takes = _BYTES * (table.tip.size + table.activation.size)
-    write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
+    write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite)
 
 
 def path_csv(found: xr.Dataset) -> str:

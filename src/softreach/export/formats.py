@@ -41,7 +41,7 @@ def format_file(
 
 
 def write_by_suffix(
-    path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool, takes: float
+    path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool
 ) -> None:
     """Write the content whole, or leave what was there.
 
@@ -50,7 +50,6 @@ def write_by_suffix(
         formats: What can be written, by suffix.
         content: What their writers take.
         overwrite: Whether it may replace anything.
-        takes: What the file will take of the disk, roughly [bytes].
 
     Raises:
         InvalidInput: No writer for the suffix (the error lists those there are), or something else
@@ -60,7 +59,7 @@ def write_by_suffix(
     """
     kind = format_of(path, formats)
     assert kind.write is not None
-    with writing(path, kind, takes=takes, overwrite=overwrite) as file:
+    with writing(path, kind, overwrite=overwrite) as file:
         kind.write(content, file)
 
 

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
 
-_BYTES = 50  # of a triangle and its share of the vertices
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 _CLEAR = 0.45  # opacity of a body that has something inside
 
@@ -123,9 +122,8 @@ def write_parts(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    takes = _BYTES * sum(len(part.faces) for part in parts)
     scaled = [part._replace(vertices=unit.of(part.vertices)) for part in parts]
-    write_by_suffix(path, SURFACE_FILES, Scene(scaled, unit), overwrite=overwrite, takes=takes)
+    write_by_suffix(path, SURFACE_FILES, Scene(scaled, unit), overwrite=overwrite)
 
 
 def export_arm(

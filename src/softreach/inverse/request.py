@@ -13,11 +13,8 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.quantity import shortened, unit_names
+from softreach.support.quantity import unit_names
 from softreach.support.units import TYPED, lengths_in
-
-FARTHEST = 1e100
-"""Largest coordinate of a target [m]: squares of larger ones leave the range of numbers."""
 
 _HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\])])")
 """Name of a column with its unit."""
@@ -59,12 +56,9 @@ def as_targets(name: str, targets: ArrayLike) -> Array:
     """The targets as a (t, 3) float array.
 
     Raises:
-        InvalidInput: Another shape, or values that are not finite or beyond 1e100 m.
+        InvalidInput: Another shape, or values that are not finite.
     """
-    points = as_rows(name, targets, 3, "of shape (t, 3), positions in m")
-    if points.size and (far := np.abs(points).max()) > FARTHEST:
-        raise InvalidInput(name, f"up to {far:g} m", f"within {FARTHEST:g} m")
-    return points
+    return as_rows(name, targets, 3, "of shape (t, 3), positions in m")
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
@@ -133,13 +127,10 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
         InvalidInput: The text is not three lengths.
     """
     values = lengths_in(text, 3, length)
-    if values is None or max(map(abs, values)) > FARTHEST:
+    if values is None:
         units = TYPED if length is None else f"{TYPED}, L"
-        allowed = (
-            f"three comma-separated numbers x,y,z in m, up to {FARTHEST:g}, or each with its unit "
-            f"({units})"
-        )
-        raise InvalidInput(name, shortened(text) or "''", allowed)
+        allowed = f"three comma-separated numbers x,y,z in m, or each with its unit ({units})"
+        raise InvalidInput(name, text or "''", allowed)
     return values
 
 
@@ -150,7 +141,7 @@ def _header_units(line: str, source: str) -> list[str]:
         match = _HEADER.fullmatch(name.strip().strip('"'))
         unit = "" if match is None else match[1] or match[2] or ""
         if match is not None and match[2] and unit not in (*unit_names("m"), "L"):
-            raise InvalidInput(f"{source}, header", shortened(line), f"in {TYPED} or L")
+            raise InvalidInput(f"{source}, header", line, f"in {TYPED} or L")
         units.append({"over_length": "L"}.get(unit, unit))
     return units
 

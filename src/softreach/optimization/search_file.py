@@ -97,7 +97,7 @@ def read_search(
     """
     try:
         document = tomllib.loads(text)
-    except (ValueError, RecursionError):
+    except ValueError:
         document = {}  # for which the requirements are refused
     reader = _Reader(document.get("search", {}), given or {}, folder, design_from)
     bases = reader.bases()

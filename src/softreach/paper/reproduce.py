@@ -12,7 +12,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from softreach.atlas.build import STORED
 from softreach.paper.notebook import FULL, QUICK, Notebook
 from softreach.paper.report import REPORT, write_report
 from softreach.paper.sections.misprints import misprints
@@ -36,9 +35,6 @@ PARTS: Mapping[str, Callable[..., None]] = {
     "uniqueness": uniqueness,
 }
 """Name -> what computes it, from the settings, the folder and a notebook; short ones first."""
-
-
-_FIGURES = 5e7  # bytes of all figures, roughly
 
 
 def reproduce_paper(
@@ -72,9 +68,7 @@ def reproduce_paper(
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)
     report = folder / "report.html"
-    begun = (folder / "figures").exists()  # of which nobody knows how much is done
-    takes = 0.0 if begun else _FIGURES + STORED * settings.samples * settings.designs**2
-    check_place(report, REPORT[".html"], takes=takes, overwrite=overwrite, name="out")
+    check_place(report, REPORT[".html"], overwrite=overwrite, name="out")
     key = {**asdict(settings), "softreach": version("softreach"), "source": _source()}
     notebooks: dict[str, Notebook] = {}
     for number, (name, part) in enumerate(PARTS.items(), 1):

@@ -67,7 +67,7 @@ def read(text: str, folder: Path, length: float | None, source: str) -> dict[str
         raise InvalidDesign([Fault("TOML", None, f"must be at most {LONGEST:,} long")], source)
     try:
         document = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
     reader = _Reader(folder, length)
     parts = reader.parts(document)

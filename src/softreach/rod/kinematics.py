@@ -24,7 +24,6 @@ from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
-from softreach.support.memory import check_room
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +40,6 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _LINES_TOGETHER = 256  # samples
-_COLUMNS = 64  # numbers at a station of one sample, those that come and go included
 
 
 def tip_positions(
@@ -125,7 +123,6 @@ def marker_positions(
     """
     rod = tip_map(arm, tol, frame=frame)
     gamma = rod.check_activations("activations", activations)
-    check_room("activations", len(gamma), _COLUMNS * max(1, len(rod.arm.markers)))
     return _markers(rod, gamma)
 
 
@@ -175,7 +172,7 @@ def configuration(
     rod = tip_map(arm, tol, frame=frame)
     values = as_floats("activation", activation)
     gamma = rod.check_activations("activation", np.atleast_2d(values))
-    z = stations_along(rod, stations, _COLUMNS * max(1, len(gamma)))
+    z = stations_along(rod, stations)
     status = np.empty(len(gamma), np.int8)
     frames, strains = rod.frames(gamma, z, status), rod.strains(gamma, z)
     dataset = shape_dataset(rod, gamma, z, frames, strains, **_lines(rod, gamma))
@@ -221,21 +218,19 @@ def _lines(rod: TipMap, gamma: Array) -> dict[str, Array]:
     return {"line_length": length, "bundle_activation": gamma[:, : arm.bundles]}
 
 
-def stations_along(rod: TipMap, stations: int | ArrayLike, columns: int = 1) -> Array:
+def stations_along(rod: TipMap, stations: int | ArrayLike) -> Array:
     """Z [m] of stations given by their number or by themselves, ascending.
 
     Args:
         rod: The tip map.
         stations: Number of stations, evenly spaced from base to tip, or their Z [m].
-        columns: Numbers that are computed at each; there must be memory for them.
 
     Raises:
-        InvalidInput: No such number or stations, or so many that there is no memory.
+        InvalidInput: No such number or stations.
     """
     if isinstance(stations, list | tuple) or getattr(stations, "ndim", 0) > 0:
         return rod.check_stations(stations)
     number = plain(stations)
     if isinstance(number, bool) or not isinstance(number, int) or number < 2:
         raise InvalidInput("stations", as_given(stations), "2 or more, or the stations' Z in m")
-    check_room("stations", number, columns)
     return np.linspace(0.0, rod.length, number)

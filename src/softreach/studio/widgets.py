@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
-from softreach.support.quantity import shortened, sizes_in
+from softreach.support.quantity import sizes_in
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -220,7 +220,7 @@ class TypedField:
     def _submitted(self, event: Any) -> None:
         text = self._text.value
         if (value := self._kind.value(text)) is None:
-            self._message.warn(f"{shortened(text)!r}: must be {self._kind.demand}")
+            self._message.warn(f"{text!r}: must be {self._kind.demand}")
             return
         with self._lock:
             self._value = value

@@ -1,7 +1,7 @@
 """Arguments of public functions, converted in their first lines and so refused in one way.
 
 A converter takes the argument's name and value, then what is allowed, and returns what the function
-goes on with::
+goes on with, or raises `InvalidInput`, which names the argument::
 
     n = as_integer("n", n, 1)
     cell = None if cell is None else as_number("cell", cell, POSITIVE)
@@ -43,16 +43,7 @@ POSITIVE = Range(0.0, open_low=True)
 
 
 def as_number(name: str, value: object, allowed: Range = Range()) -> float:  # noqa: B008
-    """A real number in a range as a float.
-
-    Args:
-        name: What errors call it.
-        value: A number of Python or NumPy; no truth value, no text.
-        allowed: The range.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """A real number of Python or NumPy in a range, as a float; no truth value, no text."""
     number = plain(value)
     if isinstance(number, Real) and not isinstance(number, bool) and allowed.admits(number):
         return float(number)
@@ -60,11 +51,7 @@ def as_number(name: str, value: object, allowed: Range = Range()) -> float:  # n
 
 
 def as_integer(name: str, value: object, low: int = 0, high: float = math.inf) -> int:
-    """A whole number from `low` to `high` as an int.
-
-    Raises:
-        InvalidInput: Anything else, 2.0 too.
-    """
+    """A whole number from `low` to `high` as an int; 2.0 is none."""
     number = plain(value)
     if isinstance(number, Integral) and not isinstance(number, bool) and low <= int(number) <= high:
         return int(number)
@@ -73,11 +60,7 @@ def as_integer(name: str, value: object, low: int = 0, high: float = math.inf) -
 
 
 def as_flag(name: str, value: object) -> bool:
-    """True or False.
-
-    Raises:
-        InvalidInput: Anything else, even if Python takes it for true.
-    """
+    """True or False, and nothing else that Python takes for true."""
     flag = plain(value)
     if isinstance(flag, bool):
         return flag
@@ -85,22 +68,12 @@ def as_flag(name: str, value: object) -> bool:
 
 
 def as_text(name: str, value: object) -> str:
-    """Text of any length.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    if isinstance(value, str):
-        return value
-    raise InvalidInput(name, as_given(value), "text")
+    """Text of any length."""
+    return as_instance(name, value, str, "text")
 
 
 def as_path(name: str, value: object) -> str:
-    """A path as text.
-
-    Raises:
-        InvalidInput: Neither text nor a path, or one that no file can have.
-    """
+    """A path as text, not empty."""
     path = os.fspath(value) if isinstance(value, os.PathLike) else value
     if isinstance(path, str) and path and "\0" not in path:
         return path
@@ -108,11 +81,7 @@ def as_path(name: str, value: object) -> str:
 
 
 def as_one_of(name: str, value: object, words: Iterable[str]) -> str:
-    """One of some words.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """One of some words."""
     if isinstance(value, str) and value in words:
         return value
     hint = did_you_mean(value, words) if isinstance(value, str) else ""
@@ -120,11 +89,7 @@ def as_one_of(name: str, value: object, words: Iterable[str]) -> str:
 
 
 def as_names(name: str, value: object) -> tuple[str, ...]:
-    """One name or a sequence of names.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """One name or a sequence of names."""
     if isinstance(value, str):
         return (value,)
     if isinstance(value, list | tuple | Mapping) and all(isinstance(item, str) for item in value):
@@ -133,22 +98,14 @@ def as_names(name: str, value: object) -> tuple[str, ...]:
 
 
 def as_mapping(name: str, value: object, each: Callable[[str, Any], Any]) -> dict[str, Any]:
-    """A mapping from names as a dictionary of what another converter makes of each value.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """A mapping from names as a dictionary of what another converter makes of each value."""
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: each(f"{name}[{key!r}]", item) for key, item in value.items()}
     raise InvalidInput(name, as_given(value), "a dictionary whose keys are names")
 
 
 def as_name_or_index(name: str, value: object) -> str | int:
-    """Text or a whole number; which there are is known elsewhere.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """Text or a whole number; which there are is known elsewhere."""
     key = plain(value)
     if isinstance(key, str | int) and not isinstance(key, bool):
         return key
@@ -156,22 +113,14 @@ def as_name_or_index(name: str, value: object) -> str | int:
 
 
 def as_instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> Any:
-    """An object of a class; `what` names it: "a Manipulator".
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """An object of a class; `what` names it: "a Manipulator"."""
     if isinstance(value, kind):
         return value
     raise InvalidInput(name, as_given(value), what)
 
 
 def as_function(name: str, value: object) -> Callable[..., Any]:
-    """A function, or anything else that can be called.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """A function, or anything else that can be called."""
     if callable(value):
         return value
     raise InvalidInput(name, as_given(value), "a function")
@@ -180,18 +129,7 @@ def as_function(name: str, value: object) -> Callable[..., Any]:
 def as_dataset(
     name: str, value: Any, *variables: str, kind: str = "Dataset", what: str = ""
 ) -> Any:
-    """An `xarray.Dataset` (or another `kind`) that has some variables.
-
-    Args:
-        name: What errors call it.
-        value: The dataset.
-        variables: Names of the variables.
-        kind: Name of the class in xarray.
-        what: What errors ask for, such as "a cloud".
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """An `xarray.Dataset` (or another `kind`), called `what`, that has some variables."""
     with_variables = f" with {', '.join(variables)}" if variables else ""
     allowed = f"{what or f'an xarray.{kind}'}{with_variables}"
     xarray = sys.modules.get("xarray")  # who has a dataset has imported it

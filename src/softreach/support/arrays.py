@@ -1,19 +1,19 @@
 """Arrays that users pass: converted and checked in one place, and names for them by what they hold.
 
-Numbers are whole or real numbers of Python or NumPy. Truth values, text, complex numbers, dates and
-objects are none, though NumPy would convert many of them; nor are masked entries.
+Numbers are what NumPy takes for whole or real numbers; masked entries are none. What cannot be
+converted raises `InvalidInput`, which names the argument.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 from operator import itemgetter
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
 
 __all__ = [
@@ -53,18 +53,6 @@ Faces = NDArray[np.integer]
 """Triangles as rows of three vertices, shape (n, 3)."""
 
 _NUMBERS = "an array of numbers"
-_FILL = "drop the masked entries, or fill them with numbers"
-_KINDS = {
-    "b": "truth values",
-    "c": "complex numbers",
-    "m": "durations",
-    "M": "dates",
-    "S": "text",
-    "T": "text",
-    "U": "text",
-    "V": "records",
-}
-
 
 Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
 """A named tuple of arrays of one length: its columns."""
@@ -97,35 +85,17 @@ def read_only(values: Array) -> Array:
 
 
 def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
-    """The values as a float array in memory order, of any shape; NaN and infinity are numbers.
-
-    Args:
-        name: What errors call them.
-        values: Numbers: an array, a sequence, or one number.
-        allowed: What errors ask for.
-
-    Raises:
-        InvalidInput: No numbers, rows of different lengths, or masked entries.
-    """
+    """Numbers as a float array in memory order, of any shape; NaN and infinity are numbers."""
     if type(values) is np.ndarray and values.dtype == np.float64:
         return np.ascontiguousarray(values).reshape(values.shape)
     array = _array(name, values, allowed)
     if array.dtype.kind in "iuf":
         return np.asarray(array, np.float64, order="C")
-    if array.dtype.kind == "O" and array.ndim and all(map(_is_number, array.flat)):
-        try:  # fractions, and whole numbers beyond 64 bits
-            return array.astype(np.float64)
-        except OverflowError:
-            pass
     raise InvalidInput(name, _described(values, array), allowed)
 
 
 def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
-    """Finite numbers of shape (n, columns); one row may stand alone.
-
-    Raises:
-        InvalidInput: No numbers, another shape, or rows that are not finite.
-    """
+    """Finite numbers of shape (n, columns); one row may stand alone."""
     rows = as_floats(name, values, allowed)
     rows = rows[None] if rows.shape == (columns,) else rows
     if rows.ndim != 2 or rows.shape[1] != columns:
@@ -134,11 +104,7 @@ def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
 
 
 def as_points(name: str, values: object) -> Points:
-    """Finite positions [m], shape (n, 3); one may stand alone, and nothing at all is none of them.
-
-    Raises:
-        InvalidInput: No numbers, another shape, or rows that are not finite.
-    """
+    """Finite positions [m], shape (n, 3); one may stand alone, and an empty array is none."""
     allowed = "of shape (n, 3), positions in m"
     points = as_floats(name, values, allowed)
     if points.size == 0 and points.ndim <= 2:
@@ -147,11 +113,7 @@ def as_points(name: str, values: object) -> Points:
 
 
 def check_finite(name: str, values: Array) -> Array:
-    """The array itself, if no number in it is NaN or infinite.
-
-    Raises:
-        InvalidInput: There are such; the first is told.
-    """
+    """The array itself, if no number in it is NaN or infinite; the first such row is named."""
     # The extremes take a third of the time of isfinite, and no memory.
     if not values.size or np.isfinite([values.min(), values.max()]).all():
         return values
@@ -164,11 +126,7 @@ def check_finite(name: str, values: Array) -> Array:
 
 
 def as_stations(name: str, values: object) -> Array:
-    """Finite numbers of shape (station,), of which one may stand alone.
-
-    Raises:
-        InvalidInput: No numbers, more dimensions, or some that are not finite.
-    """
+    """Finite numbers of shape (station,), of which one may stand alone."""
     stations = np.atleast_1d(as_floats(name, values))
     if stations.ndim > 1:
         raise InvalidInput(f"{name}.shape", stations.shape, "of shape (station,)")
@@ -176,18 +134,9 @@ def as_stations(name: str, values: object) -> Array:
 
 
 def as_directions(name: str, values: object, count: int | None = None) -> Array:
-    """Unit vectors along vectors of any length.
+    """Unit vectors along vectors of shape (3,) or (n, 3) and any length but 0.
 
-    Args:
-        name: What errors call them.
-        values: Shape (3,) or (n, 3).
-        count: How many there must be, of which one may stand for all; None for any number.
-
-    Returns:
-        Shape (count, 3); that of the values without a count.
-
-    Raises:
-        InvalidInput: Another shape, numbers that are not finite, or a vector without length.
+    With a count, shape (count, 3): one vector may stand for all. Else that of the values.
     """
     vectors = as_floats(name, values)
     rows = "n" if count is None else count
@@ -202,11 +151,7 @@ def as_directions(name: str, values: object, count: int | None = None) -> Array:
 
 
 def as_shares(name: str, values: object) -> Array:
-    """Numbers from 0 to 1, shape (k,), one at least.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """Numbers from 0 to 1, shape (k,), one at least."""
     shares = as_floats(name, values)
     if shares.ndim == 1 and shares.size and ((shares >= 0) & (shares <= 1)).all():
         return shares
@@ -214,104 +159,40 @@ def as_shares(name: str, values: object) -> Array:
 
 
 def as_indices(name: str, values: object, count: int, what: str) -> Index:
-    """Indices from 0 to count - 1, shape (k,).
-
-    Args:
-        name: What errors call them.
-        values: Whole numbers.
-        count: How many things there are.
-        what: What they count, such as "samples of the cloud".
-
-    Raises:
-        InvalidInput: Other numbers, or of another shape.
-    """
+    """Indices from 0 to count - 1 of things such as "samples of the cloud", shape (k,)."""
     allowed = f"one-dimensional, of whole numbers from 0 to {count - 1:,}, {what}"
-    array = _array(name, values, allowed)
-    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
-        raise InvalidInput(name, _described(values, array), allowed)
-    if array.size and not (array.min() >= 0 and array.max() < count):
-        span = f"indices from {array.min():,} to {array.max():,}"
-        raise InvalidInput(name, span, allowed)
-    return array.astype(np.intp)
+    indices = _array(name, values, allowed)
+    return _within(name, indices, indices.ndim == 1, count, allowed).astype(np.intp)
 
 
 def as_faces(name: str, values: object, count: int) -> Faces:
-    """Triangles whose corners are indices from 0 to count - 1, shape (f, 3).
-
-    Raises:
-        InvalidInput: Other numbers, or of another shape.
-    """
+    """Triangles whose corners are indices from 0 to count - 1, shape (f, 3)."""
     allowed = f"of shape (f, 3), whole numbers from 0 to {count - 1:,}"
     faces = _array(name, values, allowed)
-    if faces.size == 0:
-        return np.empty((0, 3), np.int64)
-    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
-        raise InvalidInput(name, _described(values, faces), allowed)
-    if not (faces.min() >= 0 and faces.max() < count):
-        raise InvalidInput(name, f"indices from {faces.min():,} to {faces.max():,}", allowed)
-    return faces.astype(np.int64)
+    faces = faces if faces.size else np.empty((0, 3), np.int64)
+    return _within(name, faces, faces.shape[1:] == (3,), count, allowed).astype(np.int64)
+
+
+def _within(
+    name: str, indices: NDArray[Any], fits: bool, count: int, allowed: str
+) -> NDArray[np.integer]:
+    if not fits or (indices.size and indices.dtype.kind not in "iu"):
+        raise InvalidInput(name, _described(indices, indices), allowed)
+    if indices.size and not (indices.min() >= 0 and indices.max() < count):
+        span = f"indices from {indices.min():,} to {indices.max():,}"
+        raise InvalidInput(name, span, allowed)
+    return indices
 
 
 def _array(name: str, values: object, allowed: str) -> NDArray[Any]:
-    """The values as NumPy takes them, unless it would lose something on the way."""
-    if np.ma.is_masked(values):
-        raise InvalidInput(name, "a masked array", allowed, _FILL)
-    if fault := _no_number(values):
-        raise InvalidInput(name, fault, allowed)
+    if np.ma.is_masked(values):  # NumPy would take what is behind the mask
+        raise InvalidInput(name, "a masked array", allowed, "drop or fill the masked entries")
     try:
         return np.asarray(values)
-    except (TypeError, ValueError, OverflowError):  # ragged rows; objects that are no arrays
-        fault = "rows of different lengths" if isinstance(values, list | tuple) else _kind(values)
-        raise InvalidInput(name, fault, allowed) from None
+    except (TypeError, ValueError):  # ragged rows; objects that are no arrays
+        raise InvalidInput(name, as_given(values), allowed) from None
 
 
-def _no_number(values: object) -> str:
-    """Kind of value in a nested sequence that NumPy would turn into a number, such as True; or "".
-
-    Looks at types alone, row by row: a hundredth of a second for a million numbers.
-    """
-    if not isinstance(values, list | tuple):
-        return ""
-    kinds = set(map(type, values))
-    if kinds & {bool, np.bool_}:
-        return "truth values"
-    if type(None) in kinds:
-        return "rows with None"
-    nested = kinds - {int, float}
-    if any(issubclass(kind, np.ma.MaskedArray) for kind in nested) and any(
-        map(np.ma.is_masked, values)
-    ):
-        return "masked entries"
-    if any(issubclass(kind, list | tuple) for kind in nested):
-        return next((fault for row in values if (fault := _no_number(row))), "")
-    return ""
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | Fraction | np.integer | np.floating) and not isinstance(
-        value, bool
-    )
-
-
-def _described(values: object, array: NDArray[Any]) -> str:
-    """Words for what was given, in short: an array may be long."""
-    if array.ndim == 0:
-        return repr(values) if array.dtype.kind in "USO" and _is_text(values) else _kind(values)
-    kind = _KINDS.get(array.dtype.kind, str(array.dtype))
-    return f"{kind} of shape {array.shape}"
-
-
-def _is_text(values: object) -> bool:
-    return isinstance(values, str | bytes)
-
-
-def _kind(values: object) -> str:
-    """The type of a value, and the value where that is short."""
-    if values is None or isinstance(values, bool | int | float | complex | np.generic):
-        return str(values)
-    return f"the class {values.__name__}" if isinstance(values, type) else _article(values)
-
-
-def _article(values: object) -> str:
-    name = type(values).__name__
-    return f"{'an' if name[0] in 'aeiouAEIOU' else 'a'} {name}"
+def _described(values: object, array: NDArray[Any]) -> object:
+    """A long array in short."""
+    return f"{array.dtype} of shape {array.shape}" if array.ndim else as_given(values)

@@ -1,19 +1,19 @@
-"""Free memory and disk space, and checks of what is asked of them."""
+"""Free memory, and checks of what is asked of it."""
 
 from __future__ import annotations
 
 import ctypes
 import gc
 import os
-import shutil
 import sys
 from pathlib import Path
 
-from softreach.support.errors import InvalidInput, warn
+from softreach.support.errors import InvalidInput
 
-__all__ = ["check_disk", "check_memory", "check_room", "free_disk", "free_memory", "return_memory"]
+__all__ = ["check_memory", "free_memory", "return_memory"]
 
 _UNKNOWN = 4e9  # where the system does not say
+_NOTICED = 1e8  # bytes; below, the system is not asked
 _CONTROL_GROUP = Path("/sys/fs/cgroup")
 _CONTROL_GROUPS = (
     ("memory.max", "memory.current", "memory.stat", "inactive_file"),
@@ -67,61 +67,12 @@ def return_memory() -> None:
         trim(0)
 
 
-def free_disk(path: str | os.PathLike[str]) -> float:
-    """Bytes that may be written where `path` is or will be; infinite where nobody knows."""
-    place = Path(path).absolute()
-    try:
-        return float(shutil.disk_usage(next(p for p in (place, *place.parents) if p.exists())).free)
-    except (OSError, StopIteration):
-        return float("inf")
-
-
 def check_memory(name: str, value: object, needed: float) -> None:
-    """Say what something will take of the memory, before it is taken.
-
-    Args:
-        name: The argument that decides.
-        value: What it is.
-        needed: What follows from it [bytes].
+    """Refuse what takes more memory than is free [bytes]: Linux would grant it, then kill.
 
     Raises:
-        InvalidInput: It is more than there is.
-
-    Warns:
-        SoftreachWarning: It is more than half of what there is.
+        InvalidInput: The argument of this name and value needs too much.
     """
-    if needed > _NOTICED:
-        _check(name, value, float(min(needed, 1e300)), free_memory(), "memory")
-
-
-def check_room(name: str, rows: int, columns: int) -> None:
-    """As `check_memory`, for a number of rows, each of so many doubles."""
-    if (needed := 8 * columns * rows) > _NOTICED:
-        shown = f"{rows:,}" if rows < 10**30 else "a number beyond 1e30"
-        check_memory(name, shown, needed)
-
-
-def check_disk(name: str, value: object, needed: float, path: str | os.PathLike[str]) -> None:
-    """Say what something will take of the disk that `path` is on; as `check_memory`."""
-    if needed > _NOTICED:
-        _check(name, value, needed, free_disk(path), "disk space")
-
-
-_NOTICED = 1e6  # bytes; below, nobody asks the system
-
-
-def _check(name: str, value: object, needed: float, free: float, what: str) -> None:
-    taken = f"{_size(needed)} of {what}, of which {_size(free)} are free"
-    if needed > free:
+    if needed > _NOTICED and needed > (free := free_memory()):
+        taken = f"{needed / 1e9:,.1f} GB of memory, of which {free / 1e9:,.1f} GB are free"
         raise InvalidInput(name, value, f"smaller: it takes {taken}")
-    if needed > free / 2:
-        warn(f"{name} = {value} takes {taken}")
-
-
-def _size(number: float) -> str:
-    """A number of bytes with two or three digits."""
-    for unit in ("bytes", "kB", "MB", "GB", "TB", "PB"):
-        if number < 999.5:
-            return f"{number:.3g} {unit}"
-        number /= 1000
-    return f"{number:.3g} EB"

@@ -6,8 +6,6 @@ Nothing else runs code: design files and stores name kinds and metrics, never mo
 from __future__ import annotations
 
 import importlib
-import importlib.util
-import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
@@ -15,78 +13,58 @@ from contextlib import contextmanager
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Self
+from typing import Any
 
+import softreach
 from softreach.support.errors import InvalidInput
 
-__all__ = [
-    "ACTUATORS",
-    "METRICS",
-    "PROFILES",
-    "Imports",
-    "declared",
-    "import_module",
-    "imported",
-    "importing",
-    "loaded",
-]
+__all__ = ["ACTUATORS", "METRICS", "PROFILES", "declared", "imported", "importing", "loaded"]
 
 ACTUATORS, PROFILES, METRICS = (
     f"softreach.{each}" for each in ("actuators", "profiles", "metrics")
 )
 """Groups of entry points: the name of a class, or of a metric, and where it is."""
 
-_A_MODULE = "a module that Python finds, or the path of a .py file"
+_A_MODULE = "a module that can be imported"
 
-_PACKAGE = str(Path(__file__).parents[1])
-
-_imported: dict[str, ModuleType] = {}
-"""Modules by what a worker on this machine imports them by, in their order."""
-
-
-def import_module(name: str) -> ModuleType:
-    """Import a module of the user, by its name or from its file.
-
-    A file is known by its name without .py, so that worker processes and stores can name what is in
-    it.
-
-    Raises:
-        InvalidInput: There is no such module, it fails, or another one has its name.
-    """
-    is_file = name.endswith(".py") or "/" in name or os.sep in name
-    try:
-        module = _from_file(name) if is_file else importlib.import_module(name)
-    except InvalidInput:
-        raise
-    except (Exception, SystemExit) as error:
-        if not is_file and _is_missing(error, name):
-            hint = f"did you mean {name}.py?" if Path(f"{name}.py").is_file() else ""
-            raise InvalidInput("import", name or "''", _A_MODULE, hint) from None
-        raise InvalidInput(
-            "import", name, "a module that can be imported", _cause(error)
-        ) from error
-    _imported[str(Path(name).resolve()) if is_file else name] = module
-    return module
+_imported: list[ModuleType] = []
 
 
 @contextmanager
 def importing(names: Iterable[str]) -> Iterator[None]:
-    """A block for which modules of the user are imported, and known by their names.
+    """A block for which modules of the user are imported, by their names or from .py files.
 
     Raises:
-        InvalidInput: As `import_module`.
+        InvalidInput: There is no such module, it fails, or another one has its name.
     """
+    before = sys.path.copy()
     try:
-        for name in names:
-            import_module(name)
+        _imported.extend(map(_import, names))
         yield
     finally:
         _imported.clear()
+        sys.path[:] = before
+
+
+def _import(name: str) -> ModuleType:
+    path = Path(name).resolve() if name.endswith(".py") else None
+    if path is not None and not path.is_file():
+        raise InvalidInput("import", name, "the path of a .py file that exists")
+    if path is not None and str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    importlib.invalidate_caches()
+    try:
+        module = importlib.import_module(path.stem if path else name)
+    except (Exception, SystemExit) as error:
+        raise InvalidInput("import", name or "''", _A_MODULE, _cause(error)) from error
+    if path is not None and Path(module.__file__ or "").resolve() != path:
+        raise InvalidInput("import", name, "a file whose name no other module has")
+    return module
 
 
 def imported() -> tuple[ModuleType, ...]:
-    """Modules that `import_module` has imported, in their order."""
-    return tuple(_imported.values())
+    """Modules that the user named, in their order."""
+    return tuple(_imported)
 
 
 def declared(group: str) -> dict[str, EntryPoint]:
@@ -105,89 +83,14 @@ def loaded(entry: EntryPoint) -> Any:
     try:
         return entry.load()
     except (Exception, SystemExit) as error:
-        package = f" of {entry.dist.name}" if entry.dist else ""
-        name = f"entry point {entry.name}{package}"
-        raise InvalidInput(
-            name, entry.value, "a module that can be imported", _cause(error)
-        ) from error
-
-
-class Imports:
-    """Modules that are imported again wherever this is unpickled: in worker processes."""
-
-    def __init__(self, names: Iterable[str]) -> None:
-        self._names, self.fault = tuple(names), ""
-
-    @classmethod
-    def needed_by(cls, parts: Iterable[object]) -> Self:
-        """Those that the user named, and the modules of the classes of these parts."""
-        modules = dict.fromkeys(type(part).__module__ for part in parts)
-        others = {"__main__", *(module.__name__ for module in imported())}
-        own = (each for each in modules if each in sys.modules and not _is_ours(each))
-        return cls([*_imported, *(each for each in own if each not in others)])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, self._names
-
-
-def _restored(*names: str) -> Imports:
-    """The imports of another process, made again here; what fails is kept for who asks."""
-    imports = Imports(names)
-    for name in names:
-        try:
-            import_module(name)
-        except InvalidInput as error:
-            imports.fault = str(error)
-    return imports
-
-
-def _is_ours(module: str) -> bool:
-    return module.partition(".")[0] == "softreach"
-
-
-def _from_file(name: str) -> ModuleType:
-    path = Path(name).resolve()
-    if path.suffix != ".py" or not path.is_file():
-        raise InvalidInput("import", name, "the path of a .py file that exists")
-    stem = path.stem
-    if not stem.isidentifier():
-        raise InvalidInput("import", name, "a file whose name is letters, digits and underscores")
-    module = sys.modules.get(stem)
-    known = importlib.util.find_spec(stem) if module is None else module
-    place = getattr(known, "origin" if module is None else "__file__", None)
-    if known is not None and (place is None or Path(place).resolve() != path):
-        allowed = f"a file of another name, as there is a module {stem} already"
-        raise InvalidInput("import", name, allowed, "rename it")
-    if module is not None:
-        return module
-    spec = importlib.util.spec_from_file_location(stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules[stem] = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[stem]
-        raise
-    return module
-
-
-def _is_missing(error: BaseException, name: str) -> bool:
-    """True if the module itself is not there, and not one that it imports."""
-    if not all(part.isidentifier() for part in name.split(".")):
-        return True
-    missing = error.name if isinstance(error, ModuleNotFoundError) else None
-    return missing is not None and f"{name}.".startswith(f"{missing}.")
+        name = f"entry point {entry.name}"
+        raise InvalidInput(name, entry.value, _A_MODULE, _cause(error)) from error
 
 
 def _cause(error: BaseException) -> str:
     """The error in one line, with the line of the user's code that led to it."""
-    steps = [
-        step
-        for step in traceback.extract_tb(error.__traceback__)
-        if not step.filename.startswith(("<", _PACKAGE))
-    ]
-    place = f" ({Path(steps[-1].filename).name}, line {steps[-1].lineno})" if steps else ""
-    said = "; ".join(str(error).splitlines())
-    text = f"{type(error).__name__}: {said}" if said else type(error).__name__
-    return text if isinstance(error, SyntaxError) else f"{text}{place}"
+    others = ("<", *(str(Path(file).parent) for file in (softreach.__file__, importlib.__file__)))
+    steps = traceback.extract_tb(error.__traceback__)
+    own = [step for step in steps if not step.filename.startswith(others)]
+    place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ") + place

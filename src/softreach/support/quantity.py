@@ -14,7 +14,6 @@ __all__ = [
     "read_number",
     "read_quantity",
     "read_whole_number",
-    "shortened",
     "sizes_in",
     "unit_names",
 ]
@@ -25,9 +24,7 @@ _FINEST = 1e-9  # of the value: what follows is rounding
 _DECIMAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(rf"\s*({_DECIMAL})\s*(.*?)\s*", re.ASCII)
 _GROUPED = re.compile(r"[+-]?\d+(?:_\d+)+", re.ASCII)
-_SHOWN = 60  # characters of what was typed
-_LONGEST = 40  # characters of a whole number
-_LARGEST = 30  # its power of ten
+_LARGEST = 30  # power of ten of a whole number
 _UNITS = {
     "kg": {"kg": "1", "g": "1e-3", "mg": "1e-6"},
     "m": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "µm": "1e-6"},
@@ -85,7 +82,7 @@ def read_whole_number(text: str) -> int:
     """
     plain = text.strip().replace("_", "") if _GROUPED.fullmatch(text.strip()) else text
     match = _NUMBER.fullmatch(plain)
-    if match is None or match[2] or len(plain) > _LONGEST:
+    if match is None or match[2]:
         raise ValueError(text)
     number = Decimal(match[1])
     if number.adjusted() > _LARGEST or number != number.to_integral_value():
@@ -100,12 +97,6 @@ def numbers_in(text: str, count: int | None = None) -> list[float] | None:
     except ValueError:
         return None
     return values if count in (None, len(values)) else None
-
-
-def shortened(text: str) -> str:
-    """Typed text, such that it fits into a line and can be printed."""
-    plain = "".join(character if character.isprintable() else "?" for character in text)
-    return plain if len(plain) <= _SHOWN else f"{plain[: _SHOWN // 2]}...{plain[-_SHOWN // 4 :]}"
 
 
 def unit_names(unit: str) -> tuple[str, ...]:

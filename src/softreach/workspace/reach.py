@@ -19,7 +19,7 @@ from softreach.support.arguments import (
 )
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, warn
-from softreach.support.memory import check_room, free_memory
+from softreach.support.memory import free_memory
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.abstract_set import ReachableSet
@@ -32,7 +32,6 @@ from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import thin_set
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
-_OF_VERTEX = 8  # doubles that a vertex of the grid takes at least
 _MOST_CELLS = 2.0**26
 T = TypeVar("T")
 
@@ -162,11 +161,10 @@ def as_even_cells(name: str, value: object) -> int:
     """A number of cells along each axis of the activation box, instead of the rule's.
 
     Raises:
-        InvalidInput: It is odd, less than 2, or more than fits into memory.
+        InvalidInput: It is odd or less than 2.
     """
     cells = plain(value)
     if isinstance(cells, int) and cells >= 2 and cells % 2 == 0:
-        check_room(name, (cells + 1) ** 3, _OF_VERTEX)
         return cells
     raise InvalidInput(name, as_given(value), "an even number of cells, 2 or more")
 

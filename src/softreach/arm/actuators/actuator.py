@@ -26,7 +26,6 @@ __all__ = [
     "PolarActuator",
     "Resultants",
     "bounds_faults",
-    "distance_faults",
     "length_or_ratio_faults",
 ]
 
@@ -39,10 +38,6 @@ met."""
 
 MOST_BUNDLES = 100
 """Of an arm in all: the time to bound its bending grows with their square."""
-
-
-_FARTHEST = 1000.0
-"""Distance from the axis over R2 that a bundle may have: far beyond any disk."""
 
 
 class Resultants(NamedTuple):
@@ -231,20 +226,6 @@ def length_or_ratio_faults(values: Mapping[str, Any], field: str) -> list[Fault]
         return []
     both = None if pair[0] is None else pair
     return [Fault(f"{field}, {ratio}", both, f"give exactly one of {field} and {ratio}")]
-
-
-def distance_faults(actuator: Actuator, profile: Profile, section: Section) -> list[Fault]:
-    """Faults of bundles that have a distance from the axis at which nothing could hold them."""
-    if not hasattr(actuator, "distance"):
-        return []
-    z = np.array([0.0, *actuator.breakpoints(profile), profile.length])
-    radius = profile.radius(z)
-    with np.errstate(over="ignore"):
-        distance = actuator.outline(profile, section, z).outer_ratio * radius[:, None]
-    if (ratio := float(np.max(distance, initial=0.0) / radius.max())) <= _FARTHEST:
-        return []
-    allowed = f"must be within {_FARTHEST:g} times the largest outer radius of the arm"
-    return [Fault("distance over R2", ratio, allowed)]
 
 
 def _plain_bounds(bounds: ArrayLike) -> Bounds:

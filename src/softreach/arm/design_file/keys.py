@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from functools import cache
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
@@ -135,40 +135,25 @@ def field_keys(kind: type) -> dict[str, str]:
 
 
 def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
-    """Imported kinds of actuators or profiles that are not softreach's, by their classes' names.
-
-    Raises:
-        InvalidInput: Two modules have a kind of one name, or one has softreach's.
-    """
-    taken = {*KINDS[of], *(kind.__name__ for kind in KINDS[of].values())}
-    own: dict[str, type[Kind]] = {}
-    for kind in _subclasses(of):
-        name, module = kind.__name__, kind.__module__
-        if module.partition(".")[0] == "softreach" or getattr(kind, "__abstractmethods__", ()):
-            continue
-        other = own.get(name, kind).__module__
-        if name in taken or other != module:
-            owner = "softreach" if name in taken else f"the module {other}"
-            allowed = f"another name, as {owner} has a kind {name}"
-            raise InvalidInput(f"class {name} of the module {module}", name, allowed)
-        own[name] = kind
-    return own
+    """Imported kinds of actuators or profiles that are not softreach's, by their classes' names."""
+    return {
+        kind.__name__: kind
+        for kind in _subclasses(of)
+        if kind.__module__.partition(".")[0] != "softreach"
+        and not getattr(kind, "__abstractmethods__", ())
+    }
 
 
 def own_kind(of: type[Kind], name: str) -> type[Kind] | None:
     """The kind of this name that is not softreach's, from an installed package if need be.
 
     Raises:
-        InvalidInput: A package that declares it does not have it.
+        InvalidInput: A package that declares it cannot be imported.
     """
-    own = own_kinds(of)
-    entry = None if name in own else plugins.declared(_GROUPS[of]).get(name)
-    if entry is not None:
-        made = plugins.loaded(entry)
-        own = own_kinds(of)
-        if own.get(name) is not made:
-            raise InvalidInput(f"entry point {name}", entry.value, f"a class {name} of that kind")
-    return own.get(name)
+    entries = plugins.declared(_GROUPS[of])
+    if name not in own_kinds(of) and name in entries:
+        plugins.loaded(entries[name])
+    return own_kinds(of).get(name)
 
 
 def every_kind(of: type[Kind]) -> dict[str, type[Kind]]:
@@ -262,12 +247,9 @@ def degrees_text(angle: float) -> str:
 def _radians(text: str) -> float:
     digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
     short = len(digits) < _LONG and math.isfinite(float(text))
-    try:
-        if short or not Decimal(text).is_finite():
-            return math.radians(float(text))
-        return float(Decimal(text) * _PI / 180)
-    except InvalidOperation:  # an exponent beyond all numbers
+    if short or not Decimal(text).is_finite():
         return math.radians(float(text))
+    return float(Decimal(text) * _PI / 180)
 
 
 def _decimal_text(number: str) -> str:

@@ -108,18 +108,15 @@ def document_of(
         number: Maker of the value of a number with a point or an exponent.
 
     Raises:
-        InvalidDesign: Text that is no TOML, or too long or too deeply nested to be a design.
+        InvalidDesign: Text that is no TOML, or too long to be a design.
     """
     if len(text) > LONGEST:
         allowed = f"must be at most {LONGEST:,} characters long, and has {len(text):,}"
         raise InvalidDesign([Fault("TOML", None, allowed)], source)
     try:
         return tomllib.loads(text, parse_float=number)
-    except RecursionError:
-        trouble = "tables or lists in each other, hundreds deep"
-    except ValueError as error:  # beside faults of syntax, numbers of thousands of digits
-        trouble = str(error)
-    raise InvalidDesign([Fault("TOML", trouble, "must be valid TOML")], source)
+    except ValueError as error:
+        raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
 
 
 def parse(text: str, source: str) -> Parts:

@@ -247,11 +247,4 @@ def _floats(raw: Any) -> Any:
 
 
 def _is_number(raw: Any) -> bool:
-    """A number of Python that a double can hold."""
-    if isinstance(raw, bool) or not isinstance(raw, int | float):
-        return False
-    try:
-        float(raw)
-    except OverflowError:
-        return False
-    return True
+    return isinstance(raw, int | float) and not isinstance(raw, bool)

@@ -10,7 +10,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import OwnParameter, Parameter, parameters
 from softreach.support.arguments import as_instance, as_text, plain
-from softreach.support.errors import Fault, InvalidInput, did_you_mean, in_short
+from softreach.support.errors import Fault, InvalidInput, did_you_mean
 
 __all__ = [
     "changed",
@@ -62,7 +62,7 @@ def find_parameters(
     aliases: dict[str, str] = {}
     for name in names:
         if not isinstance(name, str) or name not in listed:
-            raise unknown_parameter(in_short(name), known)
+            raise unknown_parameter(str(name), known)
         if (first := aliases.setdefault(listed[name], name)) != name:
             raise InvalidInput("parameter", name, "given once", f"{first} is the same")
     return {aliases[key]: _renamed(known[key], aliases[key]) for key in known if key in aliases}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from io import BufferedWriter
 from itertools import chain
@@ -23,7 +22,6 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.files.kinds import FileKind, Formats
-from softreach.support.memory import free_memory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +30,6 @@ __all__ = ["CLOUD_PAIR", "gamma_path", "read_cloud", "write_cloud"]
 
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
-_BYTES = 20  # of a number in text
 _ENDING = "_gamma"
 _NO_NUMBER = re.compile(r"could not convert string (.*) to float64 at row (\d+), column (\d+)")
 
@@ -102,8 +99,7 @@ def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     filament = filament_of(design_of(schema.check_cloud(cloud)))
     kind = CLOUD_PAIR[".csv"]
-    takes = _BYTES * (cloud["tip"].size + cloud["activation"].size)
-    check_place(path, kind, takes=takes, overwrite=overwrite)
+    check_place(path, kind, overwrite=overwrite)
     with writing(gamma_path(path), kind, overwrite=overwrite) as file:
         _write(file, cloud["activation"].values, filament)
     with writing(path, kind, overwrite=overwrite) as file:
@@ -153,7 +149,8 @@ def _warn(arm: Manipulator, activation: Array, difference: float) -> None:
 def _table(path: Path, columns: int, meaning: str) -> Array:
     """A table of numbers without a header, shape (row, columns)."""
     name = fspath(path)
-    _check_file(path)
+    if not path.is_file():
+        raise InvalidInput("file", name, "a file that exists")
     try:
         # NumPy would unpack or fetch what it is given by name.
         with path.open(encoding="utf-8-sig") as file:
@@ -174,16 +171,6 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
     return table
 
 
-def _check_file(path: Path) -> None:
-    """Refuse what is no file, or one that cannot fit into memory."""
-    if not path.is_file():
-        raise InvalidInput("file", fspath(path), "a file that exists")
-    size, room = os.stat(path).st_size, free_memory() / 2
-    if size > room:
-        allowed = f"at most {room / 1e9:.1f} GB, half of the free memory"
-        raise InvalidInput(fspath(path), f"{size / 1e9:.1f} GB", allowed)
-
-
 def _reason(error: Exception) -> str:
     """Fault of a table, in a few printable words."""
     if isinstance(error, UnicodeDecodeError):
@@ -191,5 +178,4 @@ def _reason(error: Exception) -> str:
     text = str(error).partition(";")[0] or type(error).__name__
     if match := _NO_NUMBER.search(text):
         text = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
-    shown = "".join(character if character.isprintable() else "?" for character in text)
-    return shown if len(shown) < 120 else f"{shown[:60]} ... {shown[-40:]}"
+    return text

@@ -19,7 +19,6 @@ from typing import Any
 from softreach.support.errors import InvalidInput, NotWritten
 from softreach.support.files.interruption import as_a_whole, undoing
 from softreach.support.files.kinds import FileKind
-from softreach.support.memory import check_disk
 
 try:
     import fcntl
@@ -99,7 +98,6 @@ def check_place(
     path: StrPath,
     kind: FileKind,
     *,
-    takes: float = 0.0,
     overwrite: bool = False,
     name: str = "path",
 ) -> Path:
@@ -108,7 +106,6 @@ def check_place(
     Args:
         path: The place.
         kind: What will be written: it may replace nothing, an empty file or folder, and its kind.
-        takes: What it will take of the disk, if that may be much [bytes].
         overwrite: Whether it may replace any file, and any store of softreach. A folder with
             anything else in it is never replaced.
         name: What errors call the path.
@@ -117,11 +114,8 @@ def check_place(
         The place, absolute and without links.
 
     Raises:
-        InvalidInput: Something else is there, or the disk cannot hold it.
+        InvalidInput: Something else is there.
         NotWritten: Nothing can be written there.
-
-    Warns:
-        SoftreachWarning: It takes more than half of what is free.
     """
     with _one_line(path):
         target = _resolved(path, name)
@@ -136,7 +130,6 @@ def check_place(
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         with as_a_whole():
             os.rmdir(tempfile.mkdtemp(prefix=".softreach-", dir=_nearest_folder(target)))
-    check_disk(name, os.fspath(path), takes, target)
     return target
 
 
@@ -145,7 +138,6 @@ def replacing(
     path: StrPath,
     kind: FileKind,
     *,
-    takes: float = 0.0,
     overwrite: bool = False,
     durable: bool = True,
     name: str = "path",
@@ -157,7 +149,6 @@ def replacing(
     Args:
         path: The place.
         kind: What will be written.
-        takes: As for `check_place`.
         overwrite: As for `check_place`.
         durable: Whether what was written is on the disk before it takes its place.
         name: What errors call the path.
@@ -166,7 +157,7 @@ def replacing(
         InvalidInput: What is there is not of that kind; see `check_place`.
         NotWritten: It cannot be written.
     """
-    target = check_place(path, kind, takes=takes, overwrite=overwrite, name=name)
+    target = check_place(path, kind, overwrite=overwrite, name=name)
     with _one_line(path), _with_parents(target), scratch_folder(target.parent) as scratch:
         # The suffix stays, because writers choose their format by it.
         partial = scratch / target.name
@@ -184,7 +175,6 @@ def writing(
     path: StrPath,
     kind: FileKind,
     *,
-    takes: float = 0.0,
     overwrite: bool = False,
     name: str = "path",
 ) -> Iterator[io.BufferedWriter]:
@@ -194,7 +184,7 @@ def writing(
     closing can get lost.
     """
     with (
-        replacing(path, kind, takes=takes, overwrite=overwrite, name=name) as partial,
+        replacing(path, kind, overwrite=overwrite, name=name) as partial,
         _WatchedFile(io.FileIO(partial, "xb")) as file,
     ):
         yield file
