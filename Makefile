@@ -82,7 +82,7 @@ fast: setup
 LOWEST := .venv-lowest
 
 test-lowest: $(LOWEST)/.ready
-	NUMBA_CACHE_DIR=$(CURDIR)/$(LOWEST)/kernels $(MAKE) --no-print-directory fast BIN=$(LOWEST)/bin
+	NUMBA_CACHE_DIR=$(CURDIR)/.cache/lowest $(MAKE) --no-print-directory fast BIN=$(LOWEST)/bin
 
 $(LOWEST)/.ready: $(READY)
 	$(PYTHON) -m venv --clear $(LOWEST)
