@@ -7,13 +7,14 @@ READY := .venv/.ready
 # Bytecode is kept whatever the environment says, or every process would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-all tests all-tests ready kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all test-lowest tests all-tests ready kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
 	@echo "make test    set up, then run every check and test"
 	@echo "make quick   format, lint, layers, types and the fast tests: for every edit"
 	@echo "make test-all  as make test, with the large sizes"
+	@echo "make test-lowest  the fast tests with the lowest versions that pyproject.toml allows"
 	@echo "make record  every test; which are slow goes into tests/durations.json"
 	@echo "make check   format, lint, types, layers, documentation"
 	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
@@ -76,6 +77,19 @@ quick: lint
 fast: setup
 	$(BIN)/python -m pytest -q --quick tests
 
+# The fast tests with the lowest version of each dependency that has a wheel, in an environment and
+# with compiled kernels of its own.
+LOWEST := .venv-lowest
+
+test-lowest: $(LOWEST)/.ready
+	NUMBA_CACHE_DIR=$(CURDIR)/.cache/lowest $(MAKE) --no-print-directory fast BIN=$(LOWEST)/bin
+
+$(LOWEST)/.ready: $(READY)
+	$(PYTHON) -m venv --clear $(LOWEST)
+	PATH="$(CURDIR)/$(BIN):$$PATH" uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --only-binary :all: -r pyproject.toml --all-extras --group dev
+	PATH="$(CURDIR)/$(LOWEST)/bin:$(CURDIR)/$(BIN):$$PATH" uv pip install --quiet --python $(LOWEST)/bin/python --no-deps --no-build-isolation --editable .
+	@touch $@
+
 # Renews the list of slow tests, which `make quick` leaves out; on an idle machine.
 record: setup browser
 	$(TESTS) --record
@@ -114,4 +128,4 @@ lock:
 	uv export --quiet --all-extras --all-groups --no-emit-project --no-header --format requirements-txt --output-file requirements.lock
 
 clean:
-	rm -rf .venv out site .cache
+	rm -rf .venv $(LOWEST) out site .cache

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import inspect
+import pkgutil
 import re
+import textwrap
 import typing
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +16,7 @@ from types import ModuleType
 import pytest
 
 import softreach as sr
+from softreach.support.lazy import lazy
 
 MODULES = [
     importlib.import_module(f"softreach.{name}")
@@ -115,6 +119,58 @@ def test_every_argument_is_documented():
         if not (brief and not told) and (missing := named(function) - told):
             bad[name] = missing
     assert bad == {}
+
+
+def test_what_a_function_refuses_itself_is_documented():
+    bad = [
+        name
+        for name, function in FUNCTIONS.items()
+        for node in ast.walk(
+            ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(function))))
+        )
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call)
+        if "Raises:" not in (inspect.getdoc(function) or "")
+    ]
+    assert bad == []
+
+
+def texts_of_bases(name: str, function: Callable) -> str:
+    """Docstrings of a function, and of those of the same name that it overrides."""
+    owner = dict(public_objects()).get(name.rpartition(".")[0])
+    bases = inspect.getmro(owner) if inspect.isclass(owner) else ()
+    overridden = [vars(base).get(name.rpartition(".")[2]) for base in bases]
+    return " ".join(inspect.getdoc(f) or "" for f in (function, *overridden) if f)
+
+
+def test_what_returns_arrays_says_their_unit_or_shape():
+    arrays = {
+        name: texts_of_bases(name, function)
+        for name, function in FUNCTIONS.items()
+        if re.search(r"\b(NDA|A)rray\b", str(function.__annotations__.get("return")))
+    }
+    assert len(arrays) > 100
+    said = re.compile(r"\[[^\]]+\]|[Ss]hape|\((n|number),")
+    assert [name for name, text in arrays.items() if not said.search(text)] == []
+
+
+def test_methods_that_override_nothing_have_a_docstring():
+    modules = [
+        importlib.import_module(module.name)
+        for module in pkgutil.walk_packages(sr.__path__, "softreach.")
+        if not module.name.endswith("__main__")
+    ]
+    bad = [
+        f"{module.__name__}.{owner.__name__}.{name}"
+        for module in modules
+        for owner in vars(module).values()
+        if inspect.isclass(owner) and owner.__module__ == module.__name__
+        for name, method in vars(owner).items()
+        if not (name.startswith("_") or owner.__name__.startswith("_"))
+        if inspect.isroutine(method) or isinstance(method, (property, lazy))
+        if getattr(method, "__name__", name) == name  # no function as the value of a field
+        if not method.__doc__ and not any(hasattr(base, name) for base in owner.__bases__)
+    ]
+    assert bad == []
 
 
 def test_the_arm_or_the_data_asked_come_first():

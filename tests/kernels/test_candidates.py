@@ -24,6 +24,7 @@ def starts_of(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = T
 def starts_and_inverses(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = True):
     """The same, and the inverse of the Jacobian at each."""
     mesh = mesh_of(f, cells)
+    mesh = mesh._replace(remainder=np.maximum(mesh.remainder, 1e-14))  # rounding, if f is affine
     tree = image_tree(mesh)
     room = MOST_STARTS * (1 + len(targets))
     target, cell, start = np.empty(room, int), np.empty(room, int), np.empty((room, 3))

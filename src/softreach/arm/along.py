@@ -44,7 +44,7 @@ class AlongArm(Part, ABC):
 
     @abstractmethod
     def derivative(self, x: ArrayLike) -> Array:
-        """Derivative by x = Z/L."""
+        """Derivative by x = Z/L [unit of the values], of the shape of x."""
 
     @property
     def breaks(self) -> tuple[float, ...]:

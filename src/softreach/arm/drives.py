@@ -110,7 +110,7 @@ class Drive(Part):
         )
 
     def effective(self, u: Array) -> tuple[Array, Array]:
-        """dz(u), and its derivative."""
+        """dz(u) [unit], and its derivative [-], both of the shape of u."""
         beyond = np.abs(u) - self.dead_zone
         acts = beyond > 0.0 if self.dead_zone else np.ones(u.shape, bool)
         return np.where(acts, np.sign(u) * beyond, 0.0), acts.astype(float)

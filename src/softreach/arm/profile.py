@@ -186,7 +186,6 @@ class LinearTaper(Profile):
         return float(self.radius(self.length))
 
     def radius(self, z: ArrayLike) -> Array:
-        """R2(Z) [m]."""
         return self.outer_radius - as_floats("z", z) * np.tan(self.taper)
 
     def slope(self, z: ArrayLike) -> Array:
@@ -264,7 +263,6 @@ class PiecewiseTaper(_RadiiAtStations):
     """
 
     def radius(self, z: ArrayLike) -> Array:
-        """R2(Z) [m]."""
         return np.interp(as_floats("z", z), self._knots, self.radii)
 
     def slope(self, z: ArrayLike) -> Array:
@@ -300,11 +298,9 @@ class SampledTaper(_RadiiAtStations):
     """
 
     def radius(self, z: ArrayLike) -> Array:
-        """R2(Z) [m]."""
         return self._curve(as_floats("z", z) / self.length)
 
     def slope(self, z: ArrayLike) -> Array:
-        """tan φ(Z) = -R2'(Z) [-]."""
         return -self._curve_slope(as_floats("z", z) / self.length) / self.length
 
     @lazy

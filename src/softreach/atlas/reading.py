@@ -143,6 +143,9 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     Args:
         atlas: From `open_atlas`.
         metric: Which one; without a length in its unit it stays as it is.
+
+    Raises:
+        InvalidInput: No atlas, or a metric that it does not have.
     """
     atlas = as_dataset("atlas", atlas, "length", what="an atlas")
     if as_text("metric", metric) not in atlas:

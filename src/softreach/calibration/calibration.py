@@ -314,6 +314,8 @@ class Calibration:
     ) -> tuple[Array, Array]:
         """A quantity of the calibrated arm and the standard deviation that calibration leaves.
 
+        Both have the shape and unit of the quantity.
+
         Args:
             quantity: Function of an arm, such as `lambda arm: sr.reachable_set(arm).volume`.
             count: Arms that it is computed of.

@@ -41,7 +41,7 @@ class Uncertainty:
         return self.covariance / np.outer(sigma, sigma)
 
     def half_widths(self, level: float = 0.95) -> Array:
-        """Of intervals that hold the number with this probability, by Student's t."""
+        """Of intervals that hold each number with this probability, by Student's t, (number,)."""
         from scipy.special import stdtrit
 
         return self.sigma * stdtrit(self.freedom, 0.5 + 0.5 * level)

@@ -153,6 +153,9 @@ def prepared_map(
         depth: Halvings of a cell where det ∂r/∂γ changes sign or is uneven; once at least
             for an arm under loads.
         frame: In which targets are told: that of the "world" or of the "base".
+
+    Raises:
+        InvalidInput: Numbers out of range, or an arm that was prepared in another frame.
     """
     cells, depth = as_integer("cells", cells, 2, 256), as_integer("depth", depth, 0, 20)
     if isinstance(arm, PreparedMap):

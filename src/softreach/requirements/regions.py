@@ -142,7 +142,6 @@ class Box(Region):
 
     @property
     def volume(self) -> float:
-        """Volume [m³]."""
         return float(np.prod(np.subtract(self.high, self.low)))
 
     @property
@@ -194,12 +193,10 @@ class Sphere(Region):
 
     @property
     def volume(self) -> float:
-        """Volume [m³]."""
         return 4.0 / 3.0 * np.pi * self.radius**3
 
     @property
     def bounds(self) -> Array:
-        """Corners of the box around it [m], shape (2, 3)."""
         return np.array(self.center) + self.radius * np.array([[-1.0], [1.0]])
 
     def distance(self, points: ArrayLike) -> Array:
@@ -209,7 +206,6 @@ class Sphere(Region):
     def section_distances(
         self, center: Array, tangent: Array, radius: Array
     ) -> tuple[Array, Array]:
-        """As `Region.section_distances`, exact."""
         apart = center - self.center
         height = (apart * tangent).sum(axis=-1)
         across = np.sqrt(np.maximum((apart**2).sum(axis=-1) - height**2, 0.0))
@@ -243,7 +239,6 @@ class HalfSpace(Region):
 
     @property
     def volume(self) -> float:
-        """Infinite."""
         return np.inf
 
     @property
@@ -258,7 +253,6 @@ class HalfSpace(Region):
     def section_distances(
         self, center: Array, tangent: Array, radius: Array
     ) -> tuple[Array, Array]:
-        """As `Region.section_distances`, exact."""
         distance = (center - self.point) @ np.array(self.normal)
         along = tangent @ np.array(self.normal)
         reach = radius * np.sqrt(np.maximum(1.0 - along**2, 0.0))
@@ -349,7 +343,6 @@ class Mesh(Region):
 
     @property
     def bounds(self) -> Array:
-        """Corners of the box around it [m], shape (2, 3)."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def distance(self, points: ArrayLike) -> Array:

@@ -149,11 +149,11 @@ class ActivationBox:
         return as_rows("activations", activations, self.bundles, allowed)
 
     def clip(self, activations: Array) -> Array:
-        """The activations moved to the nearest bounds where they are outside."""
+        """Activations (n, bundles) moved to the nearest bounds where they are outside."""
         return np.clip(activations, self.low, self.high)
 
     def excess(self, activations: Array) -> Array:
-        """Distance of each bundle beyond its bounds, in `scales`; negative inside."""
+        """Distance of each bundle beyond its bounds, in `scales`, (n, bundles); negative inside."""
         return np.maximum(self.low - activations, activations - self.high) / self.scales
 
     def margin(self, activations: Array) -> Array:

@@ -80,7 +80,6 @@ class ArmRod(TipMap):
         """Compute what every sample needs."""
 
     def prepare(self) -> None:
-        """Compute what every sample needs, once for all threads."""
         known = vars(self)
         if "_is_prepared" in known:
             return

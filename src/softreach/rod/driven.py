@@ -55,7 +55,6 @@ class DrivenRod(DerivedMap):
 
     @property
     def steps(self) -> int:
-        """Steps that the integrator makes along the arm."""
         return self.base.steps
 
     @lazy
@@ -81,7 +80,6 @@ class DrivenRod(DerivedMap):
         return LoadedLengths(self.driving.law, LoadedRod(self.outer.inner, tol))
 
     def prepare(self) -> None:
-        """Compute what every sample needs, once for all threads."""
         super().prepare()
         self.activations(self.box.low[None])
 
@@ -114,7 +112,6 @@ class DrivenRod(DerivedMap):
         status: Status | None = None,
         directions: Array | None = None,
     ) -> None:
-        """Put tips, and what else is asked for, of checked x into place."""
         if slopes is None and twists is None:
             inner, lost = self._known(self.activations(gamma))
             self.base.fill(inner, tips, status=status, directions=directions)
@@ -145,7 +142,6 @@ class DrivenRod(DerivedMap):
             status[lost] = TipStatus.UNDECIDED
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """The smallest ζ along the arm [-] and the largest turn of a step [rad] at x."""
         return self.base.extension_and_turn(self.activations(gamma))
 
     def linearization_error(self, half_widths: Array) -> float:
@@ -158,14 +154,12 @@ class DrivenRod(DerivedMap):
         return self.base.linearization_error(self.driving.widths @ half_widths)
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
-        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
         if not self.driving.is_affine:
             return np.full(len(centers), np.inf)
         widths = self.driving.widths @ half_widths
         return self.base.linearization_errors(self.activations(centers), widths)
 
     def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        """Bound of the distance of tips from the quadratic at the center of any box in cells."""
         widths = self.driving.widths @ half_widths
         of_base = self.base.cubic_remainder(self.activations(centers), widths)
         return of_base.along(self.driving.gains)
@@ -173,14 +167,12 @@ class DrivenRod(DerivedMap):
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
     ) -> Frames:
-        """Centerline and directors at ascending stations Z [m]."""
         inner, lost = self._known(self.activations(self.box.check(activations)))
         frames = self.base.frames(inner, stations, status)
         self._drop(lost, status, *frames)
         return frames
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """The strains at stations Z [m], in any order, as a function of activations."""
         of_base = self.base.strains_at(stations)
 
         def strains(activations: ArrayLike, status: Status | None = None) -> Strains:

@@ -64,7 +64,6 @@ class FreeRod(ArmRod):
         return self.rule.packed_nodes(self._fineness)
 
     def in_steps(self, steps: int) -> Self:
-        """The rod in so many steps."""
         vars(self).update(_fineness=steps, _shape_steps=steps)
         return self
 
@@ -102,15 +101,12 @@ class FreeRod(ArmRod):
         return self._linearization.longest_arm
 
     def linearization_error(self, half_widths: Array) -> float:
-        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
         return self._linearization.error(half_widths)
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
-        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
         return self._linearization.errors(centers, half_widths)
 
     def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        """Bound of the distance of tips from the quadratic at the center of any box in cells."""
         return self._linearization.cubic_remainder(centers, half_widths)
 
     @lazy
@@ -120,7 +116,6 @@ class FreeRod(ArmRod):
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
     ) -> Frames:
-        """Centerline and directors at ascending stations Z [m]."""
         gamma, lost = self.with_arms(self.box.check(activations))
         z = self.check_stations(stations)
         table, ends = self._station_table(z)
@@ -149,7 +144,6 @@ class FreeRod(ArmRod):
         return strains
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] within the activation box."""
         z = self.check_stations(stations, ascending=False)
         return strain_range(tables(self.arm, z), self.box)
 

@@ -191,7 +191,7 @@ class TipMap(ABC):
         raise InvalidInput(name, _listed(first[0]), allowed, why + count)
 
     def with_arms(self, gamma: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Activations with the lower bounds for those that leave no arm, and the rows of these."""
+        """Activations (n, bundles), at the lower bounds where they leave no arm, and these rows."""
         lost = np.flatnonzero(~self.has_arm(gamma))
         if len(lost):
             gamma = gamma.copy()

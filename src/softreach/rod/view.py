@@ -103,17 +103,14 @@ class DerivedMap(TipMap):
 
     @property
     def pose(self) -> Base:
-        """Pose of the clamped end in the frame in which the map tells places."""
         return self.base.pose
 
     @property
     def frame(self) -> Frame:
-        """The frame in which the map tells places."""
         return self.base.frame
 
     @property
     def supports_unstable(self) -> bool:
-        """True if a tip can have another status than stable."""
         return self.base.supports_unstable
 
     @lazy
@@ -122,35 +119,27 @@ class DerivedMap(TipMap):
         return self.base.box
 
     def prepare(self) -> None:
-        """Compute what every sample needs, once for all threads."""
         self.base.prepare()
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """The smallest ζ along the arm [-] and the largest turn of a step [rad], (n,) each."""
         return self.base.extension_and_turn(gamma)
 
     def farthest(self) -> float:
-        """No tip is farther from the base than this [m]."""
         return self.base.farthest()
 
     def linearization_error(self, half_widths: Array) -> float:
-        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
         return self.base.linearization_error(half_widths)
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
-        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
         return self.base.linearization_errors(centers, half_widths)
 
     def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        """Bound of the distance of tips from the quadratic at the center of any box in cells."""
         return self.base.cubic_remainder(centers, half_widths)
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """The strains at stations Z [m], in any order, as a function of activations."""
         return self.base.strains_at(stations)
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] within the activation box."""
         return self.base.strain_range(stations)
 
 
@@ -176,7 +165,6 @@ class PlacedRod(DerivedMap):
 
     @property
     def steps(self) -> int:
-        """Steps that the integrator makes along the arm."""
         return self.base.steps
 
     def fill(
@@ -212,7 +200,6 @@ class PlacedRod(DerivedMap):
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
     ) -> Frames:
-        """Centerline and directors at ascending stations Z [m]."""
         return self.placed(self.base.frames(activations, stations, status))
 
     def placed(self, frames: Frames) -> Frames:
@@ -279,7 +266,6 @@ class View(DerivedMap):
         status: Status | None = None,
         directions: Array | None = None,
     ) -> None:
-        """Put tips, and what else is asked for, of checked x into place."""
         if self.only_stable and status is None:
             status = np.empty(len(gamma), np.int8)
         base_slopes, base_twists = self._room(slopes), self._room(twists)
@@ -310,20 +296,16 @@ class View(DerivedMap):
         drop(lost, status, *(some for some in values if some is not None))
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """The smallest ζ along the arm [-] and the largest turn of a step [rad] at x."""
         return self.base.extension_and_turn(self.activations(gamma))
 
     def linearization_error(self, half_widths: Array) -> float:
-        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
         return self.base.linearization_error(self._widths(half_widths))
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
-        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
         widths = self._widths(half_widths)
         return self.base.linearization_errors(self.activations(centers), widths)
 
     def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        """Bound of the distance of tips from the quadratic at the center of any box in cells."""
         change = np.zeros((len(self.scale), len(half_widths)))
         change[self._columns, np.arange(len(half_widths))] = self.measures
         of_base = self.base.cubic_remainder(self.activations(centers), self._widths(half_widths))
@@ -337,7 +319,6 @@ class View(DerivedMap):
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
     ) -> Frames:
-        """Centerline and directors at ascending stations Z [m]."""
         gamma = self.activations(self.box.check(activations))
         if self.only_stable and status is None:
             status = np.empty(len(gamma), np.int8)
@@ -346,7 +327,6 @@ class View(DerivedMap):
         return frames
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """The strains at stations Z [m], in any order, as a function of activations."""
         of_base = self.base.strains_at(stations)
 
         def strains(activations: ArrayLike, status: Status | None = None) -> Strains:

@@ -27,7 +27,7 @@ _FLAT = 0.1  # part of the slope at the start of a step at which its end is good
 
 
 @kernel
-def project(center, slope, wanted, softness, low, high, out, multiplier):  # noqa: C901
+def project(center, slope, wanted, softness, low, high, out, multiplier):
     """Write x into `out` (n, m) and y into `multiplier` (n, 3).
 
     Args:

@@ -57,7 +57,7 @@ def sort_keys(points, low, scale, keys):
 
 
 @strict
-def stable_order(keys, order):  # noqa: C901
+def stable_order(keys, order):
     """Increasing keys, equal ones in the order in which they come, digit by digit from the last.
 
     Digits in which no two keys differ are left out: most of the 63 bits, as columns are few.

@@ -63,7 +63,6 @@ class LoadedRod(ArmRod):
 
     @property
     def supports_unstable(self) -> bool:
-        """True if a tip can have another status than stable."""
         return True
 
     @lazy
@@ -131,7 +130,6 @@ class LoadedRod(ArmRod):
         return self._solver_of(checked(self._shape_steps, self.tol))
 
     def in_steps(self, steps: int) -> Self:
-        """The rod in so many steps."""
         vars(self).update(_tip_steps=steps, _shape_steps=steps)
         return self
 
@@ -196,7 +194,6 @@ class LoadedRod(ArmRod):
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
     ) -> Frames:
-        """Centerline and directors at ascending stations Z [m]."""
         gamma, z = self.box.check(activations), self.check_stations(stations)
         return self.shapes(gamma, z, status).frames
 

@@ -292,7 +292,6 @@ class TipForceTables(LoadTables):
         return self._given.phase if self.origin is None else self.origin.phase
 
     def uniform(self, steps: int) -> StepTables:
-        """At least `steps` steps, with boundaries where the arm or its loads are not smooth."""
         made = super(TipForceTables, self.origin or self).uniform(steps)
         scalars = made.scalars.copy()
         scalars[..., 3:] += self.force * (self.axes @ self.direction)
