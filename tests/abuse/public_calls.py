@@ -163,9 +163,9 @@ NAMES = {
         half_width high length memory radius radius_ratio residual_over_length revolution size
         taper thickness threshold tip_radius tol width""",
     "whole number": "bins cells count depth family n seed segments sides",
-    "word": "color fiber frame method metric name quantity sampler unit view",
+    "word": "color fiber frame metric name quantity sampler unit view",
     "words": "metrics names panels parameters",
-    "flag": """bias durable keep_clouds keep_extent key legend overwrite prove_least rest smallest
+    "flag": """bias durable keep_clouds keep_extent key legend overwrite rest smallest
         warn""",
     "path": "atlas path store",
     "function": "executor progress",
@@ -309,7 +309,6 @@ CALLS: dict[str, Call] = {
     "forces.blocked_force": Call(lambda: dict(arm=HEAVY, places=TIP, direction=(1.0, 0.0, 0.0))),
     "inverse.prepared_map": Call(lambda: dict(arm=ARM)),
     "inverse.solve_inverse": Call(lambda: dict(arm=ARM, targets=TIP)),
-    "inverse.twin_hints": Call(lambda: dict(arm=ARM, targets=TIP)),
     "inverse.path.track_path": Call(lambda: dict(arm=ARM, path=TIP), kinds=dict(path="array")),
     "workspace.payload.payload_curve": Call(
         lambda: dict(arm=HEAVY, payloads=[0.1]), fine={"payloads": MANY}
@@ -445,7 +444,6 @@ CALLS: dict[str, Call] = {
     "cloud.volume.volume_curve": Call(
         lambda: dict(points=cloud().tip, alphas=[0.1]), fine={"alphas": MANY | {"infinity"}}
     ),
-    "workspace.direction_spread": Call(lambda: dict(arm=ARM, n=64)),
     "workspace.reachable_set": Call(
         lambda: dict(arm=ARM, accuracy=0.2), kinds=dict(grid="whole number")
     ),

@@ -210,7 +210,6 @@ IGNORED = [
     case("payload lce_arm --gravity up --overwrite", NOT_WRITTEN),
     case(f"equilibria {TRUNK} --view top", "view = top: must be left out without a picture"),
     case(f"solve {TRUNK} --target 0,0,1 --family 2", "family = 2: must be left out for a design"),
-    case(f"solve {TRUNK} --target 0,0,1 --prove-least", "prove_least = True: must be left out for"),
     case("export a.zarr a.csv --activation=0,0,0", "activation = 0,0,0: must be left out for a cl"),
     case(
         f"export {TRUNK} a.jl --activation=0,0,0", "activation = 0,0,0: must be left out for a fi"
