@@ -29,7 +29,6 @@ from functools import partial
 import numpy as np
 
 from softreach.inverse.descent import descend
-from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import (
@@ -46,6 +45,7 @@ from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Sea
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined_by, rows
+from softreach.workspace.search import CLOSELY, nearest_tips
 
 __all__ = ["distinct", "every_branch"]
 
@@ -271,6 +271,7 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
 def _singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """Step 9: what descent finds for targets where Newton's method found nothing."""
     starts = starts_from_cells(prepared, request, chosen)
-    gamma = local_minima(prepared.rod, request.of(starts.target), starts.gamma).gamma
+    targets = request.targets[starts.target]
+    gamma = nearest_tips(prepared.rod, starts.gamma, targets, request.residual, CLOSELY).gamma
     roots = roots_at(prepared.rod, request.targets, starts.target, gamma)
     return distinct(prepared, request, rows(roots, roots.residual <= request.residual))
