@@ -20,10 +20,10 @@ from softreach.arm import (
     Ring,
     Section,
 )
-from softreach.arm.lines import tensions_of_lengths
 from softreach.arm.tensions import LengthLaw
 from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign
+from tests.laws import tensions_of_lengths
 from tests.oracles.pulled_tendons import HeavyPulledArm, PulledArm
 
 LENGTH, RADIUS, MODULUS, DISTANCE = 0.3, 0.01, 1e6, 0.008
