@@ -22,10 +22,12 @@ from softreach.workspace import (
     ReachableSolid,
     ReachableSurface,
     Surface,
+    reach,
     reachable_set,
 )
 from softreach.workspace.boundary import critical_surface
 from softreach.workspace.image import Image
+from softreach.workspace.reach import rasterized_set
 from tests.laws import arm_of
 
 
@@ -66,7 +68,7 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2
-        fine = solid(coarse.arm, grid=2 * coarse.cells, cell=cell)
+        fine = rasterized_set(tip_map(coarse.arm), 2 * coarse.cells, cell, 3e-3)
         assert abs(fine.volume - coarse.volume) < fine.volume_error + coarse.volume_error
         assert abs(several(fine) - several(coarse)) < coarse.multiplicity_error
         assert abs(fine.fold_volume - coarse.fold_volume) < coarse.fold_volume_error
@@ -309,20 +311,20 @@ def test_a_held_bundle_with_room_elsewhere_changes_nothing():
 
 def test_progress_counts_every_vertex(trunk):
     done: list[int] = []
-    reachable_set(trunk, grid=8, accuracy=0.1, progress=done.append)
+    reachable_set(trunk, accuracy=0.1, progress=done.append)
     assert sum(done) == 9**3
 
 
-def test_a_coarse_grid_is_warned_of():
+def test_a_grid_that_is_too_coarse_is_warned_of(monkeypatch):
+    monkeypatch.setattr(reach, "_MOST_VERTICES", 5**3)
     with pytest.warns(SoftreachWarning, match="grid above 4"):
-        reachable_set(trunk_at(75, 3), grid=4)
+        reachable_set(trunk_at(75, 3))
 
 
 @pytest.mark.parametrize(
     ("argument", "value", "allowed"),
     [
         ("accuracy", 0.0, ">= 1e-06"),
-        ("grid", 7, "even"),
         ("cell", 1e-9, "at least"),
         ("cell", np.nan, "> 0"),
     ],

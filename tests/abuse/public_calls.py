@@ -444,9 +444,7 @@ CALLS: dict[str, Call] = {
     "cloud.volume.volume_curve": Call(
         lambda: dict(points=cloud().tip, alphas=[0.1]), fine={"alphas": MANY | {"infinity"}}
     ),
-    "workspace.reachable_set": Call(
-        lambda: dict(arm=ARM, accuracy=0.2), kinds=dict(grid="whole number")
-    ),
+    "workspace.reachable_set": Call(lambda: dict(arm=ARM, accuracy=0.2)),
     "workspace.volume_gradient": Call(
         lambda: dict(arm=ARM, parameters="taper", accuracy=0.2), said="parameter"
     ),

@@ -218,9 +218,8 @@ def bundle_solids(arm: Body, line: Centerline, *, thickness: float) -> list[Surf
 
     def sector(span: _Span) -> Surface:
         # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
-        return ribbon_surface(
-            *(span.band(lift, np.pi / 32) for lift in (thickness / 2, -thickness / 2))
-        )
+        upper, lower = (span.band(lift, np.pi / 32) for lift in (thickness / 2, -thickness / 2))
+        return ribbon_surface(upper, lower)
 
     return _skins(arm, line, sector)
 

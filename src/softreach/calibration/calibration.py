@@ -431,10 +431,3 @@ class Calibration:
         from softreach.calibration.report import summary_text
 
         return summary_text(self)
-
-
-def as_calibration(value: object) -> Calibration:
-    """An argument that is a calibration."""
-    if not isinstance(value, Calibration):
-        raise InvalidInput("calibration", type(value).__name__, "a Calibration")
-    return value

@@ -4,15 +4,17 @@
    their corners, once for an arm (`cells`).
 2. A tetrahedron is mapped by the quadratic through tips and Jacobians of its corners, whose image
    lies within planes; the true image lies within a remainder of it, estimated from the tips and
-   Jacobians along the edges: `kernels.image.activation_mesh`. So every root lies in a tetrahedron whose
-   planes, moved out by the remainder, contain the target.
+   Jacobians along the edges: `kernels.image.activation_mesh`. So every root lies in a tetrahedron
+   whose planes, moved out by the remainder, contain the target.
 3. An octree over space lists the inflated images that may cover a place (`image_tree`); for few
    targets the boxes round the images are looked through instead (`ImageLeaves`).
 4. In each tetrahedron listed at the target, the quadratic through tips and Jacobians says whether
    and where it is reached: a start (`kernels.branches.candidates`). Tips alone improve it.
-5. Damped Newton with the exact Jacobian leads from each start to a root (`kernels.branches.newton`).
+5. Damped Newton with the exact Jacobian leads from each start to a root
+   (`kernels.branches.newton`).
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
-   opposite, along the null direction of the Jacobian (`kernels.branches.folds`), and is searched as well.
+   opposite, along the null direction of the Jacobian (`kernels.branches.folds`), and is searched as
+   well.
 7. Roots between which the tip hardly leaves the target are one.
 8. A root beyond a bound is one on the bound if the tip misses no more there than the error of the
    map leaves open.
