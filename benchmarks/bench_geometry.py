@@ -15,11 +15,15 @@ import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from benchmarks.memory import peak_bytes, reset_peak
+
+if TYPE_CHECKING:
+    from softreach.geometry.alpha_shape import AlphaComplex
 
 ALPHA = 0.03
 COUNTED = 4_000  # points of which tests are counted, by Python
@@ -37,7 +41,7 @@ def arm_cloud(n: int) -> np.ndarray:
 
 def ours(points: np.ndarray) -> float:
     """Alpha-shape volume by our own triangulation."""
-    return _alpha_volume(points, "numba")
+    return _alpha_volume(_shape(points))
 
 
 def scipy_route(points: np.ndarray) -> float:
@@ -69,17 +73,21 @@ def ours_with_bias(points: np.ndarray) -> float:
 
 def qhull_kernels(points: np.ndarray) -> float:
     """SciPy's triangulation, our kernels after it."""
-    return _alpha_volume(points, "qhull")
+    from tests.oracles.qhull import delaunay
+
+    from softreach.geometry.alpha_shape import AlphaComplex
+
+    return _alpha_volume(AlphaComplex(triangulation=delaunay(points)))
 
 
 def ours_curve(points: np.ndarray) -> float:
     """The volume at a thousand radii."""
-    return float(_shape(points, "numba").volume(np.linspace(0.001, ALPHA, 1000))[-1])
+    return float(_shape(points).volume(np.linspace(0.001, ALPHA, 1000))[-1])
 
 
 def ours_critical(points: np.ndarray) -> float:
     """The volume at the smallest radius that leaves one region."""
-    shape = _shape(points, "numba")
+    shape = _shape(points)
     return float(shape.volume(shape.critical_alpha()))
 
 
@@ -90,16 +98,15 @@ def ours_convex(points: np.ndarray) -> float:
     return convex_hull(points).volume
 
 
-def _alpha_volume(points: np.ndarray, method: str) -> float:
-    shape = _shape(points, method)
+def _alpha_volume(shape: AlphaComplex) -> float:
     return float(shape.volumes[shape.radii <= ALPHA].sum())
 
 
-def _shape(points: np.ndarray, method: str):
+def _shape(points: np.ndarray) -> AlphaComplex:
     from softreach.geometry.alpha_shape import AlphaComplex
     from softreach.geometry.delaunay import delaunay
 
-    return AlphaComplex(triangulation=delaunay(points, method))
+    return AlphaComplex(triangulation=delaunay(points))
 
 
 ROUTES: dict[str, tuple[str, Callable[[np.ndarray], float]]] = {

@@ -25,7 +25,7 @@ COMMANDS = {
     "cloud, while it writes": "cloud minimal_trunk --n 150000 --out cloud.zarr",
     "volume": "volume minimal_trunk --n 400000 --out hull.ply",
     "reach": "reach minimal_trunk --accuracy 3e-4 --out reach.stl --out reach.png",
-    "solve": "solve redundant_trunk --targets targets.csv --family 5 --prove-least",
+    "solve": "solve redundant_trunk --targets targets.csv --family 5",
     "track": "track redundant_trunk path.csv --out activations.csv",
     "equilibria": "equilibria lce_arm --payload 30g --gravity up --out equilibria.png",
     "payload": "payload lce_arm --gravity up --out payload.png",

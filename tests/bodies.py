@@ -12,6 +12,8 @@ from numpy.polynomial import chebyshev
 
 from softreach.arm import Loads, Manipulator
 from softreach.arm.tables import tables
+from softreach.rod.loaded.shooting import Equilibria, Rung
+from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import Body
 from tests.oracles import rod
 
@@ -24,6 +26,13 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
     material = ring.material.replace(young_modulus=young, density=density)
     section = arm.section.replace(rings=(ring.replace(material=material),))
     return arm.replace(section=section, loads=loads)
+
+
+def loaded_slowly(solver: Solver, gamma: np.ndarray) -> Equilibria:
+    """Equilibria found by the most patient continuation alone."""
+    equilibria = solver.empty(len(gamma))
+    solver.again(gamma, np.arange(len(gamma)), Rung.PATIENT, equilibria)
+    return equilibria
 
 
 @dataclass(frozen=True)

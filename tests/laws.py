@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.base import POINTS, Base
+from softreach.arm.driving import Driving
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 
@@ -31,6 +32,12 @@ def single(revolution: float = 0.0, **changes: object) -> Manipulator:
     """One bundle of 48 degrees."""
     fiber = FiberArchitecture(revolution=revolution, offset=0.7, extent=np.radians(48))
     return arm_of(fiber, **changes)
+
+
+def tensions_of_lengths(arm: Manipulator, displacements: object) -> Array:
+    """Tensions [N] of the tendons that are driven by length, without loads, (n, such tendons)."""
+    driving = Driving(arm)
+    return driving.activations(np.asarray(displacements, float))[:, driving.law.columns]
 
 
 def of_length(arm: Manipulator, length: float) -> Manipulator:

@@ -56,22 +56,6 @@ def test_a_cloud_is_not_exported_at_one_activation(capsys):
     assert "activation = 0,0,0: must be left out for a cloud" in capsys.readouterr().err
 
 
-def test_a_proof_of_the_least_activation_is_asked_for(capsys):
-    arm = sr.designs.redundant_trunk()
-    place = sr.tip_positions(arm, [[-0.5, -0.2, -0.8, -0.4]])[0]
-    text = ",".join(f"{x:.17g}" for x in place)
-    assert run(["solve", "redundant_trunk", f"--target={text}", "--prove-least", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)[0]
-    assert found["least_proved"]
-    least = np.linalg.norm(found["activations"][0])
-    assert least - 1e-6 <= found["change_bound"] <= least
-    assert run(["solve", "redundant_trunk", f"--target={text}", "--prove-least"]) == 0
-    said = capsys.readouterr().out
-    assert f"proved to be the least: no activation of a size √Σγ² below {least:.5f}" in said
-    assert run(["solve", "elephant_trunk", "--target=0.4,0.1,1.5", "--prove-least"]) == 0
-    assert "nothing is proved: that takes 6 free bundles" in capsys.readouterr().out
-
-
 def test_a_family_that_is_smaller_than_asked_says_so(capsys):
     arm = sr.designs.redundant_trunk()
     text = ",".join(f"{x:.17g}" for x in sr.tip_positions(arm, arm.bounds[:, 0])[0])

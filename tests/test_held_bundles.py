@@ -119,7 +119,7 @@ def test_every_activation_is_found_with_one_of_four_bundles_held_anywhere(bundle
     assert (found.statuses == Status.REACHED).all()
     assert (found.activations[:, bundle] == -0.45).all()
     assert apart(found.activations, found.offsets, gamma).max() < 1e-6
-    finer = solve_inverse(prepared_map(arm, cells=40, depth=1), targets)
+    finer = solve_inverse(prepared_map(arm, cells=48), targets)
     assert (found.counts != finer.counts).mean() < 2e-3
 
 

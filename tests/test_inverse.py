@@ -153,7 +153,7 @@ def test_a_finer_search_finds_the_same_number_of_solutions(folded):
     targets = tip_positions(folded, random_activations(folded, 2000, seed=3))
     coarse, fine = (
         solve_inverse(folded, targets),
-        solve_inverse(prepared_map(folded, cells=40, depth=1), targets),
+        solve_inverse(prepared_map(folded, cells=48), targets),
     )
     assert (coarse.counts != fine.counts).mean() < 1e-3
     assert (coarse.counts > 1).mean() > 0.1

@@ -9,6 +9,7 @@ from scipy.optimize import lsq_linear
 from softreach.arm import designs
 from softreach.inverse.descent import Objective, minimize
 from softreach.rod import ActivationBox, configuration, tip_map
+from softreach.workspace.search import CLOSELY, nearest_tips
 from tests.laws import in_box
 
 
@@ -25,12 +26,11 @@ def test_a_quadratic_has_the_minimum_in_the_box_that_scipy_finds(m):
         residual = np.einsum("nij,nj->ni", factor[which], gamma - center[which])
         return 0.5 * (residual**2).sum(axis=1), np.einsum("nij,ni->nj", factor[which], residual)
 
-    found = minimize(evaluate, rng.random((30, m)), unit_box(m))
-    assert found.converged.all()
+    gamma, value = minimize(evaluate, rng.random((30, m)), unit_box(m))
     for i in range(30):
         best = lsq_linear(factor[i], factor[i] @ center[i], (0, 1), tol=1e-14, method="bvls")
-        assert np.allclose(found.gamma[i], best.x, atol=1e-7)
-        assert found.value[i] == pytest.approx(best.cost, abs=1e-12)
+        assert np.allclose(gamma[i], best.x, atol=1e-7)
+        assert value[i] == pytest.approx(best.cost, abs=1e-12)
 
 
 def test_searches_do_not_depend_on_each_other():
@@ -39,12 +39,27 @@ def test_searches_do_not_depend_on_each_other():
         return (x**4 - x**2).sum(axis=1), 4 * (4 * x**3 - 2 * x)
 
     start = np.random.default_rng(0).random((12, 2))
-    together = minimize(evaluate, start, unit_box(2))
+    together, _ = minimize(evaluate, start, unit_box(2))
     for i in (0, 5, 11):
-        alone = minimize(
+        alone, _ = minimize(
             lambda which, gamma, i=i: evaluate(which + i, gamma), start[[i]], unit_box(2)
         )
-        assert np.array_equal(alone.gamma[0], together.gamma[i])
+        assert np.array_equal(alone[0], together[i])
+
+
+@pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk])
+def test_no_bundle_brings_the_nearest_tip_nearer_to_a_target_out_of_reach(design):
+    rod, rng = tip_map(design()), np.random.default_rng(4)
+    targets = 1.5 * rng.normal(size=(40, 3)) / np.sqrt(3) * rod.length
+    found = nearest_tips(rod, in_box(rod.arm, 40), targets, 1e-10, CLOSELY)
+    far = found.distance > 1e-3
+    assert far.sum() > 30
+    toward = (targets - found.tips)[far] / found.distance[far, None]
+    slopes = rod.tips_and_slopes(found.gamma[far])[1]
+    gain = np.einsum("ni,nij->nj", toward, slopes)
+    ahead = found.gamma[far] + 1e-9 * np.sign(gain)
+    gain[(ahead < rod.box.low) | (ahead > rod.box.high)] = 0.0
+    assert np.abs(gain).max() < 1e-5
 
 
 def differences(function, gamma: np.ndarray, step: float = 1e-6) -> np.ndarray:
@@ -56,11 +71,11 @@ def differences(function, gamma: np.ndarray, step: float = 1e-6) -> np.ndarray:
 @pytest.mark.parametrize(
     "terms",
     [
-        {},
-        {"penalty": 1e3, "multiplier": True},
-        {"near": True},
-        {"direction": True, "direction_weight": 0.7},
-        {"near": True, "multiplier": True, "direction": True, "direction_weight": 3.0},
+        {"direction_weight": 0.0},
+        {"direction_weight": 0.0, "penalty": 1e3, "multiplier": True},
+        {"direction_weight": 0.0, "near": True},
+        {"direction_weight": 0.7},
+        {"direction_weight": 3.0, "near": True, "multiplier": True},
     ],
 )
 def test_the_gradient_of_an_objective_is_its_derivative(terms):
@@ -68,13 +83,11 @@ def test_the_gradient_of_an_objective_is_its_derivative(terms):
     rod, rng = tip_map(designs.redundant_trunk(), tol=1e-10), np.random.default_rng(2)
     gamma = in_box(rod.arm, 9)
     direction = rng.normal(size=(9, 3))
-    arrays = {
-        "multiplier": rng.normal(size=(9, 3)),
-        "near": in_box(rod.arm, 9, seed=5),
-        "direction": direction / np.linalg.norm(direction, axis=1)[:, None],
-    }
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    arrays = {"multiplier": rng.normal(size=(9, 3)), "near": in_box(rod.arm, 9, seed=5)}
     chosen = {name: arrays.get(name, value) for name, value in terms.items()}
-    objective = Objective(rod=rod, targets=rng.normal(size=(9, 3)), **chosen)
+    targets = rng.normal(size=(9, 3))
+    objective = Objective(rod=rod, targets=targets, direction=direction, **chosen)
     which = np.array([3, 3, 0, 8, 1, 2, 7, 5, 4])
     expected = differences(lambda x: objective(which, x)[0], gamma)
     gradient = objective(which, gamma)[1]

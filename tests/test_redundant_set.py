@@ -149,11 +149,6 @@ def test_little_memory_means_larger_cells_a_larger_error_and_a_warning():
         reachable_set(arm, memory=0.9 * least)
 
 
-def test_a_grid_of_activations_is_refused_for_more_than_three_bundles():
-    with pytest.raises(InvalidInput, match="three free bundles only"):
-        reachable_set(designs.redundant_trunk(), grid=24)
-
-
 def test_bundles_that_bend_in_one_plane_fill_nothing():
     flat = arm_of(
         family(0, 20, 90, 2), family(0, 40, 90, 2),

@@ -65,14 +65,6 @@ def test_by_a_bound_the_tip_moves_as_its_activation_does():
     assert found == pytest.approx(np.stack(expected, axis=2), abs=1e-7)
 
 
-def test_at_fixed_activations_bounds_move_nothing():
-    arm = designs.minimal_trunk()
-    gamma = tip_map(arm).box.from_free_cube(places(arm))
-    found = derivatives(arm, ("taper", "left.lower"), 1e-9).at_activations(gamma)
-    assert not found[:, :, 1].any()
-    assert np.abs(found[:, :, 0]).max() > 1.0
-
-
 def test_all_actuators_turned_turn_the_tip_about_the_axis():
     arm = changed(designs.minimal_trunk(), {"left.offset": 0.3})
     names = tuple(f"{actuator.name}.offset" for actuator in arm.actuators)

@@ -23,6 +23,7 @@ from softreach.workspace import (
     reachable_set,
 )
 from softreach.workspace.discontinuities import left_out_cells
+from softreach.workspace.reach import rasterized_set
 from softreach.workspace.search import nearest_tips
 from tests.bodies import rubber
 
@@ -96,7 +97,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:volume .* may be off")
 
 @pytest.mark.parametrize("n", [10, 20, 40])
 def test_a_jump_is_not_bridged(n):
-    found = solid(Shifted(shift=snapping), grid=n, cell=0.03)
+    found = rasterized_set(Shifted(shift=snapping), n, 0.03, 3e-3)
     assert found.volume == pytest.approx(1.0, abs=found.volume_error)
     assert 0.5 / n < found.lost_share < 4.0 / n  # the cells that a plane cuts
     assert found.volume_error < 8.0 / n
@@ -110,7 +111,7 @@ def test_a_jump_is_not_bridged(n):
 
 @pytest.mark.parametrize("n", [10, 20, 40])
 def test_what_is_not_stable_is_not_reached(n):
-    found = solid(Shifted(stable=outside_ball), grid=n, cell=0.03)
+    found = rasterized_set(Shifted(stable=outside_ball), n, 0.03, 3e-3)
     assert found.volume == pytest.approx(1.0 - BALL, abs=found.volume_error)
     assert found.volume_error < 2.0 / n
     assert BALL < found.lost_share < BALL + 3.5 / n
@@ -122,7 +123,7 @@ def test_what_is_not_stable_is_not_reached(n):
 def test_multiplicity_counts_the_parts_that_overlap():
     # What lies beyond x = 1/2 moves back by 1/4: a quarter of the box is covered twice.
     rod = Shifted(shift=lambda gamma: -0.25 * (gamma[:, 0] > 0.5001))
-    found = solid(rod, grid=40, cell=0.02)
+    found = rasterized_set(rod, 40, 0.02, 3e-3)
     assert found.multiplicity[2] == pytest.approx(0.25, abs=found.multiplicity_error + 0.03)
     assert found.volume == pytest.approx(0.75, abs=found.volume_error)
     assert found.fold_volume == pytest.approx(0.0, abs=1e-3)
@@ -213,7 +214,7 @@ def test_an_arm_whose_payload_makes_it_snap_reaches_what_its_stable_cloud_does()
     tips = cloud.tip.values[cloud.status.values == TipStatus.STABLE]
     assert (cloud.status.values != TipStatus.STABLE).mean() < found.lost_share
     assert found.contains(tips).mean() > 0.9
-    finer = solid(arm, grid=2 * found.cells)
+    finer = rasterized_set(tip_map(arm), 2 * found.cells, None, 3e-3)
     assert abs(finer.volume - found.volume) < found.volume_error + finer.volume_error
     assert finer.lost_share < found.lost_share
 

@@ -170,12 +170,6 @@ def test_unreachability_is_what_the_concave_hull_lacks_of_the_convex_one(tips):
     assert unreachability(tips, np.inf) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_both_methods_agree(tips):
-    ours, qhulls = (concave_hull(tips, 0.2, method=method) for method in ("numba", "qhull"))
-    assert ours.volume == pytest.approx(qhulls.volume, rel=1e-9)
-    assert len(ours.faces) == len(qhulls.faces)
-
-
 @pytest.mark.parametrize("name", FLAT)
 def test_flat_clouds_have_volume_zero_and_no_faces(name):
     for hull in (

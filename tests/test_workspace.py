@@ -11,11 +11,10 @@ from softreach import sampling
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import tables
 from softreach.cloud.clouds import compute_cloud
 from softreach.geometry.hull import convex_hull
 from softreach.inverse import solve_inverse
-from softreach.rod import configuration, tip_map, tip_positions
+from softreach.rod import tip_map, tip_positions
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import (
     ReachableCurve,
@@ -23,12 +22,13 @@ from softreach.workspace import (
     ReachableSolid,
     ReachableSurface,
     Surface,
-    direction_spread,
+    reach,
     reachable_set,
 )
 from softreach.workspace.boundary import critical_surface
 from softreach.workspace.image import Image
-from tests.laws import arm_of, single
+from softreach.workspace.reach import rasterized_set
+from tests.laws import arm_of
 
 
 def trunk_at(revolution_deg: float, taper_deg: float) -> Manipulator:
@@ -68,7 +68,7 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2
-        fine = solid(coarse.arm, grid=2 * coarse.cells, cell=cell)
+        fine = rasterized_set(tip_map(coarse.arm), 2 * coarse.cells, cell, 3e-3)
         assert abs(fine.volume - coarse.volume) < fine.volume_error + coarse.volume_error
         assert abs(several(fine) - several(coarse)) < coarse.multiplicity_error
         assert abs(fine.fold_volume - coarse.fold_volume) < coarse.fold_volume_error
@@ -311,20 +311,20 @@ def test_a_held_bundle_with_room_elsewhere_changes_nothing():
 
 def test_progress_counts_every_vertex(trunk):
     done: list[int] = []
-    reachable_set(trunk, grid=8, accuracy=0.1, progress=done.append)
+    reachable_set(trunk, accuracy=0.1, progress=done.append)
     assert sum(done) == 9**3
 
 
-def test_a_coarse_grid_is_warned_of():
+def test_a_grid_that_is_too_coarse_is_warned_of(monkeypatch):
+    monkeypatch.setattr(reach, "_MOST_VERTICES", 5**3)
     with pytest.warns(SoftreachWarning, match="grid above 4"):
-        reachable_set(trunk_at(75, 3), grid=4)
+        reachable_set(trunk_at(75, 3))
 
 
 @pytest.mark.parametrize(
     ("argument", "value", "allowed"),
     [
         ("accuracy", 0.0, ">= 1e-06"),
-        ("grid", 7, "even"),
         ("cell", 1e-9, "at least"),
         ("cell", np.nan, "> 0"),
     ],
@@ -333,76 +333,6 @@ def test_a_wrong_argument_is_named(trunk, argument, value, allowed):
     with pytest.raises(InvalidInput, match=allowed) as caught:
         reachable_set(trunk, **{argument: value})
     assert caught.value.name == argument
-
-
-def only_cone(arm: Manipulator, n: int) -> float:
-    """The solid angle [sr] of all tip directions, in one cell that holds every tip."""
-    spread = direction_spread(arm, n=n, cell=10 * arm.length)
-    return float(spread["solid_angle"].max())
-
-
-def largest_turn(arm: Manipulator) -> float:
-    """The angle [rad] by which the first bundle, longitudinal, turns the tip when it acts alone."""
-    table, gamma = tables(arm, [0.0]), arm.bounds[0, 0]
-    stretch = 1 + table.extension[0, 0] * gamma
-    return float(np.linalg.norm(table.curvature[0, :, 0] * gamma) * stretch * arm.length)
-
-
-@pytest.mark.parametrize("gamma", [-0.3, -0.8])
-def test_the_directions_of_a_longitudinal_bundle_lie_in_the_cone_over_their_arc(gamma):
-    arm = single(activation_bounds=(gamma, 0.0))
-    exact = 2 * np.pi * (1 - np.cos(largest_turn(arm) / 2))
-    assert 0.999 * exact < only_cone(arm, 1 << 12) < 1.005 * exact
-
-
-def test_three_equal_longitudinal_bundles_turn_the_tip_within_a_cone_about_the_arm():
-    fiber = FiberArchitecture(revolution=0.0, extent=0.8, bundles=3)
-    arm = arm_of(fiber, activation_bounds=(-0.3, 0.0))
-    exact = 2 * np.pi * (1 - np.cos(largest_turn(arm)))
-    # Samples miss the corners of the box by about n^(-1/3) of its width.
-    assert 0.96 * exact < only_cone(arm, 1 << 16) < 1.005 * exact
-
-
-def test_a_cone_holds_its_widest_pair_and_is_no_wider_than_jungs_theorem_allows(trunk):
-    n, cell = 1 << 12, 0.1
-    spread = direction_spread(trunk, n=n, cell=cell)
-    cloud = compute_cloud(trunk, n=n, sampler="sobol", seed=0)
-    shape = configuration(trunk, cloud.activation.values, [trunk.length])
-    d3 = shape.directors.sel(director="d3").values[:, 0]
-    first = np.array([float(spread[name][0]) for name in "xyz"])
-    cells = np.rint((cloud.tip.values - first) / cell).astype(int)
-    np.testing.assert_array_equal(counted(cells, spread["samples"].shape), spread["samples"])
-    crowded = np.argwhere(spread["samples"].values > 1)
-    assert len(crowded) > 100
-    for place in crowded:
-        inside = d3[(cells == place).all(axis=1)]
-        pair = np.linalg.norm(inside[:, None] - inside, axis=2).max()  # 2 sin(angle / 2)
-        found = np.arccos(1 - float(spread["solid_angle"].values[tuple(place)]) / (2 * np.pi))
-        assert np.sin(found) > pair / 2 * (1 - 1e-9)
-        assert np.sin(found) < 1.03 * pair / np.sqrt(3)
-    assert np.isnan(spread["solid_angle"].values[spread["samples"].values == 0]).all()
-
-
-def counted(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """How many rows name each cell."""
-    counts = np.zeros(shape, int)
-    np.add.at(counts, tuple(cells.T), 1)
-    return counts
-
-
-@pytest.mark.large
-def test_the_cone_of_three_bundles_closes_with_the_cell_and_that_of_four_stays(trunk):
-    def shrinks(arm: Manipulator) -> float:
-        """Median cone in cells of 125 mm over that in cells half as wide."""
-        wide, narrow = (
-            float(spread["solid_angle"].where(spread["samples"] > 30).median())
-            for spread in (direction_spread(arm, n=1 << 17, cell=cell) for cell in (0.125, 0.0625))
-        )
-        return wide / narrow
-
-    # One direction a place: its spread falls with the cell's face, by about four.
-    assert shrinks(trunk) > 2.8
-    assert shrinks(designs.redundant_trunk()) < 2.2
 
 
 def test_distance_to_a_slab_is_its_height_and_beyond_it_to_its_edges():

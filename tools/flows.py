@@ -114,7 +114,7 @@ def reach_by_flux() -> Callable[[], object]:
 def reach_by_raster() -> Callable[[], object]:
     """The reachable set of three bundles whose map folds."""
     arm = sr.designs.minimal_trunk()
-    return lambda: sr.reachable_set(arm, grid=8)
+    return lambda: sr.reachable_set(arm, accuracy=0.1)
 
 
 def reach_by_search() -> Callable[[], object]:

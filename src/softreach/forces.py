@@ -21,7 +21,6 @@ from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.stiffness import yielding_rod
-from softreach.support.arguments import as_integer
 from softreach.support.arrays import Array, as_directions, as_floats
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress
@@ -41,7 +40,6 @@ def blocked_force(
     direction: ArrayLike,
     *,
     start: ArrayLike | None = None,
-    family: int = 1,
     tol: float = 1e-6,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -61,7 +59,6 @@ def blocked_force(
         direction: Along which the tip pushes, of any length, shape (3,) or (n, 3).
         start: Activations near which the force begins to grow [unit of each], shape (bundles,) or
             (n, bundles); by default all that `solve_inverse` finds for the places.
-        family: With more than three free bundles: how many of these to start from.
         tol: Largest tip error, in L.
         progress: Called with the number of places done since its last call.
 
@@ -78,7 +75,6 @@ def blocked_force(
         InvalidDesign: A material has no Young's modulus.
     """
     as_directions("direction", direction)
-    family = as_integer("family", family, 1, 10_000)
     progress = as_progress(progress)
     rod = tip_map(arm, tol)
     if rod.arm.drives or any(isinstance(part, LengthTendon) for part in rod.arm.actuators):
@@ -88,7 +84,7 @@ def blocked_force(
     if rod.box.dimension < 3:
         allowed = "3 or more to keep the tip in its place"
         raise InvalidInput("free bundles", rod.box.dimension, allowed)
-    targets, starts = _starts(rod, places, start, family)
+    targets, starts = _starts(rod, places, start)
     directions = as_directions("direction", direction, len(targets))
     best = []
     for target, along, choice in zip(targets, directions, starts, strict=True):
@@ -114,14 +110,14 @@ def _force(result: _Best) -> float:
 
 
 def _starts(
-    rod: TipMap, places: ArrayLike | None, start: ArrayLike | None, family: int
+    rod: TipMap, places: ArrayLike | None, start: ArrayLike | None
 ) -> tuple[Array, list[Array]]:
     """Places, and activations (k, bundles) to start from for each."""
     if start is None:
         if places is None:
             raise InvalidInput("places", None, "given, or `start`")
         targets = as_targets("places", places)
-        solutions = solve_inverse(rod, targets, family=family)
+        solutions = solve_inverse(rod, targets)
         return targets, [solution.activations for solution in solutions]
     if places is None:
         gamma = rod.check_activations("start", np.atleast_2d(as_floats("start", start)))

@@ -31,12 +31,11 @@ class Rest:
     """Status of the equilibrium: stable or not, or none found."""
 
 
-def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
+def rest(arm: Manipulator) -> Rest:
     """The arm at rest under its loads.
 
     Args:
         arm: The design with its loads.
-        tol: Largest tip error, in L.
 
     Raises:
         InvalidInput: An arm without loads, or with loads too heavy to be followed along it.
@@ -50,8 +49,8 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     held = arm
     if arm.bundles and not arm.drives:
         held = arm.with_bounds(np.stack([activation, activation], axis=1))
-    (tip,), (status,) = tip_map(held, tol, warn=False).tips_and_status(activation[None])
-    free = tip_map(held.replace(loads=None), tol).tips(activation[None])[0]
+    (tip,), (status,) = tip_map(held, warn=False).tips_and_status(activation[None])
+    free = tip_map(held.replace(loads=None)).tips(activation[None])[0]
     sag = float(np.linalg.norm(tip - free))
     return Rest(
         activation=activation,

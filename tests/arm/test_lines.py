@@ -12,10 +12,9 @@ from softreach.arm.lines import (
     limit_shortening,
     line_lengths,
     line_strains,
-    tensions_of_lengths,
 )
 from tests.kinds import fibers_and_a_tendon
-from tests.laws import arms, in_box
+from tests.laws import arms, in_box, tensions_of_lengths
 
 
 def drawn_lengths(arm, gamma, stations=4001):

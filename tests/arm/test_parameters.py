@@ -347,7 +347,7 @@ def test_what_an_arm_leaves_open_is_not_a_number_and_can_be_given(trunk):
     name = "rings[0].material.young_modulus"
     assert math.isnan(value_of(trunk, name))
     made = changed(trunk, {name: 1e5})
-    assert made.section.has_modulus
+    assert value_of(made, name) == 1e5
     gamma = in_box(trunk, 3)
     np.testing.assert_allclose(tip_positions(made, gamma), tip_positions(trunk, gamma), rtol=1e-12)
 
@@ -359,7 +359,7 @@ def test_one_modulus_of_several_materials_asks_for_the_others(trunk):
     with pytest.raises(InvalidDesign, match=r"^rings\[1\]\.material\.young_modulus: must be given"):
         changed(arm, {"rings[0].material.young_modulus": 1e5})
     both = {f"rings[{k}].material.young_modulus": 1e5 * (k + 1) for k in range(2)}
-    assert changed(arm, both).section.has_modulus
+    assert all(value_of(changed(arm, both), name) == both[name] for name in both)
 
 
 def test_one_ratio_of_poisson_is_of_all_materials():

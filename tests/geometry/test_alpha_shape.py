@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections import Counter
 
 import numpy as np
@@ -14,13 +12,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from softreach.geometry import alpha_shape
-from softreach.geometry import hull as geometry_hull
 from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
 from softreach.geometry.delaunay import Delaunay, delaunay
 from softreach.geometry.hull import Hull, convex_hull
 from softreach.geometry.surface import enclosed_volume
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import rational
+from tests.oracles import qhull
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +26,8 @@ def arm_shape() -> AlphaComplex:
     return alpha_complex(arc_tips(3000))
 
 
-def alpha_complex(points: np.ndarray, method: str = "auto") -> AlphaComplex:
-    return AlphaComplex(triangulation=delaunay(points, method))
+def alpha_complex(points: np.ndarray) -> AlphaComplex:
+    return AlphaComplex(triangulation=delaunay(points))
 
 
 def regions_by_scipy(shape: AlphaComplex, kept: np.ndarray) -> int:
@@ -97,7 +95,7 @@ def test_radii_of_almost_flat_cells_keep_their_digits():
 @pytest.mark.parametrize("alpha", [0.01, 0.03, 0.1, 0.3, np.inf])
 def test_volumes_and_regions_equal_those_of_scipy(alpha):
     points = arc_tips(1500, seed=5)
-    ours, scipys = alpha_complex(points), alpha_complex(points, "qhull")
+    ours, scipys = alpha_complex(points), AlphaComplex(triangulation=qhull.delaunay(points))
     assert ours.volume(alpha) == pytest.approx(scipys.volume(alpha), rel=1e-9, abs=1e-15)
     assert ours.regions(alpha) == scipys.regions(alpha)
     assert ours.regions(alpha) == regions_by_scipy(ours, ours.radii <= alpha)
@@ -250,26 +248,3 @@ def test_radii_and_volumes_do_not_depend_on_the_order_of_vertices(order, seed):
     shape, same = AlphaComplex(triangulation=mesh), AlphaComplex(triangulation=turned)
     np.testing.assert_array_equal(shape.radii, same.radii)
     np.testing.assert_array_equal(shape.volumes, same.volumes)
-
-
-ALONE = """
-import sys
-import numpy as np
-from softreach.geometry.hull import convex_hull
-volume = convex_hull(np.random.default_rng(0).random((50, 3))).volume
-print("scipy.spatial" in sys.modules)
-import scipy.spatial
-from scipy.spatial import _qhull
-print(scipy.spatial.ConvexHull is _qhull.ConvexHull, volume.hex())
-"""
-
-
-def test_qhull_is_loaded_without_the_package_that_it_is_in_and_is_the_same():
-    run = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, check=True)
-    points = np.random.default_rng(0).random((50, 3))
-    assert run.stdout.split() == ["False", "True", convex_hull(points).volume.hex()]
-
-
-def test_where_qhull_cannot_be_loaded_alone_it_comes_with_its_package(monkeypatch):
-    monkeypatch.setattr(geometry_hull, "Path", None)  # as any failure
-    assert geometry_hull._qhull.__wrapped__().__name__ == "scipy.spatial"

@@ -20,6 +20,7 @@ from softreach.kernels.points.triangulation import FACES, FEW
 from softreach.support.errors import InvalidInput
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import exact_insphere, exact_orient, rational
+from tests.oracles import qhull
 
 WORK = scratch()
 every_degenerate = pytest.mark.parametrize("name", DEGENERATE)
@@ -94,13 +95,13 @@ def test_the_last_point_inside_a_sphere_of_points_joins_all_faces_of_their_hull(
 
 @pytest.mark.parametrize("points", [random_points(400), arc_tips(700)], ids=["cube", "arm"])
 def test_cells_equal_those_of_qhull_where_they_are_unique(points):
-    assert cells_of(delaunay(points)) == cells_of(delaunay(points, "qhull"))
+    assert cells_of(delaunay(points)) == cells_of(qhull.delaunay(points))
 
 
 @given(st.integers(5, 60), st.integers(0, 2**32 - 1))
 def test_cells_of_small_random_clouds_equal_those_of_qhull(n, seed):
     points = random_points(n, seed)
-    assert cells_of(delaunay(points)) == cells_of(delaunay(points, "qhull"))
+    assert cells_of(delaunay(points)) == cells_of(qhull.delaunay(points))
 
 
 @every_degenerate
@@ -164,10 +165,9 @@ def test_cells_do_not_depend_on_the_order_of_the_points(order):
     assert set(map(tuple, renamed.tolist())) == cells_of(delaunay(points))
 
 
-@pytest.mark.parametrize("method", ["numba", "qhull"])
 @pytest.mark.parametrize("name", FLAT)
-def test_flat_clouds_have_no_cells(name, method):
-    mesh = delaunay(FLAT[name], method)
+def test_flat_clouds_have_no_cells(name):
+    mesh = delaunay(FLAT[name])
     assert mesh.tetrahedra.shape == mesh.neighbors.shape == (0, 4)
     assert len(mesh.duplicate_of) == len(FLAT[name])
 
@@ -205,8 +205,3 @@ def test_rows_that_are_not_finite_are_counted_and_the_first_is_named(bad):
 def test_points_of_another_shape_are_refused():
     with pytest.raises(InvalidInput, match=r"points.shape = \(5, 2\): must be of shape \(n, 3\)"):
         delaunay(np.zeros((5, 2)))
-
-
-def test_an_unknown_method_is_refused():
-    with pytest.raises(InvalidInput, match="auto, numba, qhull"):
-        delaunay(random_points(5), "voronoi")

@@ -68,7 +68,7 @@ LATER = (
     "reach lce_arm --base x --payload 1g --accuracy 0.2 --out b.stl",
     "payload lce_arm --gravity up --payloads 1g --accuracy 0.2",
     "gradient lce_arm taper --accuracy 0.2",
-    "solve redundant_trunk --target 0.2,0.1,0.6 --family 3 --prove-least",
+    "solve redundant_trunk --target 0.2,0.1,0.6 --family 3",
     "solve lce_arm --payload 1g --target 0.02,0.01,0.06",
     "equilibria lce_arm --payload 1g",
     "cloud lce_arm --n 500 --set loads.follower_force[1]=1mN --payload 1g",

@@ -20,10 +20,10 @@ from softreach.arm import (
     Ring,
     Section,
 )
-from softreach.arm.lines import tensions_of_lengths
 from softreach.arm.tensions import LengthLaw
 from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign
+from tests.laws import tensions_of_lengths
 from tests.oracles.pulled_tendons import HeavyPulledArm, PulledArm
 
 LENGTH, RADIUS, MODULUS, DISTANCE = 0.3, 0.01, 1e6, 0.008
@@ -242,7 +242,7 @@ def test_a_length_driven_arm_has_clouds_sets_and_inverses():
 
 def test_the_set_of_a_length_driven_arm_holds_its_tips():
     arm = arm_of(tendons(3, activation_bounds=(0.0, 0.02)))
-    region = reachable_set(arm, grid=20, cell=LENGTH / 50)
+    region = reachable_set(arm, accuracy=0.02)
     tips = tip_map(arm).tips(random_activations(arm, 50))
     assert np.mean(region.contains(tips)) > 0.9
     assert not region.contains([[0.0, 0.0, 1.1 * LENGTH]]).any()

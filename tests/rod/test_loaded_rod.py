@@ -21,7 +21,7 @@ from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidDesign
-from tests.bodies import oracle_rod, rubber, uniform
+from tests.bodies import loaded_slowly, oracle_rod, rubber, uniform
 from tests.oracles import column, elastica, loaded_rod
 
 TRUNK = designs.minimal_trunk()
@@ -330,7 +330,7 @@ def test_what_is_stable_at_once_is_stable_and_the_same_when_loaded_slowly():
     solver = Solver(loaded(Loads(gravity=UP), young=young).tables, 16, 1e-8)
     gamma = np.random.default_rng(2).uniform(-5 / 3, 0, (256, 3))
     found = solver.find(gamma)
-    slowly = solver.slowly(gamma)
+    slowly = loaded_slowly(solver, gamma)
     both = found.status != TipStatus.NO_EQUILIBRIUM
     assert (found.rung == Rung.DIRECT).mean() > 0.5
     np.testing.assert_allclose(found.tips[both], slowly.tips[both], atol=1e-7)

@@ -86,8 +86,6 @@ def redundant_trunk(
     taper: float = math.radians(2),
     *,
     length: float = 1.0,
-    tip_radius: float | None = None,
-    radius_ratio: float = 0.75,
     material: Material | str | None = None,
 ) -> Manipulator:
     """The paper's redundant design: the longitudinal bundle of `minimal_trunk` split in two.
@@ -100,19 +98,10 @@ def redundant_trunk(
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
         taper: φ [rad].
         length: L [m].
-        tip_radius: R2(L) [m], which takes the place of the taper.
-        radius_ratio: R1/R2 [-].
         material: Material of all of the arm, also by its name in the library; None for an
             incompressible one whose Young's modulus cancels.
     """
-    arm = minimal_trunk(
-        revolution,
-        taper,
-        length=length,
-        tip_radius=tip_radius,
-        radius_ratio=radius_ratio,
-        material=material,
-    )
+    arm = minimal_trunk(revolution, taper, length=length, material=material)
     pair = (_longitudinal(246, "longitudinal 1"), _longitudinal(294, "longitudinal 2"))
     return arm.replace(actuators=(*arm.actuators[:2], *pair))
 

@@ -17,7 +17,6 @@ __all__ = [
     "limit_shortening",
     "line_lengths",
     "line_strains",
-    "tensions_of_lengths",
 ]
 
 Array = NDArray[np.float64]
@@ -75,24 +74,6 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
         (dx - three * y) ** 2 + (dy + three * x) ** 2 + (zeta[..., None] + one * y - two * x) ** 2
     )
     return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
-
-
-def tensions_of_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
-    """Tensions of the tendons that are driven by length, without loads [N].
-
-    Args:
-        arm: The design.
-        activations: Displacements in m among them, shape (n, bundles).
-
-    Returns:
-        τ >= 0, shape (n, tendons driven by length), in the order of their bundles.
-
-    Raises:
-        InvalidInput: No finite activations of that shape.
-    """
-    driving = Driving(a_manipulator("arm", arm))
-    gamma = as_rows("activations", activations, arm.inputs, "of shape (n, inputs)")
-    return driving.activations(gamma)[:, driving.law.columns]
 
 
 def line_strains(arm: Manipulator) -> Array:

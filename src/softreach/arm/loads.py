@@ -135,9 +135,3 @@ class Loads(Part):
         dead = ("gravity", "tip_force", "tip_moment", "force_per_length")
         turned = {name: base.directions_to_base(getattr(self, name)) for name in dead}
         return self.replace(point_loads=points, **turned)
-
-    @property
-    def conservative(self) -> bool:
-        """The loads have a potential, so that stable means of least energy."""
-        moments = (self.tip_moment, *(load.moment for load in self.point_loads))
-        return not any(map(any, (self.follower_force, self.follower_moment, *moments)))

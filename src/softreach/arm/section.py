@@ -186,11 +186,6 @@ class Section(Part):
         return (Layer(self.bore_ratio, self.inner_ratio, self.core_material), *rings)
 
     @property
-    def has_modulus(self) -> bool:
-        """Young's modulus is known, so that forces have a unit."""
-        return all(layer.material.young_modulus is not None for layer in self.layers)
-
-    @property
     def breaks(self) -> tuple[float, ...]:
         """Z/L inside (0, 1) where what was measured is not smooth."""
         return () if self.measured is None else self.measured.breaks

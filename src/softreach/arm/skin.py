@@ -207,21 +207,19 @@ def bundle_skins(
     return _skins(arm, line, sector)
 
 
-def bundle_solids(
-    arm: Body, line: Centerline, *, thickness: float, step: float = np.pi / 32
-) -> list[Surface]:
+def bundle_solids(arm: Body, line: Centerline, *, thickness: float) -> list[Surface]:
     """Each bundle as closed surfaces: bands become skins, half sunk into the outside of their ring.
 
     Args:
         arm: The design.
         line: Centerline with its sections; give it `arm.breakpoints`, so that bundles end there.
         thickness: Of the skins, in R2 [-].
-        step: Largest angle between neighboring points across a band [rad].
     """
 
     def sector(span: _Span) -> Surface:
         # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
-        return ribbon_surface(span.band(thickness / 2, step), span.band(-thickness / 2, step))
+        upper, lower = (span.band(lift, np.pi / 32) for lift in (thickness / 2, -thickness / 2))
+        return ribbon_surface(upper, lower)
 
     return _skins(arm, line, sector)
 

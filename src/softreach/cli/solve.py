@@ -16,9 +16,7 @@ from softreach.support.errors import InvalidInput, counted
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
-    from softreach.inverse import Solution, Solutions
-
-_HINTS = 100  # targets out of reach that get one
+    from softreach.inverse import Solution
 
 
 def solve(
@@ -40,10 +38,6 @@ def solve(
         WHOLE,
         Parameter(help="With more than three free bundles: solutions for each target (1)."),
     ] = None,
-    prove_least: Annotated[
-        bool,
-        Parameter(help="With more than three free bundles: prove that the activation is least."),
-    ] = False,
     changes: Changes = UNCHANGED,
     unit: Unit = None,
     json: AsJson = False,
@@ -64,37 +58,21 @@ def solve(
     lengths = Lengths.of(arm, unit)
     if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
         why = "left out for a design with three free bundles or fewer: all solutions are found"
-        refuse(why, family=family, prove_least=prove_least)
+        refuse(why, family=family)
     if targets is None:
         points = [position_in("target", target or "", arm.length)]
     else:
         points = points_in("targets", targets, arm)
     count = 1 if family is None else family
-    solutions = solve_inverse(arm, points, family=count, prove_least=prove_least)
-    hints = _hints(arm, solutions)
+    solutions = solve_inverse(arm, points, family=count)
     if json:
-        records = zip(solutions, hints, strict=True)
-        console.json([{**_record(one, lengths), "hint": hint or None} for one, hint in records])
+        console.json([_record(one, lengths) for one in solutions])
         return
-    for solution, hint in zip(solutions, hints, strict=True):
+    for solution in solutions:
         _print(solution, arm, lengths)
-        if len(solution):
-            _print_more(solution, arm, count, prove_least)
-        if hint:
-            console.line(f"  {hint}")
-
-
-def _hints(arm: Manipulator, solutions: Solutions) -> list[str]:
-    """Hints at what targets out of reach may mean; for the first of many."""
-    from softreach.inverse import twin_hints
-
-    hints = [""] * len(solutions)
-    missed = [k for k, one in enumerate(solutions) if not len(one)][:_HINTS]
-    if missed:
-        found = twin_hints(arm, solutions.targets[missed])
-        for k, hint in zip(missed, found, strict=True):
-            hints[k] = hint
-    return hints
+        if 0 < len(solution) < count:
+            known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
+            console.line(f"  no others found: further searches end at {known}")
 
 
 def _record(solution: Solution, lengths: Lengths) -> dict[str, object]:
@@ -109,8 +87,6 @@ def _record(solution: Solution, lengths: Lengths) -> dict[str, object]:
         "nearest_activation": solution.nearest_activation.tolist(),
         **lengths.record("gap", solution.gap),
         **lengths.record("gap_bound", solution.gap_bound),
-        "change_bound": solution.change_bound,
-        "least_proved": solution.least_proved,
         "unstable": solution.unstable,
     }
 
@@ -138,34 +114,3 @@ def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
         gap = lengths.text(solution.gap, ".4g")
         console.line(f"  nearest {lengths.place(solution.nearest)}, {gap} away{bound}")
         console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
-
-
-def _print_more(solution: Solution, arm: Manipulator, wanted: int, prove_least: bool) -> None:
-    """Remarks on the family and the proof that were asked for."""
-    if len(solution) < wanted:
-        known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
-        console.line(f"  no others found: further searches end at {known}")
-    if prove_least:
-        console.line(f"  {_proof(solution, arm)}")
-
-
-def _proof(solution: Solution, arm: Manipulator) -> str:
-    """A line on what is proved about the size √Σγ² of the activations that reach a target."""
-    from softreach.inverse.proofs import MOST_BUNDLES
-
-    bound = f"no activation of a size √Σγ² below {solution.change_bound:.6g}{_size_unit(arm)}"
-    if solution.least_proved:
-        return f"proved to be the least: {bound} reaches it"
-    if solution.change_bound:
-        return f"proved: {bound} reaches it; whether the first is the least is open"
-    if arm.loads is not None:
-        return "nothing is proved: of arms under loads nothing can be"
-    return f"nothing is proved: that takes {MOST_BUNDLES} free bundles or fewer, and less effort"
-
-
-def _size_unit(arm: Manipulator) -> str:
-    """Unit of the size of an activation."""
-    units = set(arm.input_units)
-    if len(units) > 1:
-        return " (each over its range)"
-    return "" if units == {"1"} else f" {units.pop()}"

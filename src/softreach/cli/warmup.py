@@ -62,10 +62,9 @@ def _free() -> list[Callable[[], object]]:
         partial(solve_inverse, arm, [target, beyond]),
         lambda: prepared_map(arm).tree,
         partial(track_path, arm, path),
-        partial(workspace.direction_spread, arm, n=1024),
         partial(workspace.reachable_set, redundant, accuracy=0.1),
         partial(solve_inverse, redundant, [target], near=[-0.5] * 4),
-        partial(solve_inverse, redundant, [target], prove_least=True),
+        partial(solve_inverse, redundant, [target]),
         partial(track_path, redundant, path),
     ]
 

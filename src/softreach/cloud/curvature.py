@@ -123,10 +123,10 @@ def stream_statistics(
     return _dataset(rod, z, tallies, shares)
 
 
-def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
-    """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
+def distal_stations(arm: Manipulator | TipMap) -> Array:
+    """Six even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
     arm = as_instance("arm", arm, (Manipulator, TipMap), "a Manipulator or a TipMap")
-    return np.linspace(0.5, 1.0, as_integer("count", count, 1, _MOST)) * arm.length
+    return np.linspace(0.5, 1.0, 6) * arm.length
 
 
 def _blocks(name: str, value: Any) -> Iterable[Array]:

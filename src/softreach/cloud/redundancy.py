@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,7 @@ from softreach.geometry.neighbors import mean_value_distance
 from softreach.rod.view import activation_measures
 from softreach.schema import cell_dataset, check_cloud, is_stable, tip_cells
 from softreach.support.arguments import as_dataset, as_number, plain
-from softreach.support.arrays import Array, Index, Mask, as_indices, as_shares
+from softreach.support.arrays import Array, Index, Mask, as_indices
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import quantity
 
@@ -29,6 +28,7 @@ __all__ = [
     "tip_density",
 ]
 
+_SHARES = (0.05, 0.25, 0.75, 0.95)
 THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
 _VOLUMES = ("measured_volume", "occupied_volume")
 
@@ -160,7 +160,6 @@ def redundancy_summary(
     *,
     threshold: float = THRESHOLD,
     cell: float | None = None,
-    quantiles: Sequence[float] = (0.05, 0.25, 0.75, 0.95),
 ) -> RedundancySummary:
     """Median and quantiles of D̄, isolated points, and where it exceeds a threshold.
 
@@ -172,25 +171,23 @@ def redundancy_summary(
         distance: D̄ from `activation_distance`.
         threshold: The D̄ [-] above which a place counts as redundant.
         cell: Edge of the grid cells [m]; None for L/20.
-        quantiles: Probabilities.
 
     Raises:
         InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
     """
     threshold = as_number("threshold", threshold)
-    shares = as_shares("quantiles", quantiles)
     grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
     values = distance.values[np.isfinite(distance.values)]
     stable = is_stable(cloud)[evaluated]
     mean = grid.mean(distance.values, evaluated)
     known = np.isfinite(mean)
-    heights = np.quantile(values, shares) if len(values) else np.full(len(shares), np.nan)
+    heights = np.quantile(values, _SHARES) if len(values) else np.full(len(_SHARES), np.nan)
     return RedundancySummary(
         evaluated=int(stable.sum()),
         isolated=_share(np.isnan(distance.values[stable])),
         median=float(np.median(values)) if len(values) else np.nan,
         median_error=_median_error(values),
-        quantiles=dict(zip(shares.tolist(), heights.tolist(), strict=True)),
+        quantiles=dict(zip(_SHARES, heights.tolist(), strict=True)),
         threshold=threshold,
         redundant_points=_share(values > threshold),
         redundant_points_error=_share_error(values > threshold),

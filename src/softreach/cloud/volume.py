@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
-from softreach.geometry.delaunay import METHODS, delaunay
+from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, as_flag, as_given, as_one_of, plain
+from softreach.support.arguments import POSITIVE, as_flag, as_given, plain
 from softreach.support.arrays import Mask, as_floats, as_points
 from softreach.support.errors import InvalidInput, warn
 
@@ -29,15 +29,12 @@ SPACINGS = 3.0  # a smaller ball falls through between the points
 SPARSE = 0.6  # of the spacing that points would have if they filled their convex hull
 QUARTER_SPACINGS = 2.5  # below, V(N/4) leaves the law N^-1/2: design/triangulation.md
 
-Method = Literal["auto", "numba", "qhull"]
-
 
 def concave_hull(
     points: np.ndarray | xr.DataArray,
     alpha: float | str | None = None,
     *,
     bias: bool = False,
-    method: Method = "auto",
 ) -> Hull:
     """The alpha shape of a cloud: what a ball of radius alpha cannot scoop out of its convex hull.
 
@@ -62,7 +59,6 @@ def concave_hull(
             equilibria are left out.
         alpha: Radius [m]; ``"critical"``; or None for 0.05 of ``points.attrs["length"]``.
         bias: Whether to estimate the sampling bias.
-        method: Who triangulates, see `softreach.geometry.delaunay.delaunay`.
 
     Raises:
         InvalidInput: Points of another shape, or not finite; a radius that is not positive, or
@@ -79,7 +75,7 @@ def concave_hull(
     positions = _positions(points)
     radius = _radius(alpha, points)
     quarter = _quarter(len(positions)) if bias else None
-    hull, volume_of_quarter = _shape(positions, radius, quarter, method)
+    hull, volume_of_quarter = _shape(positions, radius, quarter)
     _warn_if_fine(hull, positions)
     if quarter is None:
         return hull
@@ -104,8 +100,6 @@ def convex_hull(points: np.ndarray | xr.DataArray) -> Hull:
 def unreachability(
     points: np.ndarray | xr.DataArray,
     alpha: float | str | None = None,
-    *,
-    method: Method = "auto",
 ) -> float:
     """The part of the convex hull that the cloud does not fill, UNR = 1 - V_conc / V_conv [-].
 
@@ -118,7 +112,6 @@ def unreachability(
         points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
             equilibria are left out.
         alpha: Radius as in `concave_hull`.
-        method: Who triangulates.
 
     Raises:
         InvalidInput: As `concave_hull`.
@@ -129,22 +122,19 @@ def unreachability(
     positions = _positions(points)
     radius = _radius(alpha, points)
     with parallel.meanwhile(partial(hulls.convex_hull, positions)) as convex_hull:
-        hull, _ = _shape(positions, radius, None, method)
+        hull, _ = _shape(positions, radius, None)
         convex = convex_hull().volume or alpha_hull(positions, np.inf)[0].volume  # almost flat
     _warn_if_fine(hull, positions)
     return 1.0 - hull.volume / convex if convex > 0 else np.nan  # theory (37)
 
 
-def volume_curve(
-    points: np.ndarray | xr.DataArray, alphas: ArrayLike, *, method: Method = "auto"
-) -> np.ndarray:
+def volume_curve(points: np.ndarray | xr.DataArray, alphas: ArrayLike) -> np.ndarray:
     """Volumes of the alpha shapes of many radii, from one triangulation.
 
     Args:
         points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
             equilibria are left out.
         alphas: Radii [m], any shape.
-        method: Who triangulates.
 
     Returns:
         Volumes [m³], shape of the radii.
@@ -155,7 +145,7 @@ def volume_curve(
     radii = as_floats("alphas", alphas)
     if not (radii >= 0).all():  # NaN too
         raise InvalidInput("alphas", radii, "radii of 0 or more [m]")
-    shape = _alpha_complex(_positions(points), method)
+    shape = _alpha_complex(_positions(points))
     return np.asarray(shape.volume(radii))
 
 
@@ -198,21 +188,18 @@ def _default_radius(points: np.ndarray | xr.DataArray) -> float:
     return DEFAULT_RADIUS * float(length)
 
 
-def _alpha_complex(positions: np.ndarray, method: Method) -> AlphaComplex:
+def _alpha_complex(positions: np.ndarray) -> AlphaComplex:
     """Triangulate and measure."""
-    return AlphaComplex(triangulation=delaunay(positions, method))
+    return AlphaComplex(triangulation=delaunay(positions))
 
 
-def _shape(
-    positions: np.ndarray, radius: float | str, part: Mask | None, method: Method
-) -> tuple[Hull, float]:
+def _shape(positions: np.ndarray, radius: float | str, part: Mask | None) -> tuple[Hull, float]:
     """The alpha shape, and the volume of that of a part; box by box if the radius is known."""
-    as_one_of("method", method, METHODS)
-    if radius != "critical" and method != "qhull":
+    if radius != "critical":
         return alpha_hull(positions, float(radius), part=part)
     clouds = [positions] if part is None else [positions, positions[part]]
-    shape, *of_part = parallel.in_order(partial(_alpha_complex, cloud, method) for cloud in clouds)
-    hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
+    shape, *of_part = parallel.in_order(partial(_alpha_complex, cloud) for cloud in clouds)
+    hull = shape.hull(shape.critical_alpha())
     return hull, sum(each.hull(hull.alpha).volume for each in of_part)
 
 

@@ -4,46 +4,43 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
 from softreach.geometry.surface import unit_scale
 from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.spatial_sort import insertion_order
-from softreach.support.arguments import as_one_of
 from softreach.support.arrays import Points, as_points
 
 _SAMPLED = 512
 _NEIGHBORS = 16
-_FEW = 1000  # of which even those on a curve are soon triangulated
-METHODS = ("auto", "numba", "qhull")
 
 
-def delaunay(points: np.ndarray, method: Literal["auto", "numba", "qhull"] = "auto") -> Delaunay:
-    """Triangulate a cloud of points.
-
-    ``"numba"`` (which ``"auto"`` means) inserts one point after the other with exact predicates
-    and is right for any input, see `softreach.kernels.points.bowyer_watson`. ``"qhull"`` is
-    SciPy's, several
-    times slower; among near-duplicate or cospherical points it may leave some out.
+def delaunay(points: np.ndarray) -> Delaunay:
+    """Triangulate a cloud of points, by exact predicates and so right for any input.
 
     Coordinates smaller than 2^-200 of the largest count as zero.
 
     Args:
         points: Positions [m], shape (n, 3).
-        method: Who triangulates.
 
     Raises:
-        InvalidInput: Points of another shape, or not finite; an unknown method.
+        InvalidInput: Points of another shape, or not finite.
     """
     points = as_points("points", points)
-    as_one_of("method", method, METHODS)
-    build = _by_qhull if method == "qhull" else _by_insertion
-    tetrahedra, neighbors, duplicate_of = build(unit_scale(points)[0])
-    return Delaunay(
-        points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
-    )
+    scaled, _ = unit_scale(points)
+    cells = neighbors = np.empty((0, 4), np.int32)
+    if len(points) >= 4:
+        order = insertion_order(scaled)  # keeps the work local
+        cells, neighbors, same = triangulate(scaled[order], partial(lies_on_curve, scaled))
+    if len(cells):
+        duplicate_of = np.empty(len(points), np.int64)
+        duplicate_of[order] = order[same]
+        cells = order.astype(np.int32)[cells]
+    else:
+        _, first, inverse = np.unique(scaled, axis=0, return_index=True, return_inverse=True)
+        duplicate_of = first[inverse.reshape(-1)]
+    return Delaunay(points=points, tetrahedra=cells, neighbors=neighbors, duplicate_of=duplicate_of)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,58 +92,3 @@ def local_dimension(points: Points) -> float:
     distance = np.asarray(KDTree(distinct).query(distinct[chosen], k=_NEIGHBORS + 1)[0])[:, 1:]
     growth = np.log(distance[:, -1:] / distance[:, :-1]).sum()
     return float(count * (_NEIGHBORS - 1) / growth) if growth > 0 else 0.0  # one sets the scale
-
-
-def _by_insertion(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Our own triangulation; points enter it in an order that keeps the work local."""
-    if len(points) < 4:
-        return *_nothing(), _first_equal(points)
-    order = insertion_order(points)
-    cells, neighbors, same = triangulate(points[order], partial(lies_on_curve, points))
-    if len(cells) == 0:
-        return *_nothing(), _first_equal(points)
-    duplicate_of = np.empty(len(points), np.int64)
-    duplicate_of[order] = order[same]
-    return order.astype(np.int32)[cells], neighbors, duplicate_of
-
-
-def _by_qhull(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """SciPy's triangulation of the distinct points, its cells turned to positive orientation."""
-    from scipy.spatial import Delaunay as Qhull  # lazily
-    from scipy.spatial import QhullError
-
-    duplicate_of = _first_equal(points)
-    distinct = np.unique(duplicate_of)
-    if len(distinct) < 4 or (len(distinct) > _FEW and lies_on_curve(points)):
-        return *_nothing(), duplicate_of
-    inner = points[distinct] - points[distinct].mean(axis=0)
-    try:
-        triangulation = Qhull(inner, qhull_options="Qbb Qc Qz Q12")
-    except QhullError:  # flat
-        return *_nothing(), duplicate_of
-    cells, neighbors = _positively_oriented(inner, triangulation.simplices, triangulation.neighbors)
-    return distinct.astype(np.int32)[cells], neighbors, duplicate_of
-
-
-def _positively_oriented(
-    points: Points, cells: np.ndarray, neighbors: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Copies with two vertices exchanged where det[b-a, c-a, d-a] < 0."""
-    corners = points[cells]
-    negative = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
-    swap = np.array([1, 0, 2, 3])
-    cells, neighbors = cells.copy(), neighbors.copy()
-    cells[negative] = cells[negative][:, swap]
-    neighbors[negative] = neighbors[negative][:, swap]
-    return cells, neighbors
-
-
-def _nothing() -> tuple[np.ndarray, np.ndarray]:
-    """No cells and no neighbors."""
-    return np.empty((0, 4), np.int32), np.empty((0, 4), np.int32)
-
-
-def _first_equal(points: Points) -> np.ndarray:
-    """For each point the first that equals it."""
-    _, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    return first[inverse.reshape(-1)] if len(points) else np.empty(0, np.int64)

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.machinery
-import sys
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,10 +140,11 @@ def convex_faces(points: Points) -> Faces:
     scaled, _ = unit_scale(points)
     if len(points) < 4:
         return np.empty((0, 3), np.int32)
-    qhull = _qhull()
+    from scipy.spatial import ConvexHull, QhullError  # lazily
+
     try:
-        hull = qhull.ConvexHull(scaled - scaled.mean(axis=0))
-    except qhull.QhullError:
+        hull = ConvexHull(scaled - scaled.mean(axis=0))
+    except QhullError:
         return np.empty((0, 3), np.int32)
     corners = hull.points[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -157,25 +152,3 @@ def convex_faces(points: Points) -> Faces:
     faces = hull.simplices.copy()
     faces[inward] = faces[inward][:, ::-1]
     return faces
-
-
-@cache
-def _qhull() -> Any:
-    """SciPy's Qhull, loaded by itself in a thirtieth of the time that `scipy.spatial` takes.
-
-    It needs LAPACK, and neither of the packages that both are in. Each module is imported as Python
-    does it, under its locks, but without its package; where this does not work, with it.
-    """
-    import scipy
-
-    imports: Any = importlib._bootstrap  # pyright: ignore[reportAttributeAccessIssue]
-    name = ""
-    with suppress(Exception):
-        for name in ("scipy.linalg.cython_lapack", "scipy.spatial._qhull"):
-            folder = Path(scipy.__file__).parent / name.split(".")[1]
-            spec = importlib.machinery.PathFinder.find_spec(name, [str(folder)])
-            with imports._ModuleLockManager(name):
-                if name not in sys.modules:
-                    imports._load_unlocked(spec)
-        return sys.modules[name]
-    return importlib.import_module("scipy.spatial")

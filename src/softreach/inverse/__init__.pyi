@@ -6,4 +6,3 @@ from .solutions import Solution as Solution
 from .solutions import Solutions as Solutions
 from .solutions import Status as Status
 from .solve import solve_inverse as solve_inverse
-from .twins import twin_hints as twin_hints

@@ -4,15 +4,17 @@
    their corners, once for an arm (`cells`).
 2. A tetrahedron is mapped by the quadratic through tips and Jacobians of its corners, whose image
    lies within planes; the true image lies within a remainder of it, estimated from the tips and
-   Jacobians along the edges: `kernels.activation_mesh`. So every root lies in a tetrahedron whose
-   planes, moved out by the remainder, contain the target.
+   Jacobians along the edges: `kernels.image.activation_mesh`. So every root lies in a tetrahedron
+   whose planes, moved out by the remainder, contain the target.
 3. An octree over space lists the inflated images that may cover a place (`image_tree`); for few
    targets the boxes round the images are looked through instead (`ImageLeaves`).
 4. In each tetrahedron listed at the target, the quadratic through tips and Jacobians says whether
-   and where it is reached: a start (`kernels.candidates`). Tips alone improve it.
-5. Damped Newton with the exact Jacobian leads from each start to a root (`kernels.newton`).
+   and where it is reached: a start (`kernels.branches.candidates`). Tips alone improve it.
+5. Damped Newton with the exact Jacobian leads from each start to a root
+   (`kernels.branches.newton`).
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
-   opposite, along the null direction of the Jacobian (`kernels.folds`), and is searched as well.
+   opposite, along the null direction of the Jacobian (`kernels.branches.folds`), and is searched as
+   well.
 7. Roots between which the tip hardly leaves the target are one.
 8. A root beyond a bound is one on the bound if the tip misses no more there than the error of the
    map leaves open.
@@ -29,7 +31,6 @@ from functools import partial
 import numpy as np
 
 from softreach.inverse.descent import descend
-from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import (
@@ -46,6 +47,7 @@ from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Sea
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined_by, rows
+from softreach.workspace.search import CLOSELY, nearest_tips
 
 __all__ = ["distinct", "every_branch"]
 
@@ -271,6 +273,7 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
 def _singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """Step 9: what descent finds for targets where Newton's method found nothing."""
     starts = starts_from_cells(prepared, request, chosen)
-    gamma = local_minima(prepared.rod, request.of(starts.target), starts.gamma).gamma
+    targets = request.targets[starts.target]
+    gamma = nearest_tips(prepared.rod, starts.gamma, targets, request.residual, CLOSELY).gamma
     roots = roots_at(prepared.rod, request.targets, starts.target, gamma)
     return distinct(prepared, request, rows(roots, roots.residual <= request.residual))

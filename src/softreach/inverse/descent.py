@@ -1,4 +1,4 @@
-"""From starts to targets: damped Gauss-Newton inside the bounds, for many starts at a time."""
+"""From starts to targets, or to compromises with a direction, for many starts at a time."""
 
 from __future__ import annotations
 
@@ -75,21 +75,23 @@ def descend(
     return ends
 
 
-def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
+def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Array, Array]:
     """Minimize function i from start i, by damped Newton within the bounds.
 
-    Second derivatives are differences of the exact gradients, so that the search ends fast also
-    where the target is far from everything reachable.
+    Second derivatives are differences of the exact gradients.
 
     Args:
         evaluate: Values and gradients of some of the functions.
         start: Inside the bounds [-], shape (n, m).
         box: The bounds.
+
+    Returns:
+        Activations (n, m) of local minima, and the functions there, (n,).
     """
     low, high, scales = box.low.copy(), box.high.copy(), box.scales
     gamma, damping = start.copy(), np.zeros(len(start))
-    active, converged = np.arange(len(start)), np.zeros(len(start), bool)
-    value, gradient, hessian = _expanded(evaluate, active, gamma, scales, ~converged)
+    active = np.arange(len(start))
+    value, gradient, hessian = _expanded(evaluate, active, gamma, scales, active >= 0)
     active = active[np.isfinite(value)]
     for _ in range(_MOST_NEWTON_STEPS):
         if not len(active):
@@ -103,61 +105,51 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
         gamma[taken] = trial[accepted]
         value[taken], gradient[taken], hessian[taken] = (part[accepted] for part in ahead)
         damping[active] = _next_damping(damped, accepted)
-        converged[active] = still
         active = active[~still & (damping[active] < _LARGEST_NEWTON_DAMPING)]
-    return Minima(gamma, value, converged)
+    return gamma, value
 
 
 @dataclass(frozen=True, kw_only=True)
 class Objective:
     """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
 
-    Theory (40). Without near and λ its minimum is the nearest reachable point; with near and the
-    right λ it is the least change that reaches the target (an augmented Lagrangian).
+    Theory (40). Without near and λ its minimum is a compromise of distance and direction; with near
+    and the right λ it is the least change that reaches the target (an augmented Lagrangian).
     """
 
     rod: TipMap
     targets: Array
     """One for each search [m], shape (n, 3)."""
+    direction: Array
+    """Unit vectors, shape (n, 3)."""
+    direction_weight: float
+    """w [-]."""
     penalty: float = 1.0
     """μ [-]."""
     multiplier: Array | None = None
     """λ, shape (n, 3)."""
     near: Array | None = None
     """Shape (n, m) [-]; None for no term of change."""
-    direction: Array | None = None
-    """Unit vectors, shape (n, 3); None for no term of direction."""
-    direction_weight: float = 0.0
-    """w [-]."""
 
     def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
         """Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,)."""
-        if self.direction is None or not self.direction_weight:
-            return self._of_position(which, gamma, *linearized(self.rod, gamma))
         motions = self.rod.tip_motions(gamma)
-        value, gradient = self._of_position(which, gamma, motions.tips, motions.slopes)
-        wanted, squared_weight = self.direction[which], self.direction_weight**2
-        value += 0.5 * squared_weight * _squares(motions.directions - wanted)
-        # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
-        turn = np.cross(motions.directions, wanted)
-        gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
-        return value, gradient
-
-    def _of_position(
-        self, which: Index, gamma: Array, tips: Array, slopes: Array
-    ) -> tuple[Array, Array]:
-        """Value and gradient of all terms but that of the direction."""
-        miss = (tips - self.targets[which]) / self.rod.length
+        miss = (motions.tips - self.targets[which]) / self.rod.length
         force = self.penalty * miss
         value = 0.5 * self.penalty * _squares(miss)
         if self.multiplier is not None:
             force += self.multiplier[which]
             value += np.einsum("ni,ni->n", self.multiplier[which], miss)
-        gradient = np.einsum("ni,nij->nj", force, slopes / self.rod.length)
+        gradient = np.einsum("ni,nij->nj", force, motions.slopes / self.rod.length)
         if self.near is not None:
             change = gamma - self.near[which]
             value += 0.5 * _squares(change)
             gradient += change
+        wanted, squared_weight = self.direction[which], self.direction_weight**2
+        value += 0.5 * squared_weight * _squares(motions.directions - wanted)
+        # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
+        turn = np.cross(motions.directions, wanted)
+        gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
         return value, gradient
 
 
@@ -184,17 +176,6 @@ class Descent(NamedTuple):
     """∂r/∂γ there [m], shape (n, 3, m)."""
     residual: Array
     """|tip - target| [m], shape (n,)."""
-
-
-class Minima(NamedTuple):
-    """Local minima."""
-
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    value: Array
-    """The functions there, shape (n,)."""
-    converged: Mask
-    """Mask of the searches whose last step was negligible, shape (n,)."""
 
 
 def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import PathStatus, PreparedMap, prepared_map
-from softreach.inverse.nearest import local_minima
 from softreach.inverse.path import Continuation
-from softreach.inverse.request import Request
+from softreach.workspace.search import CLOSELY, nearest_tips
 
 __all__ = ["Drag", "Dragged"]
 
@@ -71,13 +70,8 @@ class Drag:
         """The activation around here that brings the tip nearest to the target."""
         slope = self._tracker.at(gamma).slope
         starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, slope)]))
-        request = Request(
-            targets=np.tile(target, (len(starts), 1)),
-            residual=self._tracker.residual,
-            allowance=self._tracker.allowance,
-            near=starts,
-        )
-        ends = local_minima(self._rod, request, starts).gamma
+        targets = np.tile(target, (len(starts), 1))
+        ends = nearest_tips(self._rod, starts, targets, self._tracker.residual, CLOSELY).gamma
         tips, slopes = self._rod.tips_and_slopes(ends)
         gaps = np.linalg.norm(tips - target, axis=1)
         gaps = np.where(np.isfinite(gaps), gaps, np.inf)

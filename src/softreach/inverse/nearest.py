@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from softreach.inverse.descent import Descent, Minima, Objective, descend, minimize
+from softreach.inverse.descent import Descent, Objective, descend, minimize
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, placed
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
+from softreach.workspace.search import CLOSELY, nearest_tips
 
 _SEED = 1
 
@@ -32,15 +32,24 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
     if known is not None:
         target = np.concatenate([target, known.target])
         start = np.concatenate([start, known.gamma])
-    minima = local_minima(rod, request.of(target), start)
-    best = first_of_each(target, minima.value, len(targets))
-    return _nearest_at(rod, targets, minima.gamma[best])
+    if request.direction is None:
+        gamma, _, value = nearest_tips(rod, start, targets[target], request.residual, CLOSELY)
+    else:
+        part = request.of(target)
+        objective = Objective(
+            rod=rod,
+            targets=part.targets,
+            direction=part.direction,
+            direction_weight=part.direction_weight,
+        )
+        gamma, value = minimize(objective, start, rod.box)
+    return _nearest_at(rod, targets, gamma[first_of_each(target, value, len(targets))])
 
 
 def nearest_from(rod: TipMap, request: Request, gamma: Array) -> Nearest:
     """The local minimum of distance from one activation for each target."""
-    minima = local_minima(rod, replace(request, direction=None), gamma)
-    return _nearest_at(rod, request.targets, minima.gamma)
+    ends = nearest_tips(rod, gamma, request.targets, request.residual, CLOSELY)
+    return _nearest_at(rod, request.targets, ends.gamma)
 
 
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
@@ -73,17 +82,6 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
             gamma[rows[better]] = ends.gamma[best[better]]
             residual[rows[better]] = ends.residual[best[better]]
     return Reached(gamma, residual)
-
-
-def local_minima(rod: TipMap, request: Request, start: Array) -> Minima:
-    """A local minimum of the distance to target i (and direction i) from start i, (n, m)."""
-    objective = Objective(
-        rod=rod,
-        targets=request.targets,
-        direction=request.direction,
-        direction_weight=request.direction_weight,
-    )
-    return minimize(objective, start, rod.box)
 
 
 class Nearest(NamedTuple):

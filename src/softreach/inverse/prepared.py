@@ -45,8 +45,6 @@ class PreparedMap:
     """The tip map of all bundles, whose activations are in `measures`."""
     cells: int = _CELLS
     """With three free bundles: cells along each axis of the activation box."""
-    depth: int = 0
-    """Most halvings of a cell where det ∂r/∂γ changes sign or is uneven."""
 
     @lazy
     def measures(self) -> Array:
@@ -86,7 +84,8 @@ class PreparedMap:
 
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
-        return activation_cells(self.branch_map, self.cells, self.depth)
+        # Loads make the map steep before an equilibrium is lost.
+        return activation_cells(self.branch_map, self.cells, int(self.whole.supports_unstable))
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
@@ -141,7 +140,6 @@ def prepared_map(
     tol: float = 1e-6,
     *,
     cells: int = _CELLS,
-    depth: int = 0,
     frame: Frame = "world",
 ) -> PreparedMap:
     """Prepare an arm for `solve_inverse`; the last four are remembered.
@@ -150,27 +148,23 @@ def prepared_map(
         arm: The design, or its tip map; what is prepared already is returned as it is.
         tol: Largest tip error, in L.
         cells: With three free bundles: cells along each axis of the activation box.
-        depth: Halvings of a cell where det ∂r/∂γ changes sign or is uneven; once at least
-            for an arm under loads.
         frame: In which targets are told: that of the "world" or of the "base".
 
     Raises:
         InvalidInput: Numbers out of range, or an arm that was prepared in another frame.
     """
-    cells, depth = as_integer("cells", cells, 2, 256), as_integer("depth", depth, 0, 20)
+    cells = as_integer("cells", cells, 2, 256)
     if isinstance(arm, PreparedMap):
         if as_one_of("frame", frame, ("world", "base")) == "base" != arm.whole.frame:
             hint = "prepare the arm with this frame"
             raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
-    rod = measured_bundles(tip_map(arm, tol, frame=frame))
-    # Loads make the map steep before an equilibrium is lost.
-    return _of_map(rod, cells, max(depth, 1) if rod.supports_unstable else depth)
+    return _of_map(measured_bundles(tip_map(arm, tol, frame=frame)), cells)
 
 
 @lru_cache(maxsize=4)
-def _of_map(rod: TipMap, cells: int, depth: int) -> PreparedMap:
-    return PreparedMap(rod, cells, depth)
+def _of_map(rod: TipMap, cells: int) -> PreparedMap:
+    return PreparedMap(rod, cells)
 
 
 def forget_prepared() -> None:

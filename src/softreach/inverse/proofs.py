@@ -1,28 +1,23 @@
 """Proofs by branch and bound that no activation comes nearer to a target.
 
-Cells of the activation box are halved until a bound on each says enough.
-
-On a cell with center c and half widths h the tip lies within an error of its linearization at c,
-`TipMap.linearization_errors`. What that says of a cell is for the caller to bound.
+Cells of the activation box are halved until a bound on each says enough. On a cell with center c
+and half widths h the tip lies within an error of its linearization at c,
+`TipMap.linearization_errors`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.cell_cover import near_cells
-from softreach.rod.linearization import CubicRemainder
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, rows
-from softreach.support.lazy import lazy
+from softreach.support.arrays import Array, Index
 
-MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
+_MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
 _COARSE = 70_000  # cells that all targets share
 _ROUNDING = 1e-12  # of tips, in L
 _BLOCK = 16_384  # cells at once
@@ -67,37 +62,11 @@ def gap_bounds(
     return np.minimum(bounds, gap)
 
 
-class Cells(NamedTuple):
-    """Cells of equal shape, each of interest for one target."""
-
-    owner: Index
-    """Number of the target, ascending, shape (n,)."""
-    center: Array
-    """Activation [-], shape (n, m)."""
-
-
-class Linearized(NamedTuple):
-    """The tip map in cells."""
-
-    half: Array
-    """Half widths of all cells [-], shape (m,)."""
-    tips: Array
-    """At the centers [m], shape (n, 3)."""
-    slopes: Array
-    """∂r/∂γ there [m], shape (n, 3, m)."""
-    errors: Array
-    """Bounds of the distance from tips to their linearization [m], shape (n,)."""
-
-
-Bound = Callable[[Cells, Linearized], Array]
-"""A lower bound of what a cell holds for its target, shape (n,)."""
-
-
 class CoarseCells:
     """The box in even cells with what all targets ask of them."""
 
     def __init__(self, rod: TipMap) -> None:
-        self._rod, box, m = rod, rod.box, rod.box.dimension
+        box, m = rod.box, rod.box.dimension
         side = max(1, int(_COARSE ** (1 / max(m, 1)) + 1e-9))
         places = np.indices((side,) * m).reshape(m, side**m).T
         cube = (places + 0.5) / side
@@ -107,74 +76,11 @@ class CoarseCells:
         self.slopes = slopes * self.half
         self.radii = np.linalg.norm(self.slopes, axis=1).sum(axis=1)
 
-    @lazy
-    def cubic_remainder(self) -> CubicRemainder:
-        """What tips differ from their quadratic part by in any box of a cell."""
-        return self._rod.cubic_remainder(self.center, self.half)
-
     def near(self, target: Array, distance: float) -> Index:
         """Numbers of the cells whose tips may come so near to a target."""
         room = np.empty(len(self.center), np.int64)
         count = near_cells(self.tips, self.slopes, self.radii, self.errors, target, distance, room)
         return room[:count]
-
-
-def least_of_cells(
-    rod: TipMap, half: Array, cells: Cells, enough: Array, bound: Bound, most: int
-) -> Array:
-    """A lower bound for each target over all of its cells.
-
-    Args:
-        rod: The tip map.
-        half: Half widths of the cells [-], shape (m,).
-        cells: Cells to begin with.
-        enough: Bounds at which a cell is done and which the result does not exceed, shape (t,).
-        bound: The lower bound of a cell.
-        most: Cells that one target is worth.
-
-    Returns:
-        Shape (t,): `enough` where all cells reach it, else the least bound of those left.
-    """
-    least, count = enough.copy(), len(enough)
-    spent = np.zeros(count, np.int64)
-    while len(cells.owner):
-        owner = cells.owner
-        bounds = np.concatenate(
-            [
-                bound(part, linearized(rod, half, part.center))
-                for first in range(0, len(owner), _BLOCK)
-                for part in (rows(cells, slice(first, first + _BLOCK)),)
-            ]
-        )
-        spent += np.bincount(owner, minlength=count)
-        open_cells = bounds < enough[owner]
-        left = np.bincount(owner[open_cells], minlength=count)
-        hopeless = open_cells & (spent + 2 * left > most)[owner]
-        np.minimum.at(least, owner[hopeless], bounds[hopeless])
-        half, cells = _halved(rod, half, rows(cells, open_cells & ~hopeless))
-    return least
-
-
-def linearized(rod: TipMap, half: Array, center: Array) -> Linearized:
-    """The tip map in cells of equal shape; on the calling thread."""
-    tips, slopes = np.empty((len(center), 3)), np.empty((len(center), 3, center.shape[1]))
-    rod.fill(center, tips, slopes)
-    return Linearized(half, tips, slopes, _errors(rod, center, half))
-
-
-def _errors(rod: TipMap, center: Array, half: Array) -> Array:
-    return rod.linearization_errors(center, half) + _ROUNDING * rod.length
-
-
-def _halved(rod: TipMap, half: Array, cells: Cells) -> tuple[Array, Cells]:
-    """Both halves of every cell, along the axis that leaves least error."""
-    thinner = np.where(np.eye(len(half), dtype=bool), 0.5 * half, half)
-    axis = int(np.argmin([rod.linearization_error(widths) for widths in thinner]))
-    half = thinner[axis]
-    center = np.repeat(cells.center, 2, axis=0)
-    center[0::2, axis] -= half[axis]
-    center[1::2, axis] += half[axis]
-    return half, Cells(np.repeat(cells.owner, 2), center)
 
 
 def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough: Array) -> Array:
@@ -183,27 +89,52 @@ def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough
     counts = np.array([len(rows) for rows in near])
     most = _most_cells(rod.box.dimension)
     few = counts <= most
-    chosen = np.concatenate([rows[: len(rows) * ok] for rows, ok in zip(near, few, strict=True)])
-    cells = Cells(np.repeat(np.arange(len(enough)), counts * few), coarse.center[chosen])
-    enough = np.where(few, enough, 0.0)
-
-    def bound(part: Cells, at: Linearized) -> Array:
-        return _distances(targets[part.owner], at)
-
-    return np.maximum(least_of_cells(rod, coarse.half, cells, enough, bound, most), 0.0)
+    owner, half = np.repeat(np.arange(len(enough)), counts * few), coarse.half
+    center = coarse.center[
+        np.concatenate([cells[: len(cells) * ok] for cells, ok in zip(near, few, strict=True)])
+    ]
+    least = np.where(few, enough, 0.0)
+    spent = np.zeros(len(enough), np.int64)
+    while len(owner):
+        blocks = [slice(first, first + _BLOCK) for first in range(0, len(owner), _BLOCK)]
+        bounds = np.concatenate(
+            [_distances(rod, half, center[b], targets[owner[b]]) for b in blocks]
+        )
+        spent += np.bincount(owner, minlength=len(enough))
+        left = bounds < enough[owner]
+        halves = np.bincount(owner[left], minlength=len(enough)) * 2
+        hopeless = left & (spent + halves > most)[owner]
+        np.minimum.at(least, owner[hopeless], bounds[hopeless])
+        left &= ~hopeless
+        half, center = _halved(rod, half, center[left])
+        owner = np.repeat(owner[left], 2)
+    return np.maximum(least, 0.0)
 
 
 def _most_cells(bundles: int) -> int:
     """Most cells that are examined for one target."""
     if bundles <= 3:
         return _MOST_OF_THREE
-    return _MOST_EXCLUSION_CELLS if bundles <= MOST_BUNDLES else 0
+    return _MOST_EXCLUSION_CELLS if bundles <= _MOST_BUNDLES else 0
 
 
-def _distances(targets: Array, at: Linearized) -> Array:
-    """Least distance of each target from the image of its cell, negative if it may be in it."""
-    n, _, m = at.slopes.shape
-    away, slopes = targets - at.tips, at.slopes * at.half
+def _halved(rod: TipMap, half: Array, center: Array) -> tuple[Array, Array]:
+    """Half widths, and centers of both halves of each cell along the axis of least error."""
+    thinner = np.where(np.eye(len(half), dtype=bool), 0.5 * half, half)
+    axis = int(np.argmin([rod.linearization_error(widths) for widths in thinner]))
+    half = thinner[axis]
+    center = np.repeat(center, 2, axis=0)
+    center[0::2, axis] -= half[axis]
+    center[1::2, axis] += half[axis]
+    return half, center
+
+
+def _distances(rod: TipMap, half: Array, center: Array, targets: Array) -> Array:
+    """Least distance of each target from its cell's image, negative if it may be in it."""
+    n, m = center.shape
+    tips, slopes = np.empty((n, 3)), np.empty((n, 3, m))
+    rod.fill(center, tips, slopes)
+    away, slopes = targets - tips, slopes * half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
     inside, force = np.empty((n, m)), np.zeros((n, 3))
     side = np.ones((n, m))
@@ -212,4 +143,8 @@ def _distances(targets: Array, at: Linearized) -> Array:
     normal = -force / np.where(size > 0, size, 1.0)[:, None]
     linear = np.einsum("ni,ni->n", normal, away)
     linear -= np.abs(np.einsum("ni,nij->nj", normal, slopes)).sum(axis=1)
-    return linear - at.errors
+    return linear - _errors(rod, center, half)
+
+
+def _errors(rod: TipMap, center: Array, half: Array) -> Array:
+    return rod.linearization_errors(center, half) + _ROUNDING * rod.length

@@ -43,8 +43,6 @@ class Request:
     """Activations wanted for each target where there are infinitely many."""
     seed: int = 0
     """Seed of the random activations that the others stay near to."""
-    prove_least: bool = False
-    """True to bound the change of all activations that reach a target from below."""
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import Frame
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import counted
 
 if TYPE_CHECKING:
@@ -60,12 +60,6 @@ class Solution:
     gap_bound: float
     """A proved lower bound of the distance to all tips within the bounds [m], more than their
     error; 0 if nothing is proved."""
-    change_bound: float
-    """A proved lower bound of |γ - near| of all activations that reach the target, in their unit,
-    or of each over its range where units differ; 0 if nothing is proved, which it is only where
-    `prove_least` asks for it."""
-    least_proved: bool
-    """True if the bound is the |γ - near| of the first activation, but for 1e-6."""
     unstable: int
     """Number of activations found, with three free bundles, that would put the tip of an arm
     under loads at the target, but in an unstable equilibrium; they are left out."""
@@ -117,13 +111,6 @@ class Solutions(Sequence[Solution]):
     """Shape (t,) [m]."""
     gap_bounds: Array
     """Proved lower bounds of the distance to all tips, 0 if nothing is proved, shape (t,) [m]."""
-    change_bounds: Array
-    """Proved lower bounds of |γ - near| of all activations that reach a target, shape (t,).
-
-    In the unit of the activations; where units differ, each counts in its own range.
-    """
-    least_proved: Mask
-    """Mask of the targets whose first activation is proved to change least, to 1e-6, shape (t,)."""
     unstable: Index
     """Activations found that end in an unstable equilibrium and are left out, shape (t,)."""
 
@@ -148,12 +135,10 @@ class Solutions(Sequence[Solution]):
         """The same solutions, their activations multiplied by these; (bundles,)."""
         if (measures == 1.0).all():
             return self
-        alike = measures[0] if (measures == measures[0]).all() else 1.0
         return replace(
             self,
             activations=self.activations * measures,
             nearest_activations=self.nearest_activations * measures,
-            change_bounds=self.change_bounds * alike,
         )
 
     @property
@@ -204,8 +189,6 @@ class Solutions(Sequence[Solution]):
             nearest_activation=self.nearest_activations[i],
             gap=float(self.gaps[i]),
             gap_bound=float(self.gap_bounds[i]),
-            change_bound=float(self.change_bounds[i]),
-            least_proved=bool(self.least_proved[i]),
             unstable=int(self.unstable[i]),
         )
 
@@ -238,8 +221,6 @@ class Solutions(Sequence[Solution]):
                 "nearest_activation": (per_target, self.nearest_activations, units),
                 "gap": ("target", self.gaps, {"units": "m"}),
                 "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
-                "change_bound": ("target", self.change_bounds, {"units": "1", **units}),
-                "least_proved": ("target", self.least_proved),
                 "unstable": ("target", self.unstable, {"units": "1"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (per_solution, self.activations, units),
@@ -259,8 +240,6 @@ _PER_TARGET = (
     "nearest_activations",
     "gaps",
     "gap_bounds",
-    "change_bounds",
-    "least_proved",
     "unstable",
 )
 _PER_SOLUTION = ("activations", "residuals", "conditions", "margins")

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch
 from softreach.inverse.least_change import least_changes
-from softreach.inverse.least_proofs import SLACK, change_bounds
 from softreach.inverse.nearest import Nearest, nearest, nearest_from
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
@@ -32,9 +31,9 @@ from softreach.inverse.roots import (
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
-from softreach.support.arguments import as_flag, as_integer, as_number
+from softreach.support.arguments import as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask, as_directions, joined, rows
-from softreach.support.errors import InvalidInput, Range
+from softreach.support.errors import Range
 
 __all__ = ["solve_inverse"]
 
@@ -53,7 +52,6 @@ def solve_inverse(
     direction: ArrayLike | None = None,
     direction_weight: float = 0.1,
     family: int = 1,
-    prove_least: bool = False,
     seed: int = 0,
     tol: float = 1e-6,
     frame: Frame = "world",
@@ -88,10 +86,6 @@ def solve_inverse(
         family: With more than three free bundles: how many activations to give for each target,
             the others being those nearest to random activations and apart by a thousandth of a
             range; fewer where no more of them are found.
-        prove_least: With more than three free bundles: bound |γ - near| from below, over all
-            activations that reach a target, and say whether the one found is the least. Takes
-            some ten milliseconds for a target with four, up to half a second with five or six,
-            where it may not succeed; with more nothing is proved.
         seed: Seed of these.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
@@ -103,12 +97,8 @@ def solve_inverse(
         One `Solution` for each target; failures are its status, never an exception.
 
     Raises:
-        InvalidInput: Arguments of another shape, not finite, or out of range; a proof where a
-            direction is traded against the change.
+        InvalidInput: Arguments of another shape, not finite, or out of range.
     """
-    prove_least = as_flag("prove_least", prove_least)
-    if prove_least and direction is not None:
-        raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
     prepared = prepared_map(arm, tol, frame=frame)
     points, box = as_targets("targets", targets), prepared.whole.box
     preferred = np.zeros(box.bundles) if near is None else near
@@ -123,7 +113,6 @@ def solve_inverse(
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
         family=as_integer("family", family, 1, 10_000),
         seed=as_integer("seed", seed, 0, 2**63),
-        prove_least=prove_least,
     )
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
@@ -183,21 +172,7 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     roots = roots_at(prepared.rod, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
     closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
-    solutions = _with_nearest(prepared, request, roots, closest)
-    provable = request.prove_least and prepared.proves
-    return _with_proofs(prepared, request, solutions) if provable else solutions
-
-
-def _with_proofs(prepared: PreparedMap, request: Request, solutions: Solutions) -> Solutions:
-    """The solutions, with bounds of the change where targets are reached to the residual."""
-    reached = np.flatnonzero(solutions.gaps <= request.residual)
-    first = solutions.activations[solutions.offsets[reached]][:, prepared.whole.box.free]
-    solved = request.of(reached)
-    change = np.linalg.norm(first - solved.near, axis=1)
-    least = change_bounds(prepared.rod, prepared.coarse_cells, solved.targets, solved.near, change)
-    bounds, proved = np.zeros(len(request.targets)), np.zeros(len(request.targets), bool)
-    bounds[reached], proved[reached] = least, least >= change - SLACK
-    return replace(solutions, change_bounds=bounds, least_proved=proved)
+    return _with_nearest(prepared, request, roots, closest)
 
 
 def _with_nearest(
@@ -270,7 +245,5 @@ def _solutions(
         nearest_activations=prepared.whole.box.with_fixed(gamma),
         gaps=gaps,
         gap_bounds=proved_gaps,
-        change_bounds=np.zeros(count),
-        least_proved=np.zeros(count, bool),
         unstable=np.zeros(count, np.int64),
     )

@@ -198,7 +198,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
             direction=part.direction,
             direction_weight=part.direction_weight,
         )
-        gamma[rows] = minimize(lagrangian, gamma[rows], rod.box).gamma
+        gamma[rows] = minimize(lagrangian, gamma[rows], rod.box)[0]
         error = (linearized(rod, gamma[rows])[0] - part.targets) / rod.length
         multiplier[rows] += penalty * error  # theory (40)
         residual[rows] = np.linalg.norm(error, axis=1) * rod.length

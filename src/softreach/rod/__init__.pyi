@@ -3,7 +3,6 @@ from .kinematics import configuration as configuration
 from .kinematics import marker_positions as marker_positions
 from .kinematics import tip_jacobian as tip_jacobian
 from .kinematics import tip_positions as tip_positions
-from .linearization import CubicRemainder as CubicRemainder
 from .loaded.all_equilibria import AllEquilibria as AllEquilibria
 from .loaded.all_equilibria import equilibria as equilibria
 from .loaded.rod import LoadedRod as LoadedRod

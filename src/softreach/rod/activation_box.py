@@ -117,12 +117,6 @@ class ActivationBox:
         every[:, self.free] = cube
         return self.from_cube(every, out=every)
 
-    def of_free_bundles(self) -> ActivationBox:
-        """The box of the free bundles alone."""
-        return ActivationBox(
-            tuple(self.bounds[j] for j in self.free), tuple(self.names[j] for j in self.free)
-        )
-
     def with_fixed(self, activations: Array) -> Array:
         """Activations of all bundles from those of the free ones; the others stay fixed.
 
@@ -167,9 +161,6 @@ class ActivationBox:
         """All corners, shape (2^bundles, bundles), the last bundle varying fastest."""
         upper = np.indices((2,) * self.bundles).reshape(self.bundles, 2**self.bundles).T
         return np.where(upper, self.high, self.low)
-
-
-# The damped step toward a target that no activation takes beyond its bounds.
 
 
 def damped_steps(

@@ -16,7 +16,6 @@ from softreach.arm.driving import Driving, InnerActivations, pilot
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.linearization import CubicRemainder
 from softreach.rod.tip_map import (
     Array,
     Frames,
@@ -158,11 +157,6 @@ class DrivenRod(DerivedMap):
             return np.full(len(centers), np.inf)
         widths = self.driving.widths @ half_widths
         return self.base.linearization_errors(self.activations(centers), widths)
-
-    def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        widths = self.driving.widths @ half_widths
-        of_base = self.base.cubic_remainder(self.activations(centers), widths)
-        return of_base.along(self.driving.gains)
 
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None

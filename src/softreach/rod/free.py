@@ -16,7 +16,7 @@ from softreach.kernels.rod import slopes as derivatives
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.linearization import CubicRemainder, Linearization
+from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
 from softreach.rod.tip_map import (
     Frames,
@@ -105,9 +105,6 @@ class FreeRod(ArmRod):
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
         return self._linearization.errors(centers, half_widths)
-
-    def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        return self._linearization.cubic_remainder(centers, half_widths)
 
     @lazy
     def _linearization(self) -> Linearization:

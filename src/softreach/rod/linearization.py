@@ -1,4 +1,4 @@
-"""Bounds of the distance of the tip map of a free rod from its linear and quadratic parts.
+"""Bounds of the distance of the tip map of a free rod from its linearization.
 
 A change d of activation changes the twist ηu by κ = η U d + (y·d) u, with η = 1 + y·γ after the
 change and u = Uγ before it; y is z of fibers and muscles and 0 of forces. In the frame of the base
@@ -15,16 +15,6 @@ whose last part is at most ½ a² with a = ∫ |κ|, as Q turns only. W is linea
 with ζ, η and u at their largest in the activation box, or in the cell of it where γ + d lies.
 (The largest second derivative bounds it by three halves of the first part.)
 
-The next step of the iteration adds ∫∫ [κ'] [κ'] to Q, of which ∫∫ [κ1'] [κ1'] is quadratic in d,
-κ1 being the linear part of κ, and leaves a³/6. With b = ∫ |y·d| |U d| the tip then differs from
-its quadratic part by at most
-
-∫ ζ (a³/6 + a b) + |z·d| (½ a² + b).
-
-There a is bounded by a quadratic form, which is cheap for boxes of any shape: by Schwarz's
-inequality a² <= ∫ w ∫ |κ|²/w with any weight w > 0, and |κ|² <= (1 + θ) η² |U d|² +
-(1 + 1/θ) (y·d)² |u|² with any θ > 0. Along the arm it is a part of what it is at the tip, the same
-for every d.
 
 In a cell ζ and |u| are parts of what they are at most in the box, at every station no more than the
 largest part anywhere along the arm; so is η where it is ζ, and else it stays at its largest. All
@@ -40,17 +30,16 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, tables
-from softreach.kernels.rod.remainder import cubic_errors, relative_strains
+from softreach.kernels.rod.relative_strains import relative_strains
 from softreach.rod.activation_box import ActivationBox
 from softreach.support.lazy import lazy
 
-__all__ = ["CubicRemainder", "Linearization"]
+__all__ = ["Linearization"]
 
 Array = NDArray[np.float64]
 
 _STATIONS = 201
 _SAFETY = 1.02  # for quadrature, and for the steps of the map as it is computed
-_LEAST_WEIGHT = 1e-9  # of the largest
 _MOST_SIGNS = 8  # bundles up to which all signs of d are tried
 _MOST_KNOWN = 64  # proportions of half widths whose terms are kept
 
@@ -81,48 +70,6 @@ class _Terms(NamedTuple):
         return 0.5 * _SAFETY * (longest * square + linear)
 
 
-class CubicRemainder(NamedTuple):
-    """Bound of the distance of tips from the quadratic at the center of any box in some cells."""
-
-    longest: Array
-    """Largest ζ in each cell as a part of that in the activation box, shape (n,)."""
-    turned: Array
-    """The same of η or |u|, whichever is larger, shape (n,)."""
-    turns: Array
-    """G: a² is G[d, d] at most at the tip, shape (m, m)."""
-    stretched_turns: Array
-    """B: b is B[|d|, |d|] at most at the tip, shape (m, m)."""
-    stretches: Array
-    """∫ |z| of each bundle [m], shape (m,)."""
-    turned_stretches: Array
-    """The same weighted with ½ a² as a part of what it is at the tip, shape (m,)."""
-    thrice: float
-    """∫ ζ a³/6 [m] where a is 1 at the tip."""
-    once: float
-    """∫ ζ a [m] there."""
-
-    def errors(self, cells: NDArray[np.intp], half_widths: Array) -> Array:
-        """The largest |r(γ + d) - r(γ) - r'(γ) d - ½ r''(γ)[d, d]| [m], shape (k,).
-
-        Args:
-            cells: Number of the cell in which each box lies, shape (k,).
-            half_widths: Of the boxes, shape (k, m).
-        """
-        out = np.empty(len(cells))
-        cubic_errors(half_widths, cells, self.longest, self.turned, tuple(self)[2:], out)
-        return _SAFETY * out
-
-    def along(self, change: Array) -> CubicRemainder:
-        """The same for variables x of which d is `change` x, shape (m, variables)."""
-        size = np.abs(change)
-        return self._replace(
-            turns=change.T @ self.turns @ change,
-            stretched_turns=size.T @ self.stretched_turns @ size,
-            stretches=self.stretches @ size,
-            turned_stretches=self.turned_stretches @ size,
-        )
-
-
 class Linearization:
     """The bounds for one arm, its tables computed once."""
 
@@ -135,7 +82,6 @@ class Linearization:
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths
         self.longest = 1.0 + table.extension @ middle + self.stretch @ half
         self.has_forces = table.growth is not table.extension
-        self.widths, self.signed_growth = box.widths, table.growth
         self.growth, self.most_grown = self.stretch, self.longest
         if self.has_forces:
             self.growth = np.abs(table.growth)
@@ -156,57 +102,14 @@ class Linearization:
 
     def errors(self, centers: Array, half_widths: Array) -> Array:
         """The same for |dj| <= half_widths[j] around each center only, shape (n,)."""
-        longest, grown, bending = self._parts(centers, half_widths)
-        square, terms = self._terms(half_widths)
-        return square * np.asarray(terms.sum(longest, grown, bending))
-
-    def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        """The bound of what is beyond the quadratic part, for boxes in these cells."""
-        longest, grown, bending = self._parts(centers, half_widths)
-        return CubicRemainder(longest, np.maximum(grown, bending), *self._forms)
-
-    @lazy
-    def _forms(self) -> tuple[Array, Array, Array, Array, float, float]:
-        """All else that is in a `CubicRemainder`."""
-        z, half = self.stations, 0.5 * self.widths
-        free, m = np.flatnonzero(half > 0), len(half)
-        if not len(free):
-            return np.zeros((m, m)), np.zeros((m, m)), np.zeros(m), np.zeros(m), 0.0, 0.0
-        first = self.most_grown * self._turns(half, free).max(axis=0)
-        second = (self.growth @ half) * self.bending
-        weight = first + second
-        weight += _LEAST_WEIGHT * (weight.max() or 1.0)
-        # (1 + θ)/w and (1 + 1/θ)/w, with θ such that the sum is the square of the sum.
-        of_first, of_second = (
-            square**2 / np.maximum(part, _LEAST_WEIGHT * weight)
-            for square, part in ((self.most_grown, first), (self.bending, second))
-        )
-        turns = np.einsum("s,sij,sik->jks", of_first, self.curvature, self.curvature)
-        turns += np.einsum("s,sj,sk->jks", of_second, self.signed_growth, self.signed_growth)
-        turns = (_integrals(turns, z) * _integrals(weight, z)).transpose(2, 0, 1)
-        # What is added makes parts along the arm finite where some change turns nothing.
-        tip = turns[-1] + 1e-6 * (np.trace(turns[-1]) / m or 1.0) * np.eye(m)
-        root = np.linalg.inv(np.linalg.cholesky(tip))
-        part = np.sqrt(np.maximum(np.linalg.eigvalsh(root @ turns @ root.T)[:, -1], 0.0))
-        of_each = self.growth.T[:, None] * self.size.T
-        return (
-            tip,
-            _integrals(of_each, z)[..., -1],
-            _integrals(self.stretch.T, z)[:, -1],
-            _integrals(0.5 * part**2 * self.stretch.T, z)[:, -1],
-            float(_integrals(self.longest * part**3 / 6, z)[-1]),
-            float(_integrals(self.longest * part, z)[-1]),
-        )
-
-    def _parts(self, centers: Array, half_widths: Array) -> tuple[Array, Array, Array]:
-        """Largest ζ, η and |u| in cells, as parts of what they are in the box, shape (n,) each."""
-        n = len(centers)
-        longest, bending = np.empty(n), np.empty(n)
+        longest, bending = np.empty(len(centers)), np.empty(len(centers))
         offset = (1.0 + self.stretch @ half_widths) / self.longest
         relative_strains(np.ascontiguousarray(centers), offset, *self._relative, longest, bending)
         bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
-        longest = np.minimum(longest, 1.0)
-        return longest, np.ones(n) if self.has_forces else longest, np.minimum(bending, 1.0)
+        longest, bending = np.minimum(longest, 1.0), np.minimum(bending, 1.0)
+        square, terms = self._terms(half_widths)
+        grown = 1.0 if self.has_forces else longest
+        return square * np.asarray(terms.sum(longest, grown, bending))
 
     @lazy
     def _bending_inverse(self) -> Array:

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.linearization import CubicRemainder
 from softreach.support import parallel
 from softreach.support.arguments import as_number
 from softreach.support.arrays import as_floats
@@ -217,17 +216,6 @@ class TipMap(ABC):
             half_widths: Shape (bundles,).
         """
         return np.full(len(centers), self.linearization_error(half_widths))
-
-    def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        """Bound of the distance of tips from the quadratic at the center of any box in some cells.
-
-        Of maps whose `linearization_error` is finite only.
-
-        Args:
-            centers: Of the cells, shape (n, bundles).
-            half_widths: Of the cells, shape (bundles,).
-        """
-        raise NotImplementedError
 
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""

@@ -17,7 +17,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.kernels.rod.placing import move, turn
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.linearization import CubicRemainder
 from softreach.rod.tip_map import (
     Array,
     Frame,
@@ -132,9 +131,6 @@ class DerivedMap(TipMap):
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
         return self.base.linearization_errors(centers, half_widths)
-
-    def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        return self.base.cubic_remainder(centers, half_widths)
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
         return self.base.strains_at(stations)
@@ -304,12 +300,6 @@ class View(DerivedMap):
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
         widths = self._widths(half_widths)
         return self.base.linearization_errors(self.activations(centers), widths)
-
-    def cubic_remainder(self, centers: Array, half_widths: Array) -> CubicRemainder:
-        change = np.zeros((len(self.scale), len(half_widths)))
-        change[self._columns, np.arange(len(half_widths))] = self.measures
-        of_base = self.base.cubic_remainder(self.activations(centers), self._widths(half_widths))
-        return of_base.along(change)
 
     def _widths(self, half_widths: Array) -> Array:
         widths = np.zeros(len(self.scale))

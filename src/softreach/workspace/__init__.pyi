@@ -1,6 +1,5 @@
 from . import payload as payload
 from .abstract_set import ReachableSet as ReachableSet
-from .directions import direction_spread as direction_spread
 from .gradient import VolumeGradient as VolumeGradient
 from .gradient import volume_gradient as volume_gradient
 from .image import Image as Image

@@ -92,7 +92,7 @@ class Image:
     vertices: Array
     """Mapped vertices in these units from the lattice's origin, shape (n, 3)."""
     triangles: Index
-    """Critical triangles, as `kernels.contour.critical_triangles` lists them."""
+    """Critical triangles, as `kernels.image.contour.critical_triangles` lists them."""
 
     @lazy
     def spans(self) -> tuple[Spans, Spans, Spans]:

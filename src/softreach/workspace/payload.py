@@ -33,7 +33,6 @@ def payload_curve(
     payloads: ArrayLike | None = None,
     *,
     accuracy: float = 0.01,
-    tol: float = 1e-6,
     progress: Progress | None = None,
 ) -> PayloadCurve:
     """The volume of the exact reachable set under each payload.
@@ -45,7 +44,6 @@ def payload_curve(
         payloads: Masses at the tip [kg], in any order, shape (n,); 0 is added. None for four that
             fit the stiffness of the arm.
         accuracy: Relative error allowed in each volume, as for `reachable_set`.
-        tol: Largest tip error, in L.
         progress: Called with the number of volumes done since its last call.
 
     Raises:
@@ -63,10 +61,10 @@ def payload_curve(
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
     masses, volumes = np.unique(np.append(masses, 0.0)), []
     for mass in masses:
-        volumes.append(_volume(arm, float(mass), accuracy, tol))
+        volumes.append(_volume(arm, float(mass), accuracy))
         progress(1)
     value, error, lost = np.array(volumes).T
-    return PayloadCurve(arm, masses, value, error, lost, accuracy, tol)
+    return PayloadCurve(arm, masses, value, error, lost, accuracy)
 
 
 class LargestPayload(NamedTuple):
@@ -108,8 +106,6 @@ class PayloadCurve:
     """Share of the activation box that is left out for want of stability [-], shape (n,)."""
     accuracy: float
     """Relative error allowed in each volume."""
-    tol: float
-    """Largest tip error, in L."""
     _known: dict[float, _Volume] = field(default_factory=dict)
 
     @property
@@ -167,7 +163,7 @@ class PayloadCurve:
                 for name, (values, unit, meaning) in numbers.items()
             },
             {"payload": ("payload", self.payloads, {"units": "kg", "long_name": "payload"})},
-            {**provenance(self.arm), "tol": self.tol, "accuracy": self.accuracy},
+            {**provenance(self.arm), "accuracy": self.accuracy},
         )
 
     def __repr__(self) -> str:
@@ -187,7 +183,7 @@ class PayloadCurve:
             if payload == mass:
                 return _Volume(*volume)
         if mass not in self._known:
-            self._known[mass] = _volume(self.arm, mass, self.accuracy, self.tol)
+            self._known[mass] = _volume(self.arm, mass, self.accuracy)
         return self._known[mass]
 
     def _share(self, mass: float) -> float:
@@ -239,10 +235,10 @@ def _narrowed(
     return low, high
 
 
-def _volume(arm: Manipulator, mass: float, accuracy: float, tol: float) -> _Volume:
+def _volume(arm: Manipulator, mass: float, accuracy: float) -> _Volume:
     assert arm.loads is not None
     carrying = arm.replace(loads=arm.loads.replace(payload=mass))
-    reached = reachable_set(carrying, accuracy=accuracy, tol=tol)
+    reached = reachable_set(carrying, accuracy=accuracy)
     return _Volume(reached.volume, reached.volume_error, float(getattr(reached, "lost_share", 0.0)))
 
 

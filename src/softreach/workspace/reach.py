@@ -13,9 +13,7 @@ from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
 from softreach.support.arguments import (
     POSITIVE,
-    as_given,
     as_number,
-    plain,
 )
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, warn
@@ -46,7 +44,6 @@ def reachable_set(
     *,
     accuracy: float = 3e-3,
     cell: float | None = None,
-    grid: int | None = None,
     tol: float = 1e-6,
     frame: Frame = "world",
     memory: float | None = None,
@@ -81,8 +78,6 @@ def reachable_set(
             dimension.
         accuracy: Relative error ε allowed in the volume.
         cell: Edge h of a cell [m], instead of the rule's.
-        grid: Cells n along each axis of the activation box, even, instead of the rule's; for three
-            free bundles.
         tol: Largest tip error, in L.
         frame: In which places are told: that of the "world", or of the "base", whose z is along the
             straight arm.
@@ -102,17 +97,16 @@ def reachable_set(
     """
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)
-    grid = None if grid is None else as_even_cells("grid", grid)
     memory = None if memory is None else as_number("memory", memory, _SIZES)
     rod = tip_map(arm, tol, frame=frame)
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)
     if m == 3:
-        result = _of_three(rod, accuracy, cell, grid, progress)
+        result = _of_three(rod, accuracy, cell, progress)
         finer = f"a grid above {result.cells} and a smaller cell"
     else:
-        result = _of_many(rod, accuracy, cell, grid, memory, progress)
+        result = _of_many(rod, accuracy, cell, memory, progress)
         finer = "a smaller cell" if cell is not None else "more memory"
     if result.volume_error > accuracy * result.volume:
         warn(_inaccurate(result, accuracy, finer))
@@ -155,18 +149,6 @@ def rasterized_set(
         coarse_image=coarse,
         **overlaps._asdict(),
     )
-
-
-def as_even_cells(name: str, value: object) -> int:
-    """A number of cells along each axis of the activation box, instead of the rule's.
-
-    Raises:
-        InvalidInput: It is odd or less than 2.
-    """
-    cells = plain(value)
-    if isinstance(cells, int) and cells >= 2 and cells % 2 == 0:
-        return cells
-    raise InvalidInput(name, as_given(value), "an even number of cells, 2 or more")
 
 
 def grid_for(accuracy: float) -> int:
@@ -226,16 +208,16 @@ def _fits(cells: int) -> bool:
 
 
 def _of_three(
-    rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
+    rod: TipMap, accuracy: float, cell: float | None, progress: Progress
 ) -> ReachableSolid:
-    cells = grid if grid is not None else grid_for(accuracy)
+    cells = grid_for(accuracy)
     if is_injective(rod):
         lattice = partial(lattice_for, cell=cell, accuracy=accuracy)
         if cell is not None:  # which may be too small
             lattice(MappedFaces(rod, cells).tips)
         return solid_by_flux(rod, cells, lattice, progress)
     solid = rasterized_set(rod, cells, cell, accuracy, progress)
-    while grid is None and not is_settled(solid, accuracy) and is_worthwhile(solid, accuracy):
+    while not is_settled(solid, accuracy) and is_worthwhile(solid, accuracy):
         solid = rasterized_set(rod, 2 * solid.cells, cell, accuracy, progress)
     return solid
 
@@ -244,12 +226,9 @@ def _of_many(
     rod: TipMap,
     accuracy: float,
     cell: float | None,
-    grid: int | None,
     memory: float | None,
     progress: Progress,
 ) -> ReachableSolid:
-    if grid is not None:
-        raise InvalidInput("grid", grid, "for three free bundles only", "pass `cell` instead")
     memory = max(free_memory() / 4.0, smallest_memory(rod)) if memory is None else memory
     if not smallest_memory(rod) <= memory < np.inf:
         raise InvalidInput("memory", memory, f"at least {smallest_memory(rod):.3g} bytes")

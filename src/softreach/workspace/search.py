@@ -33,6 +33,21 @@ _CHUNK = 1 << 16  # places searched for at a time
 _CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 
 
+class Stop(NamedTuple):
+    """When a search gives up that gets no nearer to its target."""
+
+    settled: float
+    """Gain that the linear map promises, of the distance [-]."""
+    most: int
+    """Steps."""
+
+
+ROUGHLY = Stop(settled=1e-3, most=30)
+"""For targets that are reached or not."""
+CLOSELY = Stop(settled=1e-13, most=1000)
+"""For the nearest tip itself."""
+
+
 class Flood:
     """Cell centers that are reached, grown from tips of a cloud to their neighbors.
 
@@ -122,7 +137,9 @@ class Flood:
             self.progress(len(some))
 
 
-def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Nearest:
+def nearest_tips(
+    rod: TipMap, start: Array, targets: Array, enough: float, stop: Stop = ROUGHLY
+) -> Nearest:
     """The activations whose tips come closest to targets, as far as a descent from `start` finds.
 
     Only stable equilibria are taken.
@@ -132,13 +149,14 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
         start: Activations to begin with, within the bounds, shape (n, bundles).
         targets: Places [m], shape (n, 3).
         enough: Distance at which a target counts as reached [m].
+        stop: When to give up.
     """
     rod, gamma = stable_tips(rod), np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
 
     def task(block: slice) -> None:
         parts = (nearest.gamma[block], nearest.tips[block], nearest.distance[block])
-        _descend(rod, targets[block], enough, Nearest(*parts))
+        _descend(rod, targets[block], enough, stop, Nearest(*parts))
 
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
@@ -159,7 +177,7 @@ class Nearest(NamedTuple):
     equilibrium."""
 
 
-def _descend(rod: TipMap, targets: Array, enough: float, nearest: Nearest) -> None:
+def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Nearest) -> None:
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
     total, box = len(targets), rod.box
     bounds = box.low, box.high, box.scales
@@ -176,7 +194,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, nearest: Nearest) -> No
         rod.fill(running.trial[:n], tips[:n], ahead[:n])
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, nearest, enough, *bounds)
+        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, *bounds)
         slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
         low, high = running.low[:n], running.high[:n]
         multiplier[:n] = 0.0

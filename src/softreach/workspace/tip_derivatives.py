@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -76,23 +76,12 @@ class TipDerivatives:
         Returns:
             [m per unit], shape (n, 3, parameters); NaN without a stable equilibrium.
         """
-        return self._differences(len(cube), lambda rod: rod.box.from_free_cube(cube))
-
-    def at_activations(self, gamma: Array) -> Array:
-        """Derivatives at fixed activations, shape (n, bundles), wherever their bounds move.
-
-        Returns:
-            [m per unit], shape (n, 3, parameters); NaN without a stable equilibrium.
-        """
-        return self._differences(len(gamma), lambda _: gamma)
-
-    def _differences(self, count: int, activations: Callable[[TipMap], Array]) -> Array:
-        out = np.zeros((count, 3, len(self._shifts)))
+        out = np.zeros((len(cube), 3, len(self._shifts)))
 
         def task(k: int) -> None:
             self._progress(0)
             for weight, rod in self._rods[k]:
-                out[:, :, k] += weight * stable_tips(rod).tips(activations(rod))
+                out[:, :, k] += weight * stable_tips(rod).tips(rod.box.from_free_cube(cube))
 
         parallel.run(partial(task, k) for k in range(len(self._shifts)))
         return out

@@ -19,9 +19,8 @@ NOWHERE = 1e150
 """Coordinate of tips that do not count; no distance may be infinite here."""
 FIRST_DAMPING = 1e-2
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-4, 1e4
-_MOST_STEPS = 30
 _BELIEVED = 0.1  # damping above which the linear map says little of what is left to gain
-_PROGRESS = 0.005  # of the tolerance or the distance: a smaller gain ends a search
+_PROGRESS = 0.005  # of the tolerance: a smaller gain ends a search
 
 
 class Running(NamedTuple):
@@ -50,7 +49,7 @@ class Running(NamedTuple):
 
 
 @kernel
-def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  # noqa: C901
+def judge(running, n, tips, ahead, targets, ends, enough, stop, low, high, scales):  # noqa: C901
     """Take in the trials of the first n, and set up the next steps of those that go on.
 
     Args:
@@ -61,6 +60,8 @@ def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  #
         targets: Of all searches [m], shape (all, 3).
         ends: Best activations, their tips and distances of all searches.
         enough: Distance at which a search ends [m].
+        stop: Gain still to be hoped for, of the distance, at which a search ends as well [-], and
+            the most steps.
         low: Lower bounds, shape (m,).
         high: Upper bounds, shape (m,).
         scales: Ranges of the bounds, shape (m,).
@@ -69,6 +70,7 @@ def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  #
         Number of those that go on.
     """
     gamma, best, distance = ends
+    settled, most = stop
     kept = 0
     for i in range(n):
         row, damping = running.row[i], running.damping[i]
@@ -84,13 +86,14 @@ def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  #
         if not begins:
             gain = now - running.left[i]
             # What the linear map promises bounds what is left to gain, once it is to be believed.
-            ended = damping <= _BELIEVED and gain <= max(_PROGRESS * min(enough, now), 1e-3 * now)
+            hoped = max(_PROGRESS * min(enough, now), settled * now)
+            ended = damping <= _BELIEVED and gain <= hoped
             if now - trial > 0.25 * gain:
                 damping = max(0.1 * damping, _LEAST_DAMPING)
             elif not better:
                 # Searches beyond the loss of stability take long: a step into it is cut down.
                 damping *= 100.0 if trial >= NOWHERE else 10.0
-            ended = ended or damping >= _LARGEST_DAMPING or running.steps[i] >= _MOST_STEPS
+            ended = ended or damping >= _LARGEST_DAMPING or running.steps[i] >= most
         if better:
             distance[row] = trial
             for j in range(gamma.shape[1]):

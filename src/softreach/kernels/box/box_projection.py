@@ -16,7 +16,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["climbs", "dual", "moved", "newton", "project", "softened"]
+__all__ = ["project"]
 
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-13  # of the largest terms
@@ -219,13 +219,6 @@ def dual(problems, n, y, out, side):
         g21 += v * c
         g22 += w * c
     return value, (e0, e1, e2), (g00, g10, g11, g20, g21, g22), changed
-
-
-@inline
-def softened(gram, more):
-    """Minus the Hessian with a larger softness."""
-    g00, g10, g11, g20, g21, g22 = gram
-    return g00 + more, g10, g11 + more, g20, g21, g22 + more
 
 
 @inline

@@ -1,13 +1,13 @@
-"""One step of a rod under any loads, and of its tangents: `loaded_step` with a whole frame.
+"""One step of a rod under any loads, and of its tangents: `kernels.loaded.step` with a whole frame.
 
 State: two orthonormal directions G, H of the world as the section sees them (the third is
 K = G × H), the moment M, and the tip y, four tuples of three. With
 
     n = n1 G + n2 H + n3 K
 
-the equations are those of `loaded_step`, with n for w G, and dH = ω × H, theory (66). A force that
-follows the tip is fixed in that world too, as any frame on the rod is during one walk: it adds to
-n1, n2, n3.
+the equations are those of `kernels.loaded.step`, with n for w G, and dH = ω × H, theory (66). A
+force that follows the tip is fixed in that world too, as any frame on the rod is during one walk:
+it adds to n1, n2, n3.
 
 A tangent turns the whole frame of a section by θ, so that δG = θ × G. It is (θ, δM, δy) with
 

@@ -11,7 +11,7 @@ always a valid Delaunay triangulation, whatever is cospherical or coplanar. The 
 star-shaped: a wall in one plane with the point would have the point inside the circle of that wall,
 hence inside the spheres on both its sides, and would not be a wall. So every cell has volume.
 
-The arrays and their conventions are in `kernels.triangulation`.
+The arrays and their conventions are in `kernels.points.triangulation`.
 
 References:
     Bowyer (1981), Computing Dirichlet tessellations, The Computer Journal 24, 162-166.

@@ -137,14 +137,6 @@ class AllEquilibria:
         return f"{kind}: tip ({tip}) m, margin {self.margin[k]:.3g}{which}"
 
 
-# Every equilibrium of a loaded arm at given activations, stable or not.
-#
-# The direction of gravity that the tip sees decides which one the base would have to see: a map of
-# the sphere to itself. Unloaded it is the identity, so that its degree is 1, theory (80): every
-# direction at the base is covered once more forward than backward, and the number of equilibria is
-# odd.
-
-
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
 _MOST_WALKED = 20_000_000  # steps of one search, which take about a second

@@ -89,7 +89,7 @@ class LoadedRod(ArmRod):
 
     @property
     def steps(self) -> int:
-        """The number of steps that `tol` needs for tips; see `loaded_steps` for the rule.
+        """The number of steps that `tol` needs for tips; see `rod.loaded.steps` for the rule.
 
         Raises:
             InvalidInput: None is enough.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.loaded import any_loads as loaded_general
+from softreach.kernels.loaded import any_loads
 from softreach.kernels.loaded import shooting as loaded
 from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
 from softreach.rod.tip_map import TipStatus
@@ -79,17 +79,17 @@ def shoot(
     compliance: bool = False,
     trace: bool = False,
 ) -> Walked:
-    """Searches under any loads; see `loaded_general.solve`."""
+    """Searches under any loads; see `any_loads.solve`."""
     n, columns = len(gamma), _columns(gamma)
     ends = np.empty((n, 11))
     answers = (
         np.zeros((n if slopes else 0, 6, columns.shape[1])),
         np.zeros((n if compliance else 0, 3, 3)),
-        np.zeros((n if trace else 0, len(coarse.lengths) + 1, loaded_general.TRACE)),
+        np.zeros((n if trace else 0, len(coarse.lengths) + 1, any_loads.TRACE)),
     )
     guessed = np.zeros((0, 6)) if guesses is None else guesses
     steps = tuple(coarse), tuple(fine)
-    loaded_general.solve(columns, axes, guessed, *steps, limits, most, ends, *answers)
+    any_loads.solve(columns, axes, guessed, *steps, limits, most, ends, *answers)
     shots = Shots(ends[:, :3], ends[:, 3:9], ends[:, 9], ends[:, 10])
     return Walked(shots, answers[0][:, :, : gamma.shape[1]], *answers[1:])
 

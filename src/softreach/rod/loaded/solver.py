@@ -149,12 +149,6 @@ class Solver:
         self._try(gamma, slice(None), DIRECT, Rung.DIRECT, equilibria, known.frame)
         return equilibria
 
-    def slowly(self, gamma: Array) -> Equilibria:
-        """Equilibria found by the most patient continuation alone."""
-        equilibria = self.empty(len(gamma))
-        self._try(gamma, slice(None), PATIENT, Rung.PATIENT, equilibria)
-        return equilibria
-
     def _try(
         self,
         gamma: Array,
