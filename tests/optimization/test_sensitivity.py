@@ -111,7 +111,7 @@ def test_indices_of_a_sum_are_shares_of_its_variances():
         problem(ends), goals=(of_design("sum", total), of_design("1", lambda _: Value(1.0)))
     )
     best = Candidate(values={"length": 1.0, "taper": 0.005})
-    shares, constant = sensitivity(asked, best, n=128).variance
+    shares, constant = sensitivity(asked, best, n=256).variance
     expected = np.array([0.8, 0.2])
     for got, error in ((shares.first, shares.first_error), (shares.total, shares.total_error)):
         assert (np.abs(got - expected) < np.maximum(3.0 * error, 0.02)).all()
