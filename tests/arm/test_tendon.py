@@ -306,3 +306,11 @@ def test_replacing_a_distance_by_a_ratio_and_back():
     assert by_ratio.replace(distance=0.008) == tendon()
     assert by_ratio.value_on("distance", STRAIGHT, SECTION) == pytest.approx(0.7 * RADIUS)
     assert tendon().value_on("distance_ratio", STRAIGHT, SECTION) == pytest.approx(0.8)
+
+
+def test_millimeters_taken_for_meters_are_refused():
+    """Such an arm would curl up so far that no search of it ends."""
+    with pytest.raises(
+        sr.InvalidDesign, match="distance = 8: must be at most the length of the ar"
+    ):
+        arm(tendon(distance=8.0))

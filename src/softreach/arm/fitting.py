@@ -143,6 +143,10 @@ def fit_faults(arm: Manipulator) -> Iterator[Fault]:
     for actuator in arm.actuators:
         parts = arm.profile, arm.section
         faults = actuator.place_faults(arm.length) or actuator.section_faults(*parts)
+        distance = getattr(actuator, "distance", None)
+        if isinstance(distance, float) and distance > arm.length:  # millimeters taken for meters
+            allowed = f"must be at most the length of the arm, {arm.length:g} m"
+            faults = [*faults, Fault("distance", distance, allowed)]
         yield from (
             fault
             if fault.path.startswith(("rings", "core"))
