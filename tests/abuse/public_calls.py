@@ -162,8 +162,8 @@ NAMES = {
     "number": """accuracy alpha alpha_over_length at cell convex direction_weight exact force
         half_width high length memory radius radius_ratio residual_over_length revolution size
         taper thickness threshold tip_radius tol width""",
-    "whole number": "bins cells family n seed segments sides",
-    "word": "color fiber frame metric name quantity sampler unit view",
+    "whole number": "bins cells count family n seed segments sides",
+    "word": "color fiber frame method metric name quantity sampler unit view",
     "words": "metrics names panels parameters",
     "flag": """bias durable keep_clouds keep_extent key legend overwrite rest smallest
         warn""",
