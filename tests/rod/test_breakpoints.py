@@ -31,6 +31,7 @@ from softreach.rod.free import FreeRod
 from softreach.rod.rods import in_steps, tip_map
 from tests.kinds import any_arms, driven
 from tests.laws import in_box
+from tests.rod.test_steps import tip_error
 
 RUBBER = Material(young_modulus=1e6, poisson_ratio=0.45)
 SECTION = Section(
@@ -190,14 +191,7 @@ def test_the_tip_is_that_of_the_rod_equations_walked_piece_by_piece(walk):
 def test_the_tolerance_is_met_for_arms_of_any_kind(arm, tol):
     """At corners of the box, inside it, and uphill from the worst of them."""
     corners = np.array(list(itertools.islice(itertools.product(*arm.bounds), 256)))
-    found = FreeRod(arm, tol)
-    exact = found.rule.packed_nodes(4 * found.steps + 16)
-
-    def error(gamma):
-        truth = np.empty((len(gamma), 3))
-        rod.tips(exact, gamma, truth)
-        return np.linalg.norm(found.tips(gamma) - truth, axis=1) / arm.length
-
+    error = tip_error(arm, tol)
     gamma = np.concatenate([corners, in_box(arm, 300)])
     rng, (low, high) = np.random.default_rng(0), arm.bounds.T
     for scale in (0.3, 0.1, 0.03):

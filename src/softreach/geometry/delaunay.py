@@ -30,17 +30,19 @@ def delaunay(points: np.ndarray) -> Delaunay:
     points = as_points("points", points)
     scaled, _ = unit_scale(points)
     cells = neighbors = np.empty((0, 4), np.int32)
+    order = same = np.arange(len(points))
     if len(points) >= 4:
         order = insertion_order(scaled)  # keeps the work local
         cells, neighbors, same = triangulate(scaled[order], partial(lies_on_curve, scaled))
-    if len(cells):
-        duplicate_of = np.empty(len(points), np.int64)
-        duplicate_of[order] = order[same]
-        cells = order.astype(np.int32)[cells]
-    else:
+    duplicate_of = np.empty(len(points), np.int64)
+    duplicate_of[order] = order[same]
+    if not len(cells):
         _, first, inverse = np.unique(scaled, axis=0, return_index=True, return_inverse=True)
         duplicate_of = first[inverse.reshape(-1)]
-    return Delaunay(points=points, tetrahedra=cells, neighbors=neighbors, duplicate_of=duplicate_of)
+    tetrahedra = order.astype(np.int32)[cells]
+    return Delaunay(
+        points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

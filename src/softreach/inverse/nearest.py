@@ -35,12 +35,11 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
     if request.direction is None:
         gamma, _, value = nearest_tips(rod, start, targets[target], request.residual, CLOSELY)
     else:
-        part = request.of(target)
         objective = Objective(
             rod=rod,
-            targets=part.targets,
-            direction=part.direction,
-            direction_weight=part.direction_weight,
+            targets=targets[target],
+            direction=request.direction[target],
+            direction_weight=request.direction_weight,
         )
         gamma, value = minimize(objective, start, rod.box)
     return _nearest_at(rod, targets, gamma[first_of_each(target, value, len(targets))])

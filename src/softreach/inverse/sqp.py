@@ -189,6 +189,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
         if not len(rows):
             break
         part = request.of(rows)
+        assert part.direction is not None
         lagrangian = Objective(
             rod=rod,
             targets=part.targets,
