@@ -76,12 +76,6 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     ).wait_for()
     assert tab.drawn("/free")
     tab.page.get_by_text("every sample rests in a stable equilibrium").wait_for()
-    tab.open("View")
-    tab.page.get_by_label("reach without loads").uncheck()
-    tab.wait(lambda: not tab.drawn("/free"), "the free cloud is gone")
-    tab.page.get_by_label("reach without loads").check()
-    tab.wait(lambda: tab.drawn("/free"), "the free cloud is back")
-    tab.open("Parts")
 
     before = loads(tab)
     for text in ("-5", "1000000000"):
