@@ -159,12 +159,15 @@ class Tab:
     def press(self, button: str) -> None:
         self.page.get_by_role("button", name=button, exact=True).click()
 
-    def choose(self, label: str, option: str, of: int = 0) -> None:
-        """Pick an option of a menu; of several of this label, the first."""
-        menu = self.page.locator(
+    def field(self, label: str):
+        """What stands behind a label to be typed into, or opened."""
+        return self.page.locator(
             f"xpath=//label[normalize-space()='{label}']/following::input[1] >> visible=true"
         )
-        menu.nth(of).click()
+
+    def choose(self, label: str, option: str) -> None:
+        """Pick an option of a menu; of several of this label, the first."""
+        self.field(label).first.click()
         self.page.get_by_role("option", name=option, exact=True).click()
 
     def drawn(self, path: str):

@@ -258,6 +258,8 @@ def move_it(tab, folder) -> None:
         tab.settle()
     tab.choose("mouse", "drags the tip")
     tab.press("Remove the path")
+    tab.wait(lambda: tab.session.state.path is None, "the path is gone")
+    tab.settle()  # what stood below it moves up
     tab.press("Rest")
     tab.wait(lambda: not any(tab.session.state.activation), "the arm is at rest")
 
@@ -413,8 +415,7 @@ def save_it(tab, folder) -> None:
     state = tab.save("Save this work", folder)
     uploaded(tab, "Load state or design", state.read_bytes(), "work.json", folder)
     tab.settle()
-    data = tab.page.locator("xpath=//label[.='data']/following::input[1] >> visible=true")
-    data.click()
+    tab.field("data").click()
     kinds = tab.page.get_by_role("option").all_inner_texts()
     tab.page.keyboard.press("Escape")
     for kind in kinds:

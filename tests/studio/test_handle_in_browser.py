@@ -226,18 +226,3 @@ def test_the_cloud_is_whole_again_after_a_drag_that_ends_outside_of_the_window(f
     tab.wait(lambda: not tab.session.is_dragged, "the drag rests")
     tab.wait(lambda: len(tab.drawn("/cloud").points) > 1 << 13, "the cloud is whole")
     tab.wait(lambda: tab.session.state.target is not None, "the end of the drag is a target")
-
-
-@pytest.mark.large
-def test_a_click_on_the_cloud_sets_a_target_only_where_the_tab_says_so(inverse_tab):
-    tab = inverse_tab
-    start = (0.0, 0.0, 0.0)
-    pose(tab, start)
-    point = tab.session.reach.cloud.tip.values[100]
-    tab.click_at(point)
-    tab.page.wait_for_timeout(300)
-    assert tab.session.state.target is None
-    tab.choose("mouse", "sets the target")
-    tab.wait(lambda: not tab.drawn("/grip").visible, "the ball is out of the way")
-    tab.click_at(point)
-    tab.wait(lambda: tab.session.state.target is not None, "the click is taken")

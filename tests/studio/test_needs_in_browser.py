@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 
-def field(tab, label):
-    return tab.page.locator(
-        f"xpath=//label[normalize-space()='{label}']/following::input[1] >> visible=true"
-    )
-
-
 def test_needs_are_seen_met_and_missed_and_follow_a_slider(tab):
     tab.open("Goals")
     tab.press("Add to the needs")  # where the tip is
     tab.page.get_by_text("place 1: reached").wait_for()
-    field(tab, "numbers").fill("0.37, 0.15, 0.85")
+    tab.field("numbers").fill("0.37, 0.15, 0.85")
     tab.settle()
     tab.press("Add to the needs")
     tab.page.get_by_text("place 2: missed by 0.0082").wait_for()

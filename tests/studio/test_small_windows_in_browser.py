@@ -160,20 +160,6 @@ def see_all(tab):
 
 
 @pytest.mark.large
-def test_numbers_at_the_axes_of_a_phone_have_room(opened):
-    tab = opened("phone")
-    see_all(tab)
-    numbers = [one for one in labels(tab) if "L" not in one.text]
-    assert len(numbers) > 6
-    places = in_canvas(tab, [one.position for one in numbers])
-    edges = np.array([one.position for one in numbers])
-    for k in range(1, len(places)):
-        if (edges[k] == edges[k - 1]).sum() == 2:  # next to each other at one edge
-            beside, above = np.abs(places[k] - places[k - 1])
-            assert beside > 24 or above > 12
-
-
-@pytest.mark.large
 def test_figures_are_as_wide_as_the_sheet_of_a_phone(opened):
     tab = opened("phone")
     tab.open("Plots")

@@ -138,7 +138,7 @@ def test_an_arm_is_read_and_aimed_in_the_unit_of_its_design(tab):
     tab.page.get_by_text(f"volume {volume:.0f}").first.wait_for()
     assert " mL" in tab.page.get_by_text(f"volume {volume:.0f}").first.inner_text()
     tab.open("Move")
-    place = tab.page.locator("xpath=//label[normalize-space()='target [mm]']/following::input[1]")
+    place = tab.field("target [mm]")
     aim = np.round(1e3 * tip_positions(arm, [arm.bounds @ (0.4, 0.6)])[0], 2)
     place.fill(", ".join(map(str, aim)))
     place.press("Enter")
