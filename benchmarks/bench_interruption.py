@@ -35,7 +35,6 @@ COMMANDS = {
     "check": "check three_fibers.toml five_places.toml --accuracy 1e-3 --out check.png",
     "search": "search five_places.toml --out best",
     "atlas": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000",
-    "atlas, 2 workers": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000 --workers 2",
     "paper": "paper --out paper --quick",
     "demo": "demo --out demo",
     "warmup": "warmup",

@@ -488,14 +488,12 @@ CALLS: dict[str, Call] = {
     ),
     "atlas.build_atlas": Call(
         lambda: dict(space=family(), store={}, n=10, metrics=["extent"]),
-        fine={"executor": {"a function"}},
     ),
     "atlas.open_atlas": Call(lambda: dict(store=stored())),
     "atlas.over_length": Call(
         lambda: dict(atlas=built(), metric="z_max"), kinds=dict(atlas="dataset")
     ),
     "atlas.verify_atlas": Call(lambda: dict(store=stored())),
-    "atlas.worker_processes": Call(lambda: dict(count=1)),
 }
 """By the names of `tests.test_names`."""
 

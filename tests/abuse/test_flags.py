@@ -76,9 +76,6 @@ WRONG = [
     case("solve redundant_trunk --target 0,0,1 --family 1.5", f"family = 1.5: {WHOLE_NUMBER}"),
     case("solve redundant_trunk --target 0,0,1 --family 0", "family = 0: must be a whole number"),
     case("solve redundant_trunk --target 0,0,1 --family 1e9", "must be a whole number, from 1 to"),
-    case("atlas build a.zarr --vary taper_deg=0,1 --workers 0", "workers = 0: must be"),
-    case("atlas build a.zarr --vary taper_deg=0,1 --workers -2", "workers = -2: must be"),
-    case("atlas build a.zarr --vary taper_deg=0,1 --workers 1.5", f"workers = 1.5: {WHOLE_NUMBER}"),
     case("atlas figures a.zarr --panels 0", "panels = 0: must be a whole number, 1 or more"),
     case("atlas build a.zarr --vary taper_deg=0,1 --shard １/2", "shard = １/2: must be i/k"),
     case("atlas build a.zarr --vary taper_deg=0,1 --shard 2/2", "shard = 2/2: must be i/k"),
@@ -224,10 +221,6 @@ IGNORED = [
     case(
         "atlas build a.zarr --vary taper_deg=0,1 --metrics exact --alpha 0.1L",
         "alpha = 0.1L: must be left out without the metrics concave",
-    ),
-    case(
-        "atlas build a.zarr --vary taper_deg=0,1 --workers 2 --scheduler tcp://localhost:1",
-        "scheduler = tcp://localhost:1: must be left out with --workers",
     ),
     case(
         "atlas build a.zarr --vary taper_deg=0,1 --scheduler tcp://localhost:1 --scheduler-file a",

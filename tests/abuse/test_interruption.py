@@ -21,7 +21,6 @@ from benchmarks.bench_interruption import (
     ended_by,
     prepare,
     started,
-    survivors_of,
 )
 
 from softreach.support.files.atomic import replacing
@@ -71,30 +70,6 @@ def _run(folder: Path, body: str) -> subprocess.Popen[str]:
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     command = [sys.executable, str(script)]
     return subprocess.Popen(command, cwd=folder, start_new_session=True, **pipes)
-
-
-def test_workers_end_with_a_parent_that_is_killed(tmp_path):
-    process = _run(
-        tmp_path,
-        """
-        import os, signal, sys, time
-
-        if __name__ == "__main__":
-            from softreach.atlas import worker_processes
-
-            pool = worker_processes(2)()
-            tasks = [pool.submit(time.sleep, 600) for _ in range(2)]
-            while not all(task.running() for task in tasks):
-                time.sleep(0.01)
-            print(len(pool._processes), "workers", flush=True)
-            os.kill(os.getpid(), signal.SIGKILL)
-        """,
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "2 workers\n"
-    assert process.wait(600) == -signal.SIGKILL
-    assert survivors_of(process.pid) == 0
-    assert process.communicate() == ("", "")
 
 
 def test_what_a_kill_leaves_of_a_file_goes_with_the_next_file_in_that_folder(tmp_path):

@@ -14,7 +14,7 @@ SCRIPT = """
     from pathlib import Path
     import numpy as np
     from softreach import describe, designs
-    from softreach.atlas import DesignSpace, build_atlas, worker_processes
+    from softreach.atlas import DesignSpace, build_atlas
     from softreach.atlas import design_task
 
     def build(store, n=3_000, alpha_over_length=0.3, accuracy=0.2, **options):

@@ -6,11 +6,12 @@ import contextlib
 import os
 import signal
 import textwrap
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 
 import pytest
 
-from softreach.atlas import StoreFailed, atlas_status, build_atlas, open_atlas, worker_processes
+from softreach.atlas import StoreFailed, atlas_status, build_atlas, open_atlas
 from softreach.support.errors import InvalidInput
 from tests.atlas.families import SMALL, assert_same, small_space
 from tests.atlas.scripts import build16, ended, run_script
@@ -59,44 +60,50 @@ def deadly(body: str, always: bool = False) -> str:
     return f"ALWAYS = {always}\n" + textwrap.dedent(DEADLY) + textwrap.dedent(body)
 
 
-@pytest.mark.large
-def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
+def test_a_pool_that_loses_a_worker_ends_with_one_line_and_another_one_continues(whole, tmp_path):
     store = tmp_path / "a.zarr"
     body = """
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+        from softreach.support.errors import SoftreachError
         if __name__ == "__main__":
-            build(sys.argv[1], executor=worker_processes(2))
+            try:
+                with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+                    build(sys.argv[1], executor=pool)
+            except SoftreachError as error:
+                sys.exit(str(error))
     """
+    said = ended(run_script(tmp_path, deadly(body), str(store)))[1]
+    assert said.splitlines()[-1].startswith("a worker died and broke its executor; what is done is")
+    assert atlas_status(store).done < 16
     assert ended(run_script(tmp_path, deadly(body), str(store))) == (None, "")
-    assert (tmp_path / "task.died").exists()
     assert_same(open_atlas(store).load(), whole)
 
 
-def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_path):
+@pytest.mark.large
+def test_a_design_that_kills_every_worker_of_a_cluster_is_given_up_and_the_rest_goes_on(tmp_path):
+    pytest.importorskip("distributed")
     store = tmp_path / "a.zarr"
-    body = """
-        if __name__ == "__main__":
-            import warnings
-            warnings.simplefilter("ignore")
-            build(sys.argv[1], executor=worker_processes(1), metrics=("extent",))
-    """
-    assert ended(run_script(tmp_path, deadly(body, True), str(store))) == (None, "")
+    ended(run_script(tmp_path, deadly(ON_DASK, always=True), str(store)))
     status = atlas_status(store)
     assert (status.done, status.messages) == (15, {3: "its worker died repeatedly"})
+
+
+ON_DASK = """
+    if __name__ == "__main__":
+        from distributed import Client, LocalCluster
+        options = {"dashboard_address": ":0", "silence_logs": 50}
+        with LocalCluster(2, threads_per_worker=1, **options) as cluster:
+            with Client(cluster) as client:
+                build(sys.argv[1], executor=client)
+"""
 
 
 @pytest.mark.large
 def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     pytest.importorskip("distributed")
     store = tmp_path / "a.zarr"
-    body = """
-        if __name__ == "__main__":
-            from distributed import Client, LocalCluster
-            options = {"dashboard_address": ":0", "silence_logs": 50}
-            with LocalCluster(2, threads_per_worker=1, **options) as cluster:
-                with Client(cluster) as client:
-                    build(sys.argv[1], executor=client)
-    """
-    process = run_script(tmp_path, deadly(body), str(store))
+    process = run_script(tmp_path, deadly(ON_DASK), str(store))
     ended(process)
     assert process.returncode == 0
     assert (tmp_path / "task.died").exists()
@@ -145,25 +152,16 @@ def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
 def test_workers_refuse_a_store_in_the_memory_of_another_process():
     from zarr.storage import MemoryStore
 
-    with pytest.raises(StoreFailed, match="in the memory of another process"):
-        build_atlas(small_space(), MemoryStore(), executor=worker_processes(1), **SMALL)
+    with (
+        ProcessPoolExecutor(1, get_context("spawn")) as pool,
+        pytest.raises(StoreFailed, match="in the memory of another process"),
+    ):
+        build_atlas(small_space(), MemoryStore(), executor=pool, **SMALL)
 
 
 def test_what_is_no_executor_is_refused(tmp_path):
     with pytest.raises(InvalidInput, match=r"executor = 3: must be a concurrent\.futures executor"):
         build_atlas(small_space(), tmp_path / "a.zarr", executor=3, **SMALL)
-
-
-def test_worker_processes_start_when_called_and_not_before(monkeypatch):
-    started = []
-    monkeypatch.setattr(
-        "softreach.atlas.processes.LocalProcesses", lambda count: started.append(count)
-    )
-    start = worker_processes(3)
-    assert started == []
-    start()
-    start()
-    assert started == [3, 3]
 
 
 def test_progress_counts_every_design_once(tmp_path):

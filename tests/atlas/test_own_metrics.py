@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pickle
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from importlib import import_module
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -20,7 +21,6 @@ from softreach.atlas import (
     atlas_status,
     best_designs,
     build_atlas,
-    worker_processes,
 )
 from softreach.atlas.metrics import chosen_metrics
 from softreach.atlas.store import AtlasStore
@@ -226,29 +226,26 @@ def test_workers_can_get_the_functions_of_all_metrics():
 
 def test_lambdas_are_refused_in_one_line_where_workers_compute_them(tmp_path):
     typed = replace(MEAN_HEIGHT, compute=lambda tips: 0.0)
-    options = SMALL | {"metrics": [typed], "executor": worker_processes(1)}
-    with pytest.raises(InvalidInput, match=r"compute of metric mean_height = .*lambda") as caught:
-        build_atlas(small_space(), tmp_path / "a.zarr", **options)
+    options = SMALL | {"metrics": [typed]}
+    with (
+        ProcessPoolExecutor(1) as pool,
+        pytest.raises(InvalidInput, match=r"compute of metric mean_height = .*lambda") as caught,
+    ):
+        build_atlas(small_space(), tmp_path / "a.zarr", executor=pool, **options)
     assert "\n" not in str(caught.value)
     with ThreadPoolExecutor(1) as threads:
-        atlas = build_atlas(small_space(), tmp_path / "a.zarr", **options | {"executor": threads})
+        atlas = build_atlas(small_space(), tmp_path / "a.zarr", executor=threads, **options)
     assert (atlas.mean_height == 0).all()
 
 
-def test_worker_processes_read_actuators_of_ones_own(tmp_path):
-    """The module of the class travels with the task."""
+def test_worker_processes_know_actuators_and_metrics_of_ones_own(tmp_path):
+    """The modules of the classes and functions are imported where the task arrives."""
     trunk = sr.designs.minimal_trunk()
     cable = Cable(place=(0.03, 0.0), name="cable", activation_bounds=(0.0, 1e-4))
     base = trunk.replace(actuators=(*trunk.actuators[:2], cable))
     space = sr.DesignSpace.grid(base, **{"cable.place[0]": [0.01, 0.03]})
-    pool = worker_processes(1)
-    atlas = build_atlas(space, tmp_path / "a.zarr", 50, metrics=["extent"], executor=pool)
-    assert atlas_status(atlas).done == 2
-
-
-def test_worker_processes_compute_metrics_of_ones_own(tmp_path):
-    options = SMALL | {"metrics": ("convex", MEAN_HEIGHT)}
-    alone = build_atlas(small_space(), tmp_path / "a.zarr", **options).load()
-    pool = worker_processes(1)
-    found = build_atlas(small_space(), tmp_path / "b.zarr", executor=pool, **options).load()
+    options = {"n": 50, "metrics": ("extent", MEAN_HEIGHT)}
+    alone = build_atlas(space, tmp_path / "a.zarr", **options).load()
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        found = build_atlas(space, tmp_path / "b.zarr", executor=pool, **options).load()
     assert_same(found, alone)

@@ -3,7 +3,6 @@
 from softreach.atlas.build import build_atlas
 from softreach.atlas.metric import Metric, MetricFailed, Need
 from softreach.atlas.metrics import METRIC_GROUPS
-from softreach.atlas.processes import worker_processes
 from softreach.atlas.questions import (
     AtlasStatus,
     atlas_cloud,
@@ -33,5 +32,4 @@ __all__ = [
     "open_atlas",
     "over_length",
     "verify_atlas",
-    "worker_processes",
 ]

@@ -85,9 +85,8 @@ def build_atlas(
         tol: Largest tip error, in L.
         keep_clouds: Whether to store the tips, 6.2 bytes each.
         executor: None for all cores of this process, with at most two clouds and one triangulation
-            per thread in memory; a `concurrent.futures` executor; a function that makes one, which
-            is called again if a worker dies; or a Dask client. Workers write to the store, which
-            they must see at the same place, and use one thread each unless
+            per thread in memory; a `concurrent.futures` executor; or a Dask client. Workers write
+            to the store, which they must see at the same place, and use one thread each unless
             ``SOFTREACH_NUM_THREADS`` says otherwise.
         shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
             store without knowing of each other.
@@ -104,6 +103,8 @@ def build_atlas(
             began; the message says what differs.
         DamagedStore: The root of the store is damaged, so that nobody knows what it holds.
         StoreFailed: The store cannot be written, for instance because the disk is full.
+        SoftreachError: A worker died and broke its executor; the same call with a new one
+            continues.
 
     Warns:
         SoftreachWarning: There are gaps, failed or damaged designs, or designs whose points are too

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Self
+from typing import Any
 
 from softreach.support.errors import InvalidInput
 
@@ -23,7 +23,6 @@ __all__ = [
     "ACTUATORS",
     "METRICS",
     "PROFILES",
-    "Imports",
     "declared",
     "import_module",
     "imported",
@@ -41,14 +40,13 @@ _A_MODULE = "a module that Python finds, or the path of a .py file"
 _PACKAGE = str(Path(__file__).parents[1])
 
 _imported: dict[str, ModuleType] = {}
-"""Modules by what a worker on this machine imports them by, in their order."""
+"""Modules that `import_module` has imported by their name, in their order."""
 
 
 def import_module(name: str) -> ModuleType:
     """Import a module of the user, by its name or from its file.
 
-    A file is known by its name without .py, so that worker processes and stores can name what is in
-    it.
+    A file is known by its name without .py, so that stores can name what is in it.
 
     Raises:
         InvalidInput: There is no such module, it fails, or another one has its name.
@@ -65,7 +63,7 @@ def import_module(name: str) -> ModuleType:
         raise InvalidInput(
             "import", name, "a module that can be imported", _cause(error)
         ) from error
-    _imported[str(Path(name).resolve()) if is_file else name] = module
+    _imported[module.__name__] = module
     return module
 
 
@@ -110,39 +108,6 @@ def loaded(entry: EntryPoint) -> Any:
         raise InvalidInput(
             name, entry.value, "a module that can be imported", _cause(error)
         ) from error
-
-
-class Imports:
-    """Modules that are imported again wherever this is unpickled: in worker processes."""
-
-    def __init__(self, names: Iterable[str]) -> None:
-        self._names, self.fault = tuple(names), ""
-
-    @classmethod
-    def needed_by(cls, parts: Iterable[object]) -> Self:
-        """Those that the user named, and the modules of the classes of these parts."""
-        modules = dict.fromkeys(type(part).__module__ for part in parts)
-        others = {"__main__", *(module.__name__ for module in imported())}
-        own = (each for each in modules if each in sys.modules and not _is_ours(each))
-        return cls([*_imported, *(each for each in own if each not in others)])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, self._names
-
-
-def _restored(*names: str) -> Imports:
-    """The imports of another process, made again here; what fails is kept for who asks."""
-    imports = Imports(names)
-    for name in names:
-        try:
-            import_module(name)
-        except InvalidInput as error:
-            imports.fault = str(error)
-    return imports
-
-
-def _is_ours(module: str) -> bool:
-    return module.partition(".")[0] == "softreach"
 
 
 def _from_file(name: str) -> ModuleType:
