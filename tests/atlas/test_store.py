@@ -110,7 +110,7 @@ def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun,
         AtlasStore.begin(slow, command(gapped_space(), **TINY))
         store = AtlasStore.open(place)
         assert store.status().tolist() == [0, 1, 3, 2]
-        assert store.messages()[3] == "no luck"
+        assert store.message(3) == "no luck"
         assert begun.files.items() <= stored_files(place).items()
 
 

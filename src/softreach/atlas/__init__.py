@@ -13,7 +13,7 @@ from softreach.atlas.questions import (
 )
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
-from softreach.support.files.damage import DamagedStore, StoreFailed
+from softreach.support.files.stores import DamagedStore, StoreFailed
 
 __all__ = [
     "METRIC_GROUPS",

@@ -17,7 +17,7 @@ from softreach.atlas.store import UNSTABLE, AtlasStore, Result
 from softreach.rod.tip_map import no_equilibrium_message
 from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, no_warnings
-from softreach.support.files.damage import StoreFailed
+from softreach.support.files.stores import StoreFailed
 
 Values = dict[str, Array]
 Outcome = tuple[int, str]

@@ -23,19 +23,17 @@ from softreach.support.arguments import as_dataset, as_flag, as_function, as_pat
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.files.atomic import replacing
-from softreach.support.files.damage import Watch, raised_at_the_end, storage_errors
-from softreach.support.files.documents import ARRAYS
 from softreach.support.files.kinds import FileKind, Formats
 from softreach.support.files.stores import (
+    ARRAYS,
+    DIGEST,
     READING,
-    REMEDY,
-    absence,
+    ROOT,
     attributes_of,
-    check_arrays,
-    checked_place,
     foreign_entry,
-    list_arrays,
-    opened_root,
+    opened_store,
+    seal,
+    storage_errors,
 )
 from softreach.support.memory import check_room
 from softreach.support.progress import Progress, bar
@@ -154,16 +152,20 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     import xarray as xr
 
     location = as_path("path", path)
-    opened = opened_root(location, "cloud")
+    opened = opened_store(location, "cloud")
     if opened is None or "command" in opened.group.attrs:
-        hint = absence(location) if opened is None else "this is an atlas"
+        hint = f"it does not exist, or has no {ROOT}" if opened is None else "this is an atlas"
         raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
     opened.watch.required = lambda _: True
     with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
-        check_arrays(opened)
-        with raised_at_the_end(opened.watch), xr.open_zarr(opened.place, **READING) as stored:
-            cloud = stored.load()
-        cloud.attrs.pop(ARRAYS, None)
+        try:
+            opened.check_arrays()
+            with opened.watch.raising(), xr.open_zarr(opened.place, **READING) as stored:
+                cloud = stored.load()
+        finally:
+            opened.check_root()
+        for name in (ARRAYS, DIGEST):
+            del cloud.attrs[name]
         return schema.check_stored_cloud(cloud)
 
 
@@ -243,17 +245,15 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
     chunk = min(cloud.sizes["sample"], _CHUNK)
     for name in ("tip", "activation"):
         encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
-    watch = Watch(location=path, remedy=REMEDY["cloud"])
-    place = checked_place(path, watch, mode="r+")
     cloud.to_zarr(
-        place,
+        path,
         mode="w",
         zarr_format=3,
         consolidated=False,
         encoding=encoding,
         write_empty_chunks=True,
     )
-    list_arrays(place, watch)
+    seal(path)
 
 
 def _few_chunks_at_a_time() -> AbstractContextManager[object]:
