@@ -28,7 +28,6 @@ from softreach.atlas.store import AtlasStore
 from softreach.support import parallel
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.files.interruption import undoing
 
 __all__ = ["ExecutorLike", "an_executor", "run_designs"]
 
@@ -91,7 +90,7 @@ def run_designs(
         parallel.run(chain([lambda: None], tasks))
         return
     pool = _Pool(executor)
-    with undoing(pool.abandon), pool:
+    with pool:
         pool.check_metrics(store.command.metrics)
         for index in _run_in_pool(pool, Remote(store), deque(indices), on_outcome):
             on_outcome(_given_up(store, index))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from softreach.support.arguments import as_integer
-from softreach.support.files.interruption import PATIENCE, as_a_whole, live_with_parent
 
 __all__ = ["WORKERS", "LocalProcesses", "Workers", "worker_processes"]
 
@@ -38,6 +39,7 @@ def worker_processes(count: int) -> Workers:
     return lambda: LocalProcesses(count)
 
 
+_PATIENCE = 1.0  # [s] for workers to end
 _QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
 
 
@@ -53,12 +55,12 @@ class LocalProcesses(ProcessPoolExecutor):
         context = multiprocessing.get_context("spawn")  # threads and forks do not mix
         _start_quiet_tracker()
         other_end, self._lifeline = context.Pipe(duplex=False)
-        first: Any = {"initializer": live_with_parent, "initargs": (other_end,)}
+        first: Any = {"initializer": _live_with_parent, "initargs": (other_end,)}
         super().__init__(count, mp_context=context, **first)
 
     def submit(self, *call: Any, **options: Any) -> Future[Any]:
         """Hand a call to a worker."""
-        with as_a_whole(), _no_interrupts():  # a worker may start now
+        with _no_interrupts():  # a worker may start now
             return super().submit(*call, **options)
 
     def abandon(self) -> None:
@@ -66,7 +68,7 @@ class LocalProcesses(ProcessPoolExecutor):
         processes = list((self._processes or {}).values())
         self._lifeline.close()
         for process in processes:
-            if not wait([process.sentinel], PATIENCE):
+            if not wait([process.sentinel], _PATIENCE):
                 process.kill()
 
 
@@ -94,3 +96,18 @@ def _no_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _live_with_parent(lifeline: Connection) -> None:
+    """Leave Ctrl-C to the parent and end when it has ended."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    threading.Thread(target=_outlive, args=(lifeline,), daemon=True, name="lifeline").start()
+
+
+def _outlive(lifeline: Connection) -> None:
+    try:
+        lifeline.recv_bytes()
+    except (EOFError, OSError):
+        os._exit(1)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.files.interruption import as_a_whole
 
 DOCUMENT = "zarr.json"
 """The file that describes an array, or a store."""
@@ -132,13 +131,10 @@ def raised_at_the_end(watch: Watch) -> Iterator[None]:
 
 @contextmanager
 def writing(location: object) -> Iterator[None]:
-    """Turn errors of the disk or the network into one line that says what to do.
-
-    A process that a signal ends waits for what is being written.
-    """
+    """Turn errors of the disk or the network into one line that says what to do."""
     failed = f"{location} cannot be written"
     then = "; what is done is safe, and the same command continues once that is fixed"
-    with as_a_whole(), storage_errors(failed, then):
+    with storage_errors(failed, then):
         yield
 
 

@@ -21,7 +21,7 @@ import google_crc32c
 from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
 
 from softreach.support.errors import InvalidInput
-from softreach.support.files.atomic import sync_file_in
+from softreach.support.files.atomic import sync
 from softreach.support.files.damage import (
     DOCUMENT,
     MISPLACED,
@@ -41,7 +41,6 @@ from softreach.support.files.documents import (
     sealed,
     unsealed,
 )
-from softreach.support.files.kinds import first_entry
 
 if TYPE_CHECKING:
     import zarr
@@ -232,7 +231,7 @@ def foreign_entry(path: Path) -> str:
     try:
         arrays = unsealed((path / DOCUMENT).read_bytes())["attributes"].get(ARRAYS)
     except FileNotFoundError:
-        return first_entry(path)
+        return min((entry.name for entry in path.iterdir()), default="")
     except (OSError, Broken):
         return DOCUMENT
     known = {"", *(arrays if isinstance(arrays, dict) else ())}
@@ -366,7 +365,16 @@ class CheckedStore(WrapperStore[Any]):
 
     async def _sync(self, key: str) -> None:
         if self.durable and isinstance(self._store, LocalStore):
-            await asyncio.to_thread(sync_file_in, self._store.root / key, self._store.root)
+            await asyncio.to_thread(_sync_in, self._store.root / key, self._store.root)
+
+
+def _sync_in(path: Path, root: Path) -> None:
+    """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
+    sync(path)
+    for folder in path.parents:
+        sync(folder)
+        if folder == root:
+            return
 
 
 def _store(location: Any, mode: Mode) -> Store:
