@@ -22,7 +22,6 @@ from softreach.rod.tip_map import check_tol
 from softreach.sampling import check_sampler
 from softreach.support.arguments import POSITIVE, as_flag, as_function, as_instance, as_number
 from softreach.support.errors import counted, warn
-from softreach.support.files.interruption import remarking
 from softreach.support.memory import check_disk, check_memory
 from softreach.support.progress import Progress, bar
 from softreach.workspace.reach import ACCURACIES
@@ -141,7 +140,7 @@ def build_atlas(
     if content.damage:
         warn(f"{content.damage}; what is damaged is computed again")
     ended = np.isin(content.status[indices], (DONE, GAP, UNSTABLE))
-    _run(atlas, indices[~ended], executor, progress, int(ended.sum()))
+    _run(atlas, indices[~ended], executor, progress)
     built = open_atlas(store)
     _warn_of_unstable(built)
     _warn_of_sparse(built)
@@ -174,24 +173,18 @@ def _run(
     indices: np.ndarray,
     executor: ExecutorLike,
     progress: Progress | None,
-    done: int,
 ) -> None:
-    """Compute designs of an atlas, of which some others are done."""
+    """Compute designs of an atlas."""
     failures: dict[int, str] = {}
-    lock, total = Lock(), done + len(indices)
+    lock = Lock()
 
-    def remark() -> str:
-        return f"{done} of {total} designs are done, and the same command continues"
-
-    with remarking(remark), bar("computing designs", len(indices)) as shown:
+    with bar("computing designs", len(indices)) as shown:
 
         def on_outcome(outcome: tuple[int, str]) -> None:
-            nonlocal done
             index, failure = outcome
             with lock:
                 if failure:
                     failures[index] = failure
-                done += not failure
                 (progress or shown)(1)
 
         run_designs(atlas, indices.tolist(), executor, on_outcome)

@@ -24,6 +24,7 @@ from softreach.atlas.store import AtlasStore
 from softreach.support import parallel
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.interruption import check_stopped
 
 __all__ = ["ExecutorLike", "an_executor", "run_designs"]
 
@@ -112,6 +113,7 @@ def _run_in_pool(
     pending: dict[Future[Outcome], int] = {}
     try:
         while True:
+            check_stopped()
             for index in islice(waiting, _AHEAD - len(pending)):
                 pending[pool.submit(run_remotely, remote, index)] = index
             if not pending:

@@ -14,7 +14,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
@@ -23,8 +23,7 @@ import google_crc32c
 from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
 
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.files.atomic import sync_file_in
-from softreach.support.files.interruption import as_a_whole
+from softreach.support.files.atomic import place_to_read, sync
 
 if TYPE_CHECKING:
     import zarr
@@ -54,6 +53,7 @@ _REMEDY = {
 }
 _ALLOWED = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
 _KEY = re.compile(r"([^/]+)/c((?:/\d+)*)", re.ASCII)
+_PARTIAL = re.compile(r"\.[0-9a-f]{32}\.partial$")  # what a killed writer of Zarr leaves
 _CHECKSUM = 4  # bytes at the end of every chunk, by the crc32c codec
 
 
@@ -279,7 +279,7 @@ class CheckedStore(WrapperStore[Any]):
             raise StoreFailed(f"{key} of {self.watch.location} was written by another Zarr release")
         await super().set(key, value)
         if self.durable and isinstance(self._store, LocalStore):
-            await asyncio.to_thread(sync_file_in, self._store.root / key, self._store.root)
+            await asyncio.to_thread(_sync_in, self._store.root / key, self._store.root)
 
     def _chunk(self, key: str) -> Chunk | None:
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
@@ -307,6 +307,15 @@ class CheckedStore(WrapperStore[Any]):
         if array not in self.watch.digests:
             return "not listed in the root"
         return "" if sha256(text) == self.watch.digests[array] else "changed since it was written"
+
+
+def _sync_in(path: Path, root: Path) -> None:
+    """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
+    sync(path)
+    for folder in path.parents:
+        sync(folder)
+        if folder == root:
+            return
 
 
 def sha256(text: bytes) -> str:
@@ -360,7 +369,7 @@ def attributes_of(path: str | os.PathLike[str]) -> Mapping[str, Any]:
         InvalidInput: No store of softreach.
     """
     try:
-        return unsealed((Path(path) / ROOT).read_bytes())
+        return unsealed(Path(place_to_read(path), ROOT).read_bytes())
     except (OSError, ValueError) as error:
         raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], str(error)) from None
 
@@ -377,21 +386,15 @@ def foreign_entry(folder: Path) -> str:
             key = Path(parent, name).relative_to(folder).as_posix()
             # A folder is one of an array, or holds its chunks.
             chunk = Chunk.of_key(key if name in files or "/" in key else f"{key}/c")
-            if chunk is None or chunk.array not in own:
+            if (chunk is None or chunk.array not in own) and not _PARTIAL.search(name):
                 return key
     return ""
 
 
-@contextmanager
-def writing(location: object) -> Iterator[None]:
-    """Turn errors of the disk or the network into one line that says what to do.
-
-    A process that a signal ends waits for what is being written.
-    """
-    failed = f"{location} cannot be written"
+def writing(location: object) -> AbstractContextManager[None]:
+    """Raise any error of writing as `StoreFailed`, with what to do."""
     then = "; what is done is safe, and the same command continues once that is fixed"
-    with as_a_whole(), storage_errors(failed, then):
-        yield
+    return storage_errors(f"{location} cannot be written", then)
 
 
 @contextmanager
