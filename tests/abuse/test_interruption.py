@@ -22,9 +22,9 @@ from benchmarks.bench_interruption import (
     prepare,
     started,
 )
+from softreach.support.files.kinds import PICTURES
 
 from softreach.support.files.atomic import replacing
-from softreach.support.files.kinds import PICTURES
 
 pytestmark = [
     pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc"),

@@ -50,3 +50,9 @@ def ended(process: subprocess.Popen) -> tuple[None, str]:
         return process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
+
+
+def stored_files(place: Path) -> dict[str, bytes]:
+    """What a store holds, without what killed writers left."""
+    files = (file for file in place.rglob("*") if file.is_file() and file.suffix != ".partial")
+    return {str(file.relative_to(place)): file.read_bytes() for file in files}
