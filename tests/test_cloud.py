@@ -55,7 +55,7 @@ def test_a_cloud_knows_where_it_comes_from(cloud, trunk):
 def test_a_cloud_is_replaced_only_if_one_says_so(cloud, tmp_path):
     path, other = tmp_path / "a.zarr", sr.compute_cloud(designs.lce_arm(), 50)
     sr.save_cloud(cloud, path)
-    with pytest.raises(InvalidInput, match="something is there; .* or pass --overwrite"):
+    with pytest.raises(InvalidInput, match="something is there; choose another name"):
         sr.save_cloud(other, path)
     assert sr.open_cloud(path).identical(cloud)
     sr.save_cloud(other, path, overwrite=True)
@@ -132,7 +132,7 @@ sr.save_cloud(sr.compute_cloud(arm, 100), store)  # what is loaded once
 tracemalloc.start()
 cloud = sr.compute_cloud(arm, 3_000_000)
 print(cloud.nbytes, tracemalloc.get_traced_memory()[1])
-sr.save_cloud(cloud, store)
+sr.save_cloud(cloud, store, overwrite=True)
 print(cloud.nbytes, tracemalloc.get_traced_memory()[1])
 size = cloud.nbytes
 del cloud

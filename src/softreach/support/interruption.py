@@ -36,30 +36,29 @@ def run_stoppable(run: Callable[[], int]) -> int:
     """
     numbers = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")]
     heeded = [n for n in numbers if n is not None and signal.getsignal(n) is not signal.SIG_IGN]
+    code = -1
     try:
         for number in heeded:
             signal.signal(number, _stop)
         sys.unraisablehook = _unraisable
         code = run()
-    except KeyboardInterrupt:
-        _ignore(heeded)
-        with suppress(OSError):  # nobody reads them, or the terminal is gone
-            sys.stdout.flush()
-        with suppress(OSError):
-            os.write(2, f"{INTERRUPTED}\n".encode())
-        os._exit(128 + (_came or [signal.SIGINT])[0])  # else asyncio prints what Zarr had begun
-    _ignore(heeded)  # a command that is done has the exit code of its work
-    return code
+    except BaseException:  # if the terminal is gone, it may be an error of writing there
+        if not _came:
+            raise
+    for number in heeded:  # a command that is done has the exit code of its work
+        signal.signal(number, signal.SIG_IGN)
+    if not _came or code == 0:
+        return code
+    with suppress(OSError):
+        sys.stdout.flush()
+    with suppress(OSError):
+        os.write(2, f"{INTERRUPTED}\n".encode())
+    os._exit(128 + _came[0])  # else asyncio prints what Zarr had begun
 
 
 def _stop(number: int, _: object) -> None:
     _came.append(number)
     raise KeyboardInterrupt
-
-
-def _ignore(numbers: list[signal.Signals]) -> None:
-    for number in numbers:
-        signal.signal(number, signal.SIG_IGN)
 
 
 def _unraisable(lost: Any) -> None:
