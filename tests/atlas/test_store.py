@@ -101,7 +101,7 @@ def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun,
     def overtakes():
         other = AtlasStore.begin(place, command(gapped_space(), **TINY))
         other.write(1, result)
-        other.write_failure(3, "no luck")
+        other.write_status(3, "no luck")
 
     for write in range(0, begun.writes, 2):
         place = tmp_path / f"{write}.zarr"

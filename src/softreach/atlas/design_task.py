@@ -57,7 +57,11 @@ class Remote:
     """
 
     def __init__(self, store: AtlasStore) -> None:
-        self.command, self._location, self._durable = store.command, store.location, store.durable
+        self.command, self._location, self._durable = (
+            store.command,
+            store.location,
+            store.opened.durable,
+        )
         self._store: AtlasStore | None = store
         self._token, self._origin = secrets.token_hex(8), (socket.gethostname(), os.getpid())
 
@@ -135,5 +139,5 @@ def _kept_tips(store: AtlasStore, intermediates: Intermediates) -> Array | None:
 
 def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:
     message = f"{type(error).__name__}: {error}"
-    store.write_failure(index, message)
+    store.write_status(index, message)
     return index, message

@@ -137,5 +137,5 @@ def _outcome(future: Future[Outcome], store: AtlasStore, index: int) -> Outcome:
         if type(error).__name__ != "KilledWorker":
             raise
         message = "its worker died repeatedly"  # Dask has tried it again by then
-        store.write_failure(index, message)
+        store.write_status(index, message)
         return index, message

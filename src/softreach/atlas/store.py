@@ -28,6 +28,7 @@ from softreach.atlas.layout import CUBE, MISSING, PER_DESIGN, Plan, array_plans
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.files.atomic import sync
 from softreach.support.files.stores import (
     ARRAYS,
     BLANK,
@@ -48,7 +49,7 @@ from softreach.support.files.stores import (
 )
 
 if TYPE_CHECKING:
-    import zarr
+    from zarr import Group
     from zarr.storage import StoreLike, StorePath
 
 
@@ -102,7 +103,7 @@ class AtlasStore:
             except DamagedStore:
                 opened = None
             if opened is None:
-                _write_root(location, command)
+                _write_root(location, command, durable)
                 opened = opened_store(location, "atlas", "r+", durable=durable)
         text = None if opened is None else opened.group.attrs.get("command")
         if opened is None or not isinstance(text, str):
@@ -143,19 +144,9 @@ class AtlasStore:
         return cls(location, Command.from_json(text), opened)
 
     @property
-    def group(self) -> zarr.Group:
-        """The arrays."""
-        return self.opened.group
-
-    @property
     def watch(self) -> Watch:
         """Watch over damage that is found."""
         return self.opened.watch
-
-    @property
-    def durable(self) -> bool:
-        """True if a power cut may lose nothing that was written."""
-        return self.opened.durable
 
     def array(self, name: str) -> Any:
         """One of the arrays, which writes also chunks that are empty.
@@ -166,7 +157,7 @@ class AtlasStore:
         if name not in self._arrays:
             # No message is no chunk; all else is written, so that what is missing is damaged.
             config: Any = {"write_empty_chunks": name != "message"}
-            array: Any = self.group[name]
+            array: Any = self.opened.group[name]
             self._arrays[name] = array.with_config(config)
         return self._arrays[name]
 
@@ -218,20 +209,16 @@ class AtlasStore:
                 tip[place] = fixed_point(result.tips, float(str(tip.attrs["scale_factor"])))
             self.write_status(index, message, status)
 
-    def write_failure(self, index: int, message: str, status: int = FAILED) -> None:
-        """Store why a design has no numbers.
+    def write_status(self, index: int, message: str, status: int = FAILED) -> None:
+        """Store how a design ended, and why.
 
         Raises:
             StoreFailed: It cannot be written.
         """
-        with writing(self.location):
-            self.write_status(index, message, status)
-
-    def write_status(self, index: int, message: str, status: int) -> None:
-        """Store how a design ended, and why."""
         place = self.command.space.place(index)
-        self.array("message")[place] = np.array(message, dtype=np.dtypes.StringDType())
-        self.array("status")[place] = status
+        with writing(self.location):
+            self.array("message")[place] = np.array(message, dtype=np.dtypes.StringDType())
+            self.array("status")[place] = status
 
 
 def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
@@ -244,14 +231,14 @@ def _is_shared(chunk: Chunk) -> bool:
     return chunk.array not in PER_DESIGN
 
 
-def _write_root(location: StoreLike, command: Command) -> None:
+def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
     """Write the root of a store, whole: of several who begin at once, the first succeeds.
 
     Raises:
         InvalidInput: The place holds something else.
     """
     import zarr
-    from zarr.storage import WrapperStore
+    from zarr.storage import LocalStore, WrapperStore
 
     place = place_of(location, "r+")
     lost = _holds_arrays_of(command, place)
@@ -274,6 +261,8 @@ def _write_root(location: StoreLike, command: Command) -> None:
 
     attributes = _attributes(command)
     zarr.create_group(Root(place.store), path=place.path, zarr_format=3, attributes=attributes)
+    if durable and isinstance(place.store, LocalStore):
+        sync(place.store.root / place.path / ROOT)
 
 
 def _holds_arrays_of(command: Command, place: StorePath) -> bool:
@@ -319,13 +308,13 @@ def _complete(store: AtlasStore) -> None:
 
     for plan in array_plans(store.command):
         with store.watch.noting() as noted:
-            there = plan.name in store.group
+            there = plan.name in store.opened.group
             if there and plan.name not in PER_DESIGN:
                 _ = store.array(plan.name)[...]
         if there and not noted:
             continue
         with suppress(ContainsArrayError):  # begun by another task, or only its values are lost
-            _described(store.group, plan, store.command)
+            _described(store.opened.group, plan, store.command)
         data = _drawn(store) if plan.name == CUBE else plan.data
         if data is not None:
             store.array(plan.name)[...] = data
@@ -336,7 +325,7 @@ def _complete(store: AtlasStore) -> None:
             store.write_status(index, reason, GAP)
 
 
-def _described(group: zarr.Group, plan: Plan, command: Command) -> None:
+def _described(group: Group, plan: Plan, command: Command) -> None:
     """Create an array without values."""
     group.create_array(
         plan.name,
@@ -352,7 +341,7 @@ def _described(group: zarr.Group, plan: Plan, command: Command) -> None:
 
 def _drawn(store: AtlasStore) -> Array:
     cube = drawn_cube(store.command)
-    if digest(cube) != store.group.attrs[CUBE_DIGEST]:
+    if digest(cube) != store.opened.group.attrs[CUBE_DIGEST]:
         raise StoreFailed(
             f"{store.location}: this machine draws other activations than the one that began it"
         )

@@ -143,7 +143,7 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     Raises:
         InvalidInput: There is no such store, or it holds something else.
         DamagedStore: It is not what was written; which array and chunk, and what to do.
-        StoreFailed: It cannot be read.
+        StoreFailed: It cannot be read, or was replaced meanwhile.
     """
     import xarray as xr
 
