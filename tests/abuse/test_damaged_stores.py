@@ -169,6 +169,18 @@ def test_nothing_is_written_to_an_atlas_whose_root_is_lost_by_another_command(
         assert files_in(place) == before
 
 
+def test_what_lies_beside_the_arrays_of_a_store_is_not_read(
+    cloud, cloud_files, atlas_files, tmp_path
+):
+    beside = {f"zarr.{32 * 'a'}.partial": b"", "mine/zarr.json": b"{}", "thesis.tex": b"precious"}
+    place = written(cloud_files | beside, tmp_path / "cloud.zarr")
+    assert sr.open_cloud(place).identical(cloud)
+    place = written(atlas_files | beside, tmp_path / "atlas.zarr")
+    assert open_atlas(place).identical(open_atlas(written(atlas_files, tmp_path / "own.zarr")))
+    built(place)
+    assert only_files(place) == atlas_files | beside
+
+
 def test_chunks_that_are_all_nan_exist(cloud, tmp_path):
     """So that one that is missing is damage, and no answer."""
     none = cloud.copy()
