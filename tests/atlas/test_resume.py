@@ -40,7 +40,7 @@ def test_kills_leave_the_same_bits_as_no_kill(kills, whole, tmp_path):
     store, drawn = tmp_path / "killed.zarr", np.random.default_rng(kills)
     for operation in drawn.integers(1, 7 if kills > 2 else 45, kills):
         process = run_script(tmp_path, body, str(store), str(operation))
-        assert ended(process) == (None, "")
+        ended(process)
         assert process.returncode == -signal.SIGKILL
     assert_same(build16(store).load(), whole)
     found, right = (stored_files(tmp_path / f"{name}.zarr") for name in ("killed", "whole"))
