@@ -35,7 +35,7 @@ STORED = 6.2
 """Size of a stored tip [bytes]."""
 
 _ON_DISK = 4096  # bytes that the smallest file takes
-_FILES = 5  # of a design without tips: status, message, checksum, metrics, curvature
+_FILES = 4  # of a design without tips: status, message, metrics, curvature
 _SAMPLE_MEMORY = 700  # bytes of memory of a sample and its share of the triangulation
 
 
@@ -100,7 +100,7 @@ def build_atlas(
     Raises:
         InvalidInput: An argument out of range, no valid design, or a store that another command
             began; the message says what differs.
-        DamagedStore: The root of the store is damaged, so that nobody knows what it holds.
+        DamagedStore: The root of the store is damaged, and another command began it.
         StoreFailed: The store cannot be written, for instance because the disk is full.
         SoftreachError: A worker died and broke its executor; the same call with a new one
             continues.
