@@ -317,37 +317,6 @@ def test_a_cloud_and_an_atlas_are_not_taken_for_each_other(cloud_files, atlas_fi
     assert "an atlas written by build_atlas" in str(raised_by(lambda: open_atlas(cloud)))
 
 
-OWN = ["thesis.tex", "tip/notes.txt", "tip/c/notes.txt", "mine/zarr.json", "mine/c/0/0", "mine/"]
-
-
-@pytest.mark.parametrize("thing", OWN)
-@pytest.mark.parametrize("kind", ["cloud", "atlas"])
-def test_a_store_with_a_thing_of_ones_own_is_never_replaced(
-    cloud, cloud_files, atlas_files, tmp_path, kind, thing
-):
-    place = written(cloud_files if kind == "cloud" else atlas_files, tmp_path / "a.zarr")
-    (place / thing).parent.mkdir(parents=True, exist_ok=True)
-    (place / thing).mkdir() if thing.endswith("/") else (place / thing).write_text("precious")
-    before = files_in(place)
-    error = raised_by(lambda: sr.save_cloud(cloud, place, overwrite=True))
-    named = thing if thing.startswith("tip") else thing.split("/")[0]
-    assert f"; {named} is not as softreach wrote it: move it away, or choose" in str(error)
-    assert files_in(place) == before
-
-
-def test_a_folder_with_a_root_of_another_program_is_never_replaced(cloud, cloud_files, tmp_path):
-    """Nor one with a damaged root: nobody knows what is in it."""
-    bare = cloud.drop_vars(["axis", "bundle"])
-    bare.to_zarr(tmp_path / "own.zarr", zarr_format=3, consolidated=False)
-    written(cloud_files, tmp_path / "damaged.zarr", "zarr.json", cloud_files["zarr.json"][:-9])
-    written({"thesis.tex": b"precious", "zarr.json": b"{}"}, tmp_path / "thesis.zarr")
-    before = files_in(tmp_path)
-    for place in sorted(tmp_path.iterdir()):
-        error = raised_by(lambda place=place: sr.save_cloud(cloud, place, overwrite=True))
-        assert "; zarr.json is not as softreach wrote it: move it away" in str(error)
-    assert files_in(tmp_path) == before
-
-
 def test_an_atlas_gives_way_to_a_cloud_only_if_one_says_so(cloud, atlas_files, tmp_path):
     place = written(atlas_files, tmp_path / "a.zarr")
     (place / f"tip/c/0.{32 * 'a'}.partial").touch()  # what a killed writer of Zarr leaves
