@@ -34,7 +34,7 @@ $(READY): requirements.lock pyproject.toml
 	@touch $(READY)
 
 demo: setup
-	$(BIN)/softreach demo --out out
+	$(BIN)/softreach demo --out out --overwrite
 
 # Tests side by side, up to four on as many cores.
 TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
@@ -115,10 +115,10 @@ bench: setup
 
 atlas: setup
 	$(BIN)/softreach atlas build out/atlas.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
-	$(BIN)/softreach atlas figures out/atlas.zarr --out out/atlas
+	$(BIN)/softreach atlas figures out/atlas.zarr --out out/atlas --overwrite
 
 paper: setup
-	$(BIN)/softreach paper --out out/paper
+	$(BIN)/softreach paper --out out/paper --overwrite
 
 docs: setup
 	$(BIN)/python -m zensical build --strict --clean

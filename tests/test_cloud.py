@@ -52,10 +52,10 @@ def test_a_cloud_knows_where_it_comes_from(cloud, trunk):
     assert again.identical(cloud)
 
 
-def test_a_cloud_of_another_design_is_replaced_only_if_one_says_so(cloud, tmp_path):
+def test_a_cloud_is_replaced_only_if_one_says_so(cloud, tmp_path):
     path, other = tmp_path / "a.zarr", sr.compute_cloud(designs.lce_arm(), 50)
     sr.save_cloud(cloud, path)
-    with pytest.raises(InvalidInput, match="a stored cloud of the same design"):
+    with pytest.raises(InvalidInput, match="something is there; choose another name"):
         sr.save_cloud(other, path)
     assert sr.open_cloud(path).identical(cloud)
     sr.save_cloud(other, path, overwrite=True)
@@ -65,7 +65,7 @@ def test_a_cloud_of_another_design_is_replaced_only_if_one_says_so(cloud, tmp_pa
 def test_a_cloud_survives_the_disk(cloud, tmp_path):
     path = tmp_path / "cloud.zarr"
     sr.save_cloud(cloud, path)
-    sr.save_cloud(cloud, path)  # over an older one
+    sr.save_cloud(cloud, path, overwrite=True)
     assert sr.open_cloud(path).identical(cloud)
     assert list(tmp_path.iterdir()) == [path]
 
@@ -79,7 +79,7 @@ def test_an_interrupted_save_leaves_the_old_cloud(cloud, tmp_path, monkeypatch):
 
     monkeypatch.setattr("xarray.Dataset.to_zarr", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        sr.save_cloud(cloud, path)
+        sr.save_cloud(cloud, path, overwrite=True)
     assert list(tmp_path.iterdir()) == [path]
     assert sr.open_cloud(path).identical(cloud)
 
@@ -132,7 +132,7 @@ sr.save_cloud(sr.compute_cloud(arm, 100), store)  # what is loaded once
 tracemalloc.start()
 cloud = sr.compute_cloud(arm, 3_000_000)
 print(cloud.nbytes, tracemalloc.get_traced_memory()[1])
-sr.save_cloud(cloud, store)
+sr.save_cloud(cloud, store, overwrite=True)
 print(cloud.nbytes, tracemalloc.get_traced_memory()[1])
 size = cloud.nbytes
 del cloud

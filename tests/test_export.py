@@ -234,7 +234,7 @@ class TestWhole:
         self, stop, cloud, tmp_path, monkeypatch
     ):
         path = tmp_path / "cloud.ply"
-        path.write_text("ply\nold")
+        path.write_text("old")
 
         def fail(file, *_):
             file.write(b"half")
@@ -242,8 +242,8 @@ class TestWhole:
 
         monkeypatch.setattr("softreach.export.clouds.write_ply_points", fail)
         with pytest.raises(stop):
-            export_cloud(cloud, path)
-        assert path.read_text() == "ply\nold"
+            export_cloud(cloud, path, overwrite=True)
+        assert path.read_text() == "old"
         assert not left_over(tmp_path, "cloud.ply")
 
     def test_an_unknown_suffix_names_the_known_ones(self, trunk, cloud, ball, bent, tmp_path):

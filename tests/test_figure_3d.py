@@ -110,7 +110,6 @@ def test_what_cannot_be_shown_is_refused_and_pages_end_in_html(trunk, tmp_path):
     with pytest.raises(InvalidInput, match=r"ending in .html"):
         save_figure(plot_3d(trunk), tmp_path / "arm.png")
     save_figure(plot_3d(trunk), tmp_path / "arm.html")
-    save_figure(plot_3d(trunk), tmp_path / "arm.html")  # its own kind is replaced
 
 
 def test_a_simplified_ball_stays_closed_and_keeps_its_volume():

@@ -1,9 +1,10 @@
-"""Outputs: whole or not at all, in no place but their own, and looked at before any work."""
+"""Outputs appear whole or not at all, and replace nothing unasked; both before any work."""
 
 from __future__ import annotations
 
 import os
 import resource
+import subprocess
 import sys
 from contextlib import contextmanager, suppress
 
@@ -14,10 +15,8 @@ import softreach as sr
 from softreach.exchange.activefilaments import write_cloud, write_design
 from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.plot import plot_3d, save_figure
-from softreach.support.errors import NotWritten
-from softreach.support.files.atomic import writing
-from softreach.support.files.documents import sealed
-from softreach.support.files.kinds import PICTURES
+from softreach.support.errors import NotWritten, SoftreachWarning
+from softreach.support.files.atomic import place_to_read, replacing_folder, writing
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 
 pytest.importorskip("pyarrow")
@@ -92,62 +91,32 @@ def no_file_larger_than(size: int):
 
 
 @every_writer
-def test_a_disk_that_is_full_is_an_error_and_leaves_nothing(name, things, tmp_path):
-    with no_file_larger_than(100):
-        error = raised_by(lambda: WRITERS[name](things, tmp_path / "new" / name))
-    assert "cannot be written: File too large; choose another disk" in str(error)
-    assert isinstance(error, OSError)
-    assert not any(tmp_path.iterdir())
-
-
-@every_writer
-def test_an_older_output_survives_a_disk_that_is_full(name, things, tmp_path):
-    WRITERS[name](things, tmp_path / name)
+def test_on_a_full_disk_an_output_is_an_error_of_one_line_and_what_was_there_stays(
+    name, things, tmp_path
+):
+    WRITERS[name](things, tmp_path / "old" / name)
+    (tmp_path / "new").mkdir()
     before = files_in(tmp_path)
-    with no_file_larger_than(100), pytest.raises(NotWritten):
-        WRITERS[name](things, tmp_path / name)
+    for folder in ("old", "new"):
+        with no_file_larger_than(100):
+            error = raised_by(
+                lambda place=tmp_path / folder / name: WRITERS[name](things, place, overwrite=True)
+            )
+        assert " cannot be written: File too large" in str(error)
+        assert "\n" not in str(error)
+        assert isinstance(error, OSError)
     assert files_in(tmp_path) == before
 
 
 @every_writer
-def test_an_output_replaces_its_own_kind(name, things, tmp_path):
-    WRITERS[name](things, tmp_path / name)
-    names = files_in(tmp_path).keys()
-    WRITERS[name](things, tmp_path / name)
-    assert files_in(tmp_path).keys() == names
-
-
-@every_writer
-def test_a_file_of_another_kind_stays_unless_one_says_so(name, things, tmp_path):
-    (tmp_path / name).write_text("my notes\nof a year\n")
+def test_what_exists_stays_unless_one_says_so(name, things, tmp_path):
+    (tmp_path / name).write_text("my notes")
     error = raised_by(lambda: WRITERS[name](things, tmp_path / name))
-    assert "something else is there; choose another name, or pass --overwrite" in str(error)
-    assert files_in(tmp_path) == {name: b"my notes\nof a year\n"}
-    WRITERS[name](things, tmp_path / name, overwrite=True)
-    assert (tmp_path / name).is_dir() or b"my notes" not in (tmp_path / name).read_bytes()
-
-
-ALIKE = {
-    "design.toml": b"[robot]\nlength_m = 1.0  # of my own arm\n",
-    "design.jl": b"using ActiveFilaments\nfilament = AFilament(rings)\n# two weeks of my work\n",
-    "cloud.npz": b"PK\x03\x04 the thesis, zipped",
-}
-
-
-@pytest.mark.parametrize("name", ALIKE)
-def test_a_file_that_only_looks_like_an_output_stays(name, things, tmp_path):
-    (tmp_path / name).write_bytes(ALIKE[name])
-    assert "something else is there" in str(
-        raised_by(lambda: WRITERS[name](things, tmp_path / name))
-    )
-    assert files_in(tmp_path) == {name: ALIKE[name]}
-
-
-def test_arrays_of_ones_own_stay(things, tmp_path):
-    np.savez(tmp_path / "cloud.npz", measured=np.arange(3.0), tip=np.zeros(3))
-    before = files_in(tmp_path)
-    assert "something else" in str(raised_by(lambda: _cloud(things, tmp_path / "cloud.npz")))
-    assert files_in(tmp_path) == before
+    assert "something is there; choose another name, or pass --overwrite" in str(error)
+    assert files_in(tmp_path) == {name: b"my notes"}
+    for _ in range(2):  # over the notes, and over an older one
+        WRITERS[name](things, tmp_path / name, overwrite=True)
+        assert (tmp_path / name).is_dir() or b"my notes" not in (tmp_path / name).read_bytes()
 
 
 @every_writer
@@ -155,31 +124,39 @@ def test_a_folder_with_other_things_is_never_replaced(name, things, tmp_path):
     (tmp_path / name).mkdir()
     (tmp_path / name / "thesis.tex").write_text("x")
     before = files_in(tmp_path)
-    error = raised_by(lambda: WRITERS[name](things, tmp_path / name, overwrite=True))
-    assert "a folder with other things is there, which is never replaced" in str(error)
+    raised_by(lambda: WRITERS[name](things, tmp_path / name, overwrite=True))
     assert files_in(tmp_path) == before
 
 
-@every_writer
-def test_a_parent_that_is_a_file_is_named(name, things, tmp_path):
-    (tmp_path / "file").write_text("x")
-    error = raised_by(lambda: WRITERS[name](things, tmp_path / "file" / name))
-    assert "a part of its path is a file" in str(error)
-    assert files_in(tmp_path) == {"file": b"x"}
+@pytest.mark.parametrize("thing", ["thesis.tex", "tip/notes.txt", "tip/c/notes.txt", "mine/c/0/0"])
+def test_a_store_with_a_thing_of_ones_own_is_never_replaced(thing, things, tmp_path):
+    sr.save_cloud(things["cloud"], tmp_path / "a.zarr")
+    (tmp_path / "a.zarr" / thing).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / "a.zarr" / thing).write_text("x")
+    before = files_in(tmp_path)
+    error = raised_by(lambda: sr.save_cloud(things["cloud"], tmp_path / "a.zarr", overwrite=True))
+    assert "is not as softreach wrote it: move it away, or choose another name" in str(error)
+    assert files_in(tmp_path) == before
 
 
-def _first(suffix: str):
-    return next(name for name in WRITERS if name.endswith(suffix))
+@pytest.mark.parametrize("root", ["{}", '{"attributes": {"sam', '{"node_type": "group"}'])
+def test_a_folder_with_a_root_of_another_program_is_never_replaced(root, things, tmp_path):
+    (tmp_path / "a.zarr").mkdir()
+    (tmp_path / "a.zarr" / "zarr.json").write_text(root)
+    before = files_in(tmp_path)
+    raised_by(lambda: sr.save_cloud(things["cloud"], tmp_path / "a.zarr", overwrite=True))
+    assert files_in(tmp_path) == before
 
 
 PLACES = [
-    pytest.param("x" * 300 + ".ply", "choose another name", id="a name too long"),
+    pytest.param("x" * 300 + ".ply", "File name too long", id="a name too long"),
     pytest.param("\0.ply", "must be a path", id="a zero byte"),
-    pytest.param("circle/a.ply", "choose another name", id="links in a circle"),
-    pytest.param("/dev/full/a.ply", "a part of its path is a file", id="below a device"),
+    pytest.param("circle/a.ply", "cannot be written", id="links in a circle"),
+    pytest.param("file/a.ply", "Not a directory", id="below a file"),
+    pytest.param("/dev/full/a.ply", "Not a directory", id="below a device"),
     pytest.param("/proc/a.ply", "cannot be written", id="a folder of the system"),
-    pytest.param("pipe.ply", "not a device or a pipe", id="a pipe"),
-    pytest.param("device.ply", "not a device or a pipe", id="a device"),
+    pytest.param("pipe.ply", "a folder, a device or a pipe is there", id="a pipe"),
+    pytest.param("device.ply", "a folder, a device or a pipe is there", id="a device"),
 ]
 
 
@@ -190,16 +167,18 @@ def test_a_place_where_nothing_can_be_written_is_said(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "circle").symlink_to("circle")
     (tmp_path / "device.ply").symlink_to("/dev/full")
+    (tmp_path / "file").touch()
     os.mkfifo("pipe.ply")
     before = sorted(os.listdir())
-    assert expected in str(raised_by(lambda: _cloud(things, place)))
+    error = raised_by(lambda: _cloud(things, place, overwrite=True))
+    assert expected in str(error)
     assert sorted(os.listdir()) == before
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_without_permission_is_said(things, tmp_path):
     tmp_path.chmod(0o500)
-    assert "that you may write to" in str(raised_by(lambda: _mesh(things, tmp_path / "a.stl")))
+    assert "Permission denied" in str(raised_by(lambda: _mesh(things, tmp_path / "a.stl")))
 
 
 def test_a_link_to_a_file_stays_a_link(things, tmp_path):
@@ -207,24 +186,6 @@ def test_a_link_to_a_file_stays_a_link(things, tmp_path):
     _mesh(things, tmp_path / "link.stl")
     assert (tmp_path / "link.stl").is_symlink()
     assert (tmp_path / "real.stl").stat().st_size == 84 + 4 * 50
-
-
-def test_the_folder_that_one_works_in_is_not_taken_away(things, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    error = raised_by(lambda: sr.save_cloud(things["cloud"], "."))
-    assert "never replaced" in str(error)
-    assert tmp_path.is_dir()
-
-
-@pytest.mark.parametrize("kind", ["an empty file", "an empty folder", "an older name"])
-def test_what_is_empty_may_be_replaced(kind, things, tmp_path):
-    path = tmp_path / "cloud.zarr"
-    if kind == "an empty file":
-        path.touch()
-    elif kind == "an empty folder":
-        path.mkdir()
-    sr.save_cloud(things["cloud"], path)
-    assert sr.open_cloud(path).sizes["sample"] == 50
 
 
 def test_a_library_that_swallows_an_error_does_not_get_away_with_it(tmp_path):
@@ -236,24 +197,100 @@ def test_a_library_that_swallows_an_error_does_not_get_away_with_it(tmp_path):
     with (
         no_file_larger_than(1000),
         pytest.raises(NotWritten),
-        writing(tmp_path / "a.png", PICTURES[".png"]) as file,
+        writing(tmp_path / "a.png") as file,
     ):
         careless(file)
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("stranger", ["notes.txt", "tip/notes.txt"])
-def test_a_cloud_with_a_file_of_ones_own_in_it_counts_as_a_folder(stranger, things, tmp_path):
-    sr.save_cloud(things["cloud"], tmp_path / "a.zarr")
-    (tmp_path / "a.zarr" / stranger).write_text("x")
-    raised_by(lambda: sr.save_cloud(things["cloud"], tmp_path / "a.zarr"))
-    assert (tmp_path / "a.zarr" / stranger).read_text() == "x"
+KILLED = """
+import os, signal, sys, warnings
+from pathlib import Path
+from softreach.support.files import atomic
+
+warnings.simplefilter("ignore")
+place, operation = Path("it"), 0
+
+def write(name, overwrite):
+    if name == "folder":
+        with atomic.replacing_folder(place, lambda _: "", overwrite=overwrite) as folder:
+            fill(folder)
+    else:
+        with atomic.writing(place, overwrite=overwrite) as file:
+            file.write(content.encode())
+
+def fill(folder):
+    for name in "ab":
+        (folder / name).mkdir()
+        (folder / name / "c").write_text(content)
+
+def found(name):
+    where = Path(atomic.place_to_read(place))
+    if name == "file":
+        return where.read_text()
+    (text,) = {(where / name / "c").read_text() for name in "ab"}
+    return text
+
+def kill_before(operation):
+    def hook(event, _):
+        nonlocal operation
+        if event in ("open", "os.mkdir", "os.remove", "os.rename", "os.rmdir"):
+            operation -= 1
+            if operation == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+    sys.addaudithook(hook)
+
+name, content, seen, killed = sys.argv[1], "old", {"old": 0, "new": 0}, True
+write(name, False)
+while killed:
+    operation += 1
+    content = "old"
+    write(name, True)
+    if not (child := os.fork()):
+        content = "new"
+        kill_before(operation)
+        write(name, True)
+        os._exit(0)
+    killed = os.waitpid(child, 0)[1] == signal.SIGKILL
+    seen[found(name)] += 1
+print(*seen.values(), len(list(Path().glob("it*"))))
+"""
+
+
+@pytest.mark.parametrize("name", ["file", "folder"])
+def test_a_kill_before_any_operation_leaves_the_old_or_the_new_whole(name, tmp_path):
+    """Nothing else is ever found there, and the next replacement succeeds each time."""
+    command = [sys.executable, "-c", KILLED, name]
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert process.stderr == ""
+    old, new, left = map(int, process.stdout.split())
+    assert old >= (10 if name == "folder" else 2)
+    assert new >= 2
+    assert left == 1
+
+
+def test_a_folder_whose_replacement_was_killed_is_found_and_comes_back(tmp_path):
+    place, new, old = (
+        tmp_path / f"a.zarr{end}" for end in ("", ".softreach-new", ".softreach-old")
+    )
+    for path in (new, old):
+        path.mkdir()
+        (path / "whole").write_text(path.name)
+    with pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new is read"):
+        assert place_to_read(place) == str(new)
+    assert not place.exists()
+    with (
+        pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new was renamed to it"),
+        replacing_folder(place, lambda _: "", overwrite=True),
+    ):
+        assert (place / "whole").read_text() == new.name
+    assert [path.name for path in tmp_path.iterdir()] == ["a.zarr"]
 
 
 TRUNK = "minimal_trunk"
 SURFACES = "must be a file name ending in .ply, .stl, .obj, .glb"
 PICTURE = "must be a file name ending in .png, .pdf, .svg"
-ELSE = "something else is there"
+THERE = "something is there; choose another name, or pass --overwrite"
 
 
 def case(words: str, expected: str):
@@ -263,39 +300,30 @@ def case(words: str, expected: str):
 
 UNWRITABLE = [
     case(f"cloud {TRUNK} --out notes.csv", "must be a file name ending in .zarr"),
-    case(f"cloud {TRUNK} --out taken/a.zarr", "a part of its path is a file"),
-    case(f"cloud {TRUNK} --out atlas.zarr", ELSE),
-    case(f"cloud {TRUNK} --out broken.zarr", "zarr.json is not as softreach wrote it"),
+    case(f"cloud {TRUNK} --out taken/a.zarr", "Not a directory"),
     case(f"cloud {TRUNK} --out folder.zarr --overwrite", "never replaced"),
     case(f"volume {TRUNK} --out a.txt", SURFACES),
-    case(f"volume {TRUNK} --out taken/a.ply", "a part of its path is a file"),
-    case(f"volume {TRUNK} --out notes.ply", ELSE),
-    case(f"volume {TRUNK} --out folder.ply", "never replaced"),
-    case(f"reach {TRUNK} --out a.txt", SURFACES),
+    case(f"volume {TRUNK} --out notes.ply", THERE),
     case(f"reach {TRUNK} --out a.png --out a.txt", ".vtk, .png, .pdf, .svg"),
-    case(f"reach {TRUNK} --out notes.ply", ELSE),
-    case(f"reach {TRUNK} --out notes.png", ELSE),
+    case(f"reach {TRUNK} --out a.png --out notes.ply", THERE),
     case(f"show {TRUNK} --out a.txt", PICTURE),
-    case(f"show {TRUNK} --out notes.png", ELSE),
-    case(f"show {TRUNK} --out taken/a.png", "a part of its path is a file"),
-    case(f"equilibria {TRUNK} --out a.txt", PICTURE),
-    case(f"equilibria {TRUNK} --out notes.png", ELSE),
-    case("payload lce_arm --gravity up --out a.txt", PICTURE),
-    case("payload lce_arm --gravity up --out notes.png", ELSE),
+    case(f"show {TRUNK} --out notes.png", THERE),
+    case(f"equilibria {TRUNK} --out notes.png", THERE),
+    case("payload lce_arm --gravity up --out notes.png", THERE),
     case(f"track {TRUNK} path.csv --out a.txt", "must be a file name ending in .csv"),
-    case(f"track {TRUNK} path.csv --out path.csv", ELSE),
+    case(f"track {TRUNK} path.csv --out path.csv", THERE),
     case(f"design {TRUNK} --out a.json", "must be a file name ending in .toml"),
-    case(f"design {TRUNK} --out notes.toml", ELSE),
-    case(f"export {TRUNK} notes.ply", ELSE),
-    case(f"export {TRUNK} notes.jl", ELSE),
+    case(f"design {TRUNK} --out notes.toml", THERE),
+    case(f"export {TRUNK} notes.jl", THERE),
     case(f"export {TRUNK} a.xls", SURFACES),
-    case("export cloud.zarr path.csv", ELSE),
-    case("export cloud.zarr path.csv --format activefilaments", ELSE),
-    case("demo --out taken", "a part of its path is a file"),
-    case("demo --out mine", ELSE),
-    case("paper --out taken", "a part of its path is a file"),
-    case("paper --out mine", ELSE),
-    case("atlas figures atlas.zarr --out taken", "a part of its path is a file"),
+    case("export cloud.zarr path.csv", THERE),
+    case("export cloud.zarr path.csv --format activefilaments", THERE),
+    case("demo --out taken", "Not a directory"),
+    case("demo --out mine", THERE),
+    case("paper --out taken", "Not a directory"),
+    case("paper --out mine", THERE),
+    case("paper --out pictures", "a folder without other figures"),
+    case("atlas figures atlas.zarr --out taken", "Not a directory"),
 ]
 
 
@@ -306,16 +334,9 @@ def crowded(tmp_path, monkeypatch):
     for name in ("taken", "notes.ply", "notes.png", "notes.toml", "notes.jl"):
         (tmp_path / name).write_text("my notes")
     (tmp_path / "path.csv").write_text("x,y,z\n0.2,0.1,0.6\n0.2,0.1,0.61\n")
-    for name in ("folder.zarr", "folder.ply", "mine"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "report.html").write_text("mine")
-        (tmp_path / name / "cloud.png").write_text("mine")
-    for name, content in {
-        "atlas.zarr": sealed(b'{"attributes": {"command": "{}"}, "node_type": "group"}'),
-        "broken.zarr": b'{"attributes": {"sam',
-    }.items():
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "zarr.json").write_bytes(content)
+    for name in ("folder.zarr/a", "mine/report.html", "mine/cloud.png", "pictures/figures/a.png"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("mine")
     return tmp_path
 
 

@@ -7,7 +7,7 @@ import pytest
 import softreach as sr
 from softreach.atlas import DesignSpace, Metric, Need
 from softreach.atlas.space_file import parse_space
-from tests.abuse.refusals import raised_by, refusal_of
+from tests.abuse.refusals import raised_by
 
 NUMBERS = "must be numbers: a list, or start:stop:count"
 ENDS = "two numbers, the lower one first"
@@ -86,11 +86,3 @@ def test_a_metric_that_is_none_is_refused(change, expected):
 def test_a_parameter_is_differentiated_by_once(trunk):
     error = raised_by(lambda: sr.volume_gradient(trunk, ["taper", "taper"]))
     assert "parameters = taper: must be given once" in str(error)
-
-
-def test_a_hundred_thousand_worker_processes_are_refused(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    arguments = ["atlas", "build", "a.zarr", "--vary", "taper_deg=0,1", "--workers", "100000"]
-    assert "workers = 100000: must be a whole number, from 1 to 1,024" in refusal_of(
-        arguments, capsys, tmp_path
-    )

@@ -61,7 +61,7 @@ def test_a_design_survives_a_file_to_the_last_bit(arm):
 def test_a_saved_design_loads_equal_and_nothing_is_left_beside_it(tmp_path, trunk):
     path = tmp_path / "folder" / "trunk.toml"
     trunk.save(path)
-    trunk.save(path)
+    trunk.save(path, overwrite=True)
     assert sr.Manipulator.load(path) == trunk
     assert list(path.parent.iterdir()) == [path]
 

@@ -14,7 +14,7 @@ SCRIPT = """
     from pathlib import Path
     import numpy as np
     from softreach import describe, designs
-    from softreach.atlas import DesignSpace, build_atlas, worker_processes
+    from softreach.atlas import DesignSpace, build_atlas
     from softreach.atlas import design_task
 
     def build(store, n=3_000, alpha_over_length=0.3, accuracy=0.2, **options):
@@ -50,3 +50,9 @@ def ended(process: subprocess.Popen) -> tuple[None, str]:
         return process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
+
+
+def stored_files(place: Path) -> dict[str, bytes]:
+    """What a store holds, without what killed writers left."""
+    files = (file for file in place.rglob("*") if file.is_file() and file.suffix != ".partial")
+    return {str(file.relative_to(place)): file.read_bytes() for file in files}

@@ -56,7 +56,7 @@ def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
 
 def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
     store = AtlasStore.begin(tmp_path / "a.zarr", command(gapped_space(), **SMALL))
-    store.write_failure(3, "no luck")
+    store.write_status(3, "no luck")
     assert run(["atlas", "status", str(tmp_path / "a.zarr")]) == 0
     said = capsys.readouterr().out
     assert "number 3" in said

@@ -6,12 +6,13 @@ import contextlib
 import os
 import signal
 import textwrap
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 
 import pytest
 
-from softreach.atlas import StoreFailed, atlas_status, build_atlas, open_atlas, worker_processes
-from softreach.support.errors import InvalidInput
+from softreach.atlas import StoreFailed, atlas_status, build_atlas, open_atlas
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import SMALL, assert_same, small_space
 from tests.atlas.scripts import build16, ended, run_script
 
@@ -45,7 +46,7 @@ DEADLY = """
     def deadly(arm, *rest):
         guilty = arm.profile.taper > 0.05 and abs(describe(arm).revolutions[0]) < 1e-9
         mark = Path(sys.argv[0]).with_suffix(".died")
-        if guilty and (ALWAYS or not mark.exists()):
+        if guilty and not mark.exists():
             mark.touch()
             die()
         return right(arm, *rest)
@@ -54,49 +55,71 @@ DEADLY = """
 """
 
 
-def deadly(body: str, always: bool = False) -> str:
-    """A script in which a worker dies over design number 3, once or always."""
-    return f"ALWAYS = {always}\n" + textwrap.dedent(DEADLY) + textwrap.dedent(body)
+def deadly(body: str) -> str:
+    """A script in which a worker dies over design number 3, once."""
+    return textwrap.dedent(DEADLY) + textwrap.dedent(body)
 
 
-@pytest.mark.large
-def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
+def test_a_pool_that_loses_a_worker_ends_with_one_line_and_another_one_continues(whole, tmp_path):
     store = tmp_path / "a.zarr"
     body = """
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+        from softreach.support.errors import SoftreachError
         if __name__ == "__main__":
-            build(sys.argv[1], executor=worker_processes(2))
+            try:
+                with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+                    build(sys.argv[1], executor=pool)
+            except SoftreachError as error:
+                sys.exit(str(error))
     """
-    assert ended(run_script(tmp_path, deadly(body), str(store))) == (None, "")
-    assert (tmp_path / "task.died").exists()
+    said = ended(run_script(tmp_path, deadly(body), str(store)))[1]
+    (line,) = [line for line in said.splitlines() if line.startswith("a worker died and broke")]
+    assert line.endswith("what is done is safe, and the same call with a new executor continues")
+    assert "Traceback" not in said
+    assert atlas_status(store).done < 16
+    again = run_script(tmp_path, deadly(body), str(store))
+    ended(again)
+    assert again.returncode == 0
     assert_same(open_atlas(store).load(), whole)
 
 
+class KilledWorker(Exception):
+    """What Dask raises for a task over which several workers died."""
+
+
+class KillingPool(ThreadPoolExecutor):
+    """Workers that die over design number 3."""
+
+    def submit(self, call, remote, index):
+        return super().submit(call, remote, index) if index != 3 else super().submit(self.killed)
+
+    def killed(self):
+        raise KilledWorker
+
+
 def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_path):
-    store = tmp_path / "a.zarr"
-    body = """
-        if __name__ == "__main__":
-            import warnings
-            warnings.simplefilter("ignore")
-            build(sys.argv[1], executor=worker_processes(1), metrics=("extent",))
-    """
-    assert ended(run_script(tmp_path, deadly(body, True), str(store))) == (None, "")
-    status = atlas_status(store)
-    assert (status.done, status.messages) == (15, {3: "its worker died repeatedly"})
+    with KillingPool(1) as pool, pytest.warns(SoftreachWarning, match="1 design failed"):
+        build_atlas(small_space(), tmp_path / "a.zarr", executor=pool, **SMALL)
+    status = atlas_status(tmp_path / "a.zarr")
+    assert (status.done, status.messages) == (3, {3: "its worker died repeatedly"})
+
+
+ON_DASK = """
+    if __name__ == "__main__":
+        from distributed import Client, LocalCluster
+        options = {"dashboard_address": ":0", "silence_logs": 50}
+        with LocalCluster(2, threads_per_worker=1, **options) as cluster:
+            with Client(cluster) as client:
+                build(sys.argv[1], executor=client)
+"""
 
 
 @pytest.mark.large
 def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     pytest.importorskip("distributed")
     store = tmp_path / "a.zarr"
-    body = """
-        if __name__ == "__main__":
-            from distributed import Client, LocalCluster
-            options = {"dashboard_address": ":0", "silence_logs": 50}
-            with LocalCluster(2, threads_per_worker=1, **options) as cluster:
-                with Client(cluster) as client:
-                    build(sys.argv[1], executor=client)
-    """
-    process = run_script(tmp_path, deadly(body), str(store))
+    process = run_script(tmp_path, deadly(ON_DASK), str(store))
     ended(process)
     assert process.returncode == 0
     assert (tmp_path / "task.died").exists()
@@ -145,25 +168,16 @@ def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
 def test_workers_refuse_a_store_in_the_memory_of_another_process():
     from zarr.storage import MemoryStore
 
-    with pytest.raises(StoreFailed, match="in the memory of another process"):
-        build_atlas(small_space(), MemoryStore(), executor=worker_processes(1), **SMALL)
+    with (
+        ProcessPoolExecutor(1, get_context("spawn")) as pool,
+        pytest.raises(StoreFailed, match="in the memory of another process"),
+    ):
+        build_atlas(small_space(), MemoryStore(), executor=pool, **SMALL)
 
 
 def test_what_is_no_executor_is_refused(tmp_path):
     with pytest.raises(InvalidInput, match=r"executor = 3: must be a concurrent\.futures executor"):
         build_atlas(small_space(), tmp_path / "a.zarr", executor=3, **SMALL)
-
-
-def test_worker_processes_start_when_called_and_not_before(monkeypatch):
-    started = []
-    monkeypatch.setattr(
-        "softreach.atlas.processes.LocalProcesses", lambda count: started.append(count)
-    )
-    start = worker_processes(3)
-    assert started == []
-    start()
-    start()
-    assert started == [3, 3]
 
 
 def test_progress_counts_every_design_once(tmp_path):

@@ -118,7 +118,7 @@ def some(tmp_path_factory) -> Path:
     asked = command(gapped_space(), **SMALL)
     store = AtlasStore.begin(place, asked)
     begin_design(store, asked.metrics, 1)()
-    store.write_failure(3, "no luck")
+    store.write_status(3, "no luck")
     return place
 
 

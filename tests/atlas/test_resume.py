@@ -13,63 +13,52 @@ from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.store import AtlasStore
 from softreach.rod import TipMap
 from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.support.interruption import INTERRUPTED
 from tests.atlas.families import SMALL, assert_same, command, small_space
-from tests.atlas.scripts import build16, ended, run_script
+from tests.atlas.scripts import build16, ended, run_script, stored_files
 from tests.laws import of_length
 
 
-@pytest.mark.parametrize("kills", [2, pytest.param(3, marks=pytest.mark.large)])
-def test_kills_leave_the_same_numbers_as_no_kill(kills, whole, tmp_path):
-    store = tmp_path / "killed.zarr"
+@pytest.mark.parametrize("kills", [2, pytest.param(30, marks=pytest.mark.large)])
+def test_kills_leave_the_same_bits_as_no_kill(kills, whole, tmp_path):
+    """Before a file is opened to be written, or is renamed; a build has about 100 such moments."""
     body = """
-        from softreach.atlas import store as stores
-        left, place = int(sys.argv[2]), sys.argv[3]
+        left = int(sys.argv[2])
 
-        def count_down(*_):
+        def count_down(event, given):
             global left
-            left -= 1
-            if not left:
-                die()
+            if event in ("os.rename", "os.link") or (event == "open" and given[1] == "wb"):
+                left -= STORE in str(given)
+                if not left:
+                    die()
 
-        if place == "within a write":
-            right = stores.fixed_point
-            stores.fixed_point = lambda *given: (count_down(), right(*given))[1]
-        build(sys.argv[1], progress=count_down if place == "after a design" else None)
+        STORE = sys.argv[1]
+        sys.addaudithook(count_down)
+        build(STORE)
     """
-    done = 0
-    moments = (2, "after a design"), (5, "within a write"), (3, "after a design")
-    for count, place in moments[:kills]:
-        process = run_script(tmp_path, body, str(store), str(count), place)
-        assert ended(process) == (None, "")
+    build16(tmp_path / "whole.zarr")
+    store, drawn = tmp_path / "killed.zarr", np.random.default_rng(kills)
+    for operation in drawn.integers(1, 7 if kills > 2 else 45, kills):
+        process = run_script(tmp_path, body, str(store), str(operation))
+        ended(process)
         assert process.returncode == -signal.SIGKILL
-        assert done < atlas_status(store).done < 16
-        done = atlas_status(store).done
     assert_same(build16(store).load(), whole)
+    found, right = (stored_files(tmp_path / f"{name}.zarr") for name in ("killed", "whole"))
+    assert found == right
 
 
-def test_an_interrupt_tells_what_is_done_and_that_the_same_again_continues(tmp_path, capsys):
-    def interrupted(_: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt) as caught:
-        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL, progress=interrupted)
-    (note,) = caught.value.__notes__
-    designs = small_space().size
-    assert note.endswith(f" of {designs} designs are done, and the same command continues")
-    assert 1 <= int(note.split()[0]) <= designs
-
-
-def test_ctrl_c_ends_a_process_with_a_line_of_what_is_done(tmp_path):
+def test_ctrl_c_ends_a_process_with_a_line_and_the_same_call_continues(whole, tmp_path):
     body = """
-        from softreach.cli.signals import end_on_signals
-        end_on_signals()
-        build(sys.argv[1], progress=lambda _: os.kill(os.getpid(), signal.SIGINT))
+        from softreach.support.interruption import run_stoppable
+        run_stoppable(
+            lambda: build(sys.argv[1], progress=lambda _: os.kill(os.getpid(), signal.SIGINT))
+        )
     """
     process = run_script(tmp_path, body, str(tmp_path / "a.zarr"))
-    _, said = ended(process)
-    assert process.returncode == 130
-    assert "interrupted: nothing half-written was left behind; " in said
-    assert said.endswith(" of 16 designs are done, and the same command continues\n")
+    said = ended(process)[1]
+    assert (process.returncode, said) == (130, f"{INTERRUPTED}\n")
+    assert 0 < atlas_status(tmp_path / "a.zarr").done < 16
+    assert_same(build16(tmp_path / "a.zarr").load(), whole)
 
 
 def test_a_second_call_computes_nothing(tmp_path, monkeypatch):

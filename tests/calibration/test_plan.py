@@ -76,14 +76,14 @@ def test_the_file_of_a_plan_is_read_once_it_is_filled_in(tmp_path):
     assert sr.calibrate(ARM, data, free=FREE).held_out.number == 0
 
 
-def test_a_plan_replaces_an_empty_plan_and_no_measurements(tmp_path):
+def test_a_plan_replaces_no_measurements(tmp_path):
     path = tmp_path / "poses.csv"
     plan = plan_poses(ARM, [MODULUS], 3, candidates=16)
     plan.save(path)
-    plan.save(path)
-    path.write_text(path.read_text().replace(",,,,,,", ",1,2,3,4,5,6", 1))
+    path.write_text(filled := path.read_text().replace(",,,,,,", ",1,2,3,4,5,6", 1))
     with pytest.raises(InvalidInput, match="overwrite"):
         plan.save(path)
+    assert path.read_text() == filled
 
 
 @pytest.mark.parametrize(

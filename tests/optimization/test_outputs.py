@@ -102,15 +102,15 @@ def test_saved_designs_are_those_of_the_front(one, several, tmp_path):
     assert str(several.problem.digest) in page
 
 
-def test_a_search_replaces_files_of_searches_and_no_others(one, several, tmp_path):
+def test_a_search_replaces_an_older_one_only_if_one_says_so(one, several, tmp_path):
     several.save(tmp_path)
-    one.save(tmp_path)
-    assert not list(tmp_path.glob("front_*.toml"))
-    (tmp_path / "front.csv").write_text("mine\n")
-    with pytest.raises(InvalidInput, match="something else is there"):
+    (tmp_path / "front_1000.toml").write_text("mine\n")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(InvalidInput, match="something is there"):
         one.save(tmp_path)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
     one.save(tmp_path, overwrite=True)
-    assert "mine" not in (tmp_path / "front.csv").read_text()
+    assert [path.read_text() for path in tmp_path.glob("front_*.toml")] == ["mine\n"]
 
 
 def test_pictures_say_their_units_and_tell_the_infeasible_by_shape(one, several):
@@ -186,7 +186,9 @@ def test_the_command_writes_what_the_call_finds(folder, capsys):
         "search.journal",
     }
     assert sr.describe(sr.Manipulator.load("best/best.toml")).mass <= 8.0
-    assert run(["search", "needs.toml", "--out", "best"]) == code
+    assert run(["search", "needs.toml", "--out", "best"]) == 2
+    assert "best.toml: must be a new name" in capsys.readouterr().err
+    assert run(["search", "needs.toml", "--out", "best", "--overwrite"]) == code
     assert "designs, " in capsys.readouterr().out
 
 

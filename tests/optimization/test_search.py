@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sqlite3
 import subprocess
 import sys
 import textwrap
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -121,6 +123,41 @@ def test_the_storage_of_another_search_is_refused(tmp_path):
     heavy(storage=storage, designs=1, polish=False)
     with pytest.raises(InvalidInput, match=r"storage = .*another search: remove it, or choose"):
         sr.search(ARM, FREE, NEEDS, minimize="mass", storage=storage, **FAST)
+
+
+FOREIGN = {
+    "notes.txt": b"my notes\nof a year\n",
+    "list.json": b"[1, 2]\n",
+    "numbers": b'{"op_code": 0}\n',
+    "optuna.journal": b'{"op_code":0,"worker_id":"a","study_name":"mine","directions":[1]}\n',
+    "picture.db": b"\x89PNG\r\n\x1a\n",
+}
+
+
+@pytest.mark.parametrize("name", [*FOREIGN, "mine.db"])
+def test_a_storage_that_softreach_did_not_write_stays_as_it_is(name, tmp_path):
+    place = tmp_path / name
+    if name == "mine.db":
+        with closing(sqlite3.connect(place)) as database:
+            database.execute("CREATE TABLE studies (study_name TEXT)")
+            database.execute("INSERT INTO studies VALUES ('mine')")
+            database.commit()
+    else:
+        place.write_bytes(FOREIGN[name])
+    before = place.read_bytes()
+    with pytest.raises(InvalidInput, match="a new file, or that of a search: choose another"):
+        heavy(storage=place)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == {place: before}
+
+
+def test_a_journal_whose_last_line_was_cut_off_goes_on(tmp_path):
+    storage = tmp_path / "search.journal"
+    whole = heavy(storage=storage, polish=False)
+    text = storage.read_bytes()
+    for kept in range(text.rindex(b"\n", 0, -1) + 2, len(text), 40):
+        storage.write_bytes(text[:kept])
+        again = heavy(storage=storage, polish=False)
+        assert rows(again)[: len(rows(whole)) - 1] == rows(whole)[:-1]
 
 
 @pytest.mark.parametrize("place", ["missing/search.journal", ".", "text.db"])

@@ -108,7 +108,7 @@ def test_what_is_there_is_not_computed_again_and_what_is_damaged_is(
     written, trunk, tmp_path, monkeypatch
 ):
     shutil.copytree(written.page.parent, tmp_path / "page")
-    again = write_static(grid(trunk), tmp_path / "page", unit="cm")
+    again = write_static(grid(trunk), tmp_path / "page", unit="cm", overwrite=True)
     assert (again.designs, again.computed) == (2, 0)
     before = files_of(again)
     damaged = next((tmp_path / "page" / "designs").iterdir())
@@ -120,10 +120,14 @@ def test_what_is_there_is_not_computed_again_and_what_is_damaged_is(
         return reachable_set(arm, accuracy=0.03)
 
     monkeypatch.setattr(static, "reachable_set", counted)
-    mended = write_static(grid(trunk), tmp_path / "page", unit="cm")
+    mended = write_static(grid(trunk), tmp_path / "page", unit="cm", overwrite=True)
     assert len(calls) == mended.computed == 1
     assert files_of(mended).keys() == before.keys()
-    fewer = write_static(grid(trunk, revolutions=(108.0,)), tmp_path / "page", unit="cm")
+    notes = tmp_path / "page" / "designs" / "mine.js"
+    notes.write_text("// of mine")
+    one = grid(trunk, revolutions=(108.0,))
+    fewer = write_static(one, tmp_path / "page", unit="cm", overwrite=True)
+    notes.unlink()
     assert fewer.computed == 0
     assert len(files_of(fewer)) == 1  # designs that the page no longer has are gone
 
@@ -132,7 +136,7 @@ def test_files_of_others_stay_and_are_refused_where_they_are_in_the_way(trunk, t
     (tmp_path / "index.html").write_text("<!doctype html><title>My page</title>")
     command = ["studio", "--static", str(tmp_path), "--vary", "taper_deg=0,1"]
     assert run(command) == 2
-    assert "a static page of designs" in capsys.readouterr().err
+    assert "index.html: must be a new name" in capsys.readouterr().err
     assert "My page" in (tmp_path / "index.html").read_text()
     assert not (tmp_path / "designs").exists()
 

@@ -280,11 +280,11 @@ class Manipulator:
         return arm
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-        """Write a design file; an older one is replaced.
+        """Write a design file.
 
         Args:
             path: The file.
-            overwrite: Replace any file, not only a design file.
+            overwrite: Whether it may replace a file.
 
         Raises:
             InvalidInput: Something else is there.
@@ -292,7 +292,7 @@ class Manipulator:
             InvalidDesign: The design has no text; see `to_toml`.
         """
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
+        with writing(path, overwrite=overwrite) as stream:
             stream.write(self.file_text.encode())
 
     @property

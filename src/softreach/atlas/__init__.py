@@ -3,7 +3,6 @@
 from softreach.atlas.build import build_atlas
 from softreach.atlas.metric import Metric, MetricFailed, Need
 from softreach.atlas.metrics import METRIC_GROUPS
-from softreach.atlas.processes import worker_processes
 from softreach.atlas.questions import (
     AtlasStatus,
     atlas_cloud,
@@ -14,7 +13,7 @@ from softreach.atlas.questions import (
 )
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
-from softreach.support.files.damage import DamagedStore, StoreFailed
+from softreach.support.files.stores import DamagedStore, StoreFailed
 
 __all__ = [
     "METRIC_GROUPS",
@@ -33,5 +32,4 @@ __all__ = [
     "open_atlas",
     "over_length",
     "verify_atlas",
-    "worker_processes",
 ]

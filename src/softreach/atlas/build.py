@@ -20,7 +20,6 @@ from softreach.rod.tip_map import check_tol
 from softreach.sampling import check_sampler
 from softreach.support.arguments import POSITIVE, as_flag, as_function, as_instance, as_number
 from softreach.support.errors import counted, warn
-from softreach.support.files.interruption import remarking
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, bar
 from softreach.workspace.reach import ACCURACIES
@@ -78,9 +77,8 @@ def build_atlas(
         tol: Largest tip error, in L.
         keep_clouds: Whether to store the tips, 6.2 bytes each.
         executor: None for all cores of this process, with at most two clouds and one triangulation
-            per thread in memory; a `concurrent.futures` executor; a function that makes one, which
-            is called again if a worker dies; or a Dask client. Workers write to the store, which
-            they must see at the same place, and use one thread each unless
+            per thread in memory; a `concurrent.futures` executor; or a Dask client. Workers write
+            to the store, which they must see at the same place, and use one thread each unless
             ``SOFTREACH_NUM_THREADS`` says otherwise.
         shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
             store without knowing of each other.
@@ -95,8 +93,10 @@ def build_atlas(
     Raises:
         InvalidInput: An argument out of range, no valid design, or a store that another command
             began; the message says what differs.
-        DamagedStore: The root of the store is damaged, so that nobody knows what it holds.
+        DamagedStore: The root of the store is damaged, and another command began it.
         StoreFailed: The store cannot be written, for instance because the disk is full.
+        SoftreachError: A worker died and broke its executor; the same call with a new one
+            continues.
 
     Warns:
         SoftreachWarning: There are gaps, failed or damaged designs, or designs whose points are too
@@ -133,7 +133,7 @@ def build_atlas(
     if content.damage:
         warn(f"{content.damage}; what is damaged is computed again")
     ended = np.isin(content.status[indices], (DONE, GAP, UNSTABLE))
-    _run(atlas, indices[~ended], executor, progress, int(ended.sum()))
+    _run(atlas, indices[~ended], executor, progress)
     built = open_atlas(store)
     _warn_of_unstable(built)
     _warn_of_sparse(built)
@@ -145,24 +145,18 @@ def _run(
     indices: np.ndarray,
     executor: ExecutorLike,
     progress: Progress | None,
-    done: int,
 ) -> None:
-    """Compute designs of an atlas, of which some others are done."""
+    """Compute designs of an atlas."""
     failures: dict[int, str] = {}
-    lock, total = Lock(), done + len(indices)
+    lock = Lock()
 
-    def remark() -> str:
-        return f"{done} of {total} designs are done, and the same command continues"
-
-    with remarking(remark), bar("computing designs", len(indices)) as shown:
+    with bar("computing designs", len(indices)) as shown:
 
         def on_outcome(outcome: tuple[int, str]) -> None:
-            nonlocal done
             index, failure = outcome
             with lock:
                 if failure:
                     failures[index] = failure
-                done += not failure
                 (progress or shown)(1)
 
         run_designs(atlas, indices.tolist(), executor, on_outcome)

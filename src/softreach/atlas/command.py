@@ -27,7 +27,6 @@ STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
 _RESERVED = frozenset(
     ("status", "message", "number", "tip", "axis", "unit_activation", "sample", "bundle", "length")
     + ("design", "metric", "metrics", "curvature", "quantity", "station", "quantile", "rank")
-    + ("checksum", "file")
 )
 """Names that no metric may have, as an atlas or a question about it uses them itself."""
 _PLAIN = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -16,13 +17,13 @@ from softreach.atlas.store import UNSTABLE, AtlasStore, Result
 from softreach.rod.tip_map import no_equilibrium_message
 from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, no_warnings
-from softreach.support.files.damage import StoreFailed
+from softreach.support.files.stores import StoreFailed
 
 Values = dict[str, Array]
 Outcome = tuple[int, str]
 """Number of a design, and why it failed; empty if it did not."""
 
-_opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
+_opened: dict[str, AtlasStore] = {}
 
 
 @no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
@@ -50,47 +51,45 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
 class Remote:
     """Task as it travels to a worker elsewhere that computes designs of a store.
 
-    It travels to the worker instead of arrays: the worker reads the activations from the store and
-    writes its results there. The metrics' functions and the kinds of the design's parts are in no
-    store, so they travel along, by the names of their modules.
+    The worker reads the activations from the store and writes its results there. The command
+    travels along, as the functions of metrics are in no store; unpickling it imports the modules
+    that these and the kinds of the design's parts are in.
     """
 
     def __init__(self, store: AtlasStore) -> None:
-        base = store.command.space.base
-        self._kinds = {type(part) for part in (base.profile, *base.actuators)}
+        self.command, self._location, self._durable = (
+            store.command,
+            store.location,
+            store.opened.durable,
+        )
         self._store: AtlasStore | None = store
-        self.metrics = store.command.metrics
-        self._durable = store.durable
-        self._location, self._origin = store.location, (socket.gethostname(), os.getpid())
+        self._token, self._origin = secrets.token_hex(8), (socket.gethostname(), os.getpid())
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_store": None}
 
     def store(self) -> AtlasStore:
-        """The store, opened once per process."""
+        """The store, opened once per process; one thread is used there, unless told otherwise."""
         from zarr.storage import MemoryStore
 
         if self._store is not None:
             return self._store
-        if isinstance(self._location, dict | MemoryStore):
-            raise StoreFailed("the store is in the memory of another process; use a path or a URL")
-        key = repr(self._location), self._origin
-        if key not in _opened:
-            _opened.clear()
-            _opened[key] = AtlasStore.open(self._location, durable=self._durable)
-        return _opened[key]
-
-    def bound_threads(self) -> None:
-        """A worker process takes one thread, unless its environment says otherwise."""
         if (socket.gethostname(), os.getpid()) != self._origin:
             os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
+            if isinstance(self._location, dict | MemoryStore):
+                raise StoreFailed(
+                    "the store is in the memory of another process; use a path or a URL"
+                )
+        if self._token not in _opened:
+            _opened.clear()
+            _opened[self._token] = AtlasStore.open(self._location, durable=self._durable)
+        return _opened[self._token]
 
 
 def run_remotely(remote: Remote, index: int) -> Outcome:
     """Compute and store a design in a worker; a repeated call gives the same result."""
-    remote.bound_threads()
     try:
-        return begin_design(remote.store(), remote.metrics, index)()
+        return begin_design(remote.store(), remote.command.metrics, index)()
     except SoftreachError as error:
         raise StoreFailed(str(error)) from None  # this one can be sent back
 
@@ -140,5 +139,5 @@ def _kept_tips(store: AtlasStore, intermediates: Intermediates) -> Array | None:
 
 def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:
     message = f"{type(error).__name__}: {error}"
-    store.write_failure(index, message)
+    store.write_status(index, message)
     return index, message

@@ -6,34 +6,29 @@ worker, leaves the same bytes.
 
 from __future__ import annotations
 
-from collections import deque
+import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
-    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
-    ThreadPoolExecutor,
     wait,
 )
-from itertools import chain
-from typing import Any, Protocol, Self
+from itertools import chain, islice
+from typing import Any, Protocol
 
 from softreach.atlas.design_task import Outcome, Remote, begin_design, run_remotely
-from softreach.atlas.metric import Metric, check_travels
-from softreach.atlas.processes import LocalProcesses, Workers
 from softreach.atlas.store import AtlasStore
 from softreach.support import parallel
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.files.interruption import undoing
+from softreach.support.interruption import check_stopped
 
 __all__ = ["ExecutorLike", "an_executor", "run_designs"]
 
-ATTEMPTS = 3
-"""Workers that a design may take with it before it counts as failed."""
+_AHEAD = 512  # tasks that an executor has at a time
 
 
 class DaskClient(Protocol):
@@ -46,10 +41,7 @@ class DaskClient(Protocol):
 
 OnOutcome = Callable[[Outcome], None]
 
-ExecutorLike = Executor | DaskClient | Workers | None
-
-
-_ALLOWED = "a concurrent.futures executor, a function that makes one, or a Dask client"
+ExecutorLike = Executor | DaskClient | None
 
 
 def an_executor(name: str, value: Any) -> Any:
@@ -58,10 +50,10 @@ def an_executor(name: str, value: Any) -> Any:
     Raises:
         InvalidInput: None of those.
     """
-    known = value is None or isinstance(value, Executor) or hasattr(value, "get_executor")
-    if known or (callable(value) and not isinstance(value, type)):
+    if value is None or isinstance(value, Executor) or hasattr(value, "get_executor"):
         return value
-    raise InvalidInput(name, as_given(value), _ALLOWED)
+    allowed = "a concurrent.futures executor, or a Dask client"
+    raise InvalidInput(name, as_given(value), allowed)
 
 
 def run_designs(
@@ -79,9 +71,9 @@ def run_designs(
         on_outcome: Called with each outcome as it comes.
 
     Raises:
-        InvalidInput: Not an executor, or a metric that its workers cannot get.
+        InvalidInput: A metric that worker processes cannot get.
         StoreFailed: The store cannot be written.
-        SoftreachError: An executor that cannot be restarted has lost a worker.
+        SoftreachError: A worker died, and with it the executor.
     """
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
@@ -90,150 +82,60 @@ def run_designs(
         # Threads start with the second task: with one before all they get the first design at once.
         parallel.run(chain([lambda: None], tasks))
         return
-    pool = _Pool(executor)
-    with undoing(pool.abandon), pool:
-        pool.check_metrics(store.command.metrics)
-        for index in _run_in_pool(pool, Remote(store), deque(indices), on_outcome):
-            on_outcome(_given_up(store, index))
+    if isinstance(executor, ProcessPoolExecutor):
+        _check_travels(store)
+    pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
+    _run_in_pool(pool, store, indices, on_outcome)
 
 
 def _reporting(task: Callable[[], Outcome], on_outcome: OnOutcome) -> Callable[[], None]:
     return lambda: on_outcome(task())
 
 
-class _Pool:
-    """An executor that is restarted where that is possible."""
-
-    def __init__(self, executor: ExecutorLike) -> None:
-        self._start: Workers | None = None
-        if isinstance(executor, Executor):
-            self._now = executor
-        elif hasattr(executor, "get_executor"):
-            # The scheduler itself tries the task of a dead worker again.
-            self._now = executor.get_executor(pure=False)  # pyright: ignore
-        else:
-            self._start = start = an_executor("executor", executor)
-            self._now = start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is not None:
-            self.abandon()
-        if self._start is not None:
-            self._now.shutdown(wait=True, cancel_futures=True)
-
-    def abandon(self) -> None:
-        """Wait for nothing that is being computed, if the workers are ours."""
-        if isinstance(self._now, LocalProcesses):
-            self._now.abandon()
-
-    def check_metrics(self, metrics: Sequence[Metric]) -> None:
-        """Refuse metrics whose functions a worker process cannot get."""
-        if isinstance(self._now, ThreadPoolExecutor):
-            return
-        by_import = isinstance(self._now, ProcessPoolExecutor)
-        for metric in metrics:
-            check_travels(metric, by_import=by_import)
-
-    @property
-    def window(self) -> int:
-        """Tasks to have in the pool at a time: few, as any of them may have broken it."""
-        return 2 * getattr(self._now, "_max_workers", 512)
-
-    def submit(self, *call: Any) -> Future[Outcome]:
-        """Hand a call to a worker."""
-        return self._now.submit(*call)
-
-    def renew(self) -> None:
-        """Replace a broken executor."""
-        if self._start is None:
-            raise SoftreachError(
-                "a worker died and broke its executor; the same call continues, and goes on by "
-                "itself if the executor is given as a function that makes it"
-            )
-        self._now.shutdown(wait=False, cancel_futures=True)
-        self._now = self._start()
+def _check_travels(store: AtlasStore) -> None:
+    """Refuse metrics whose functions a pool of processes cannot get."""
+    for metric in store.command.metrics:
+        try:
+            pickle.dumps(metric.compute)
+        except Exception:
+            raise InvalidInput(
+                f"compute of metric {metric.name}",
+                metric.compute,
+                "a function of a module where worker processes compute it",
+                "lambdas and functions inside of functions cannot be sent to them",
+            ) from None
 
 
 def _run_in_pool(
-    pool: _Pool, remote: Remote, waiting: deque[int], on_outcome: OnOutcome
-) -> list[int]:
-    """Run the designs; return those that kill their workers again and again."""
-    lost: list[int] = []
-    while waiting:
-        suspects = _run_until_broken(pool, remote, waiting, on_outcome)
-        # One at a time, to tell the design at fault from its neighbors.
-        lost += [index for index in suspects if not _survives(pool, remote, index, on_outcome)]
-    return lost
-
-
-def _survives(pool: _Pool, remote: Remote, index: int, on_outcome: OnOutcome) -> bool:
-    tries = (_run_until_broken(pool, remote, deque([index]), on_outcome) for _ in range(ATTEMPTS))
-    return any(not died for died in tries)
-
-
-def _run_until_broken(
-    pool: _Pool, remote: Remote, waiting: deque[int], on_outcome: OnOutcome
-) -> list[int]:
-    """Run designs from `waiting` until all are done or a worker dies; return those running then."""
+    pool: Executor, store: AtlasStore, indices: Sequence[int], on_outcome: OnOutcome
+) -> None:
+    remote, waiting = Remote(store), iter(indices)
     pending: dict[Future[Outcome], int] = {}
-    suspects: list[int] = []
-    broken = False
     try:
-        while (waiting or pending) and not broken:
-            broken = not _fill(pool, remote, waiting, pending)
-            done = wait(pending, return_when=FIRST_COMPLETED).done
-            suspects += _settle(pending, done, remote, on_outcome)
-            broken = broken or bool(suspects)
+        while True:
+            check_stopped()
+            for index in islice(waiting, _AHEAD - len(pending)):
+                pending[pool.submit(run_remotely, remote, index)] = index
+            if not pending:
+                return
+            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                on_outcome(_outcome(future, store, pending.pop(future)))
+    except BrokenExecutor as error:
+        raise SoftreachError(
+            "a worker died and broke its executor; what is done is safe, and the same call with "
+            "a new executor continues"
+        ) from error
     finally:
         for future in pending:
             future.cancel()
-    if broken:
-        suspects += _settle(pending, wait(pending).done, remote, on_outcome)
-        pool.renew()
-    return suspects
 
 
-def _fill(
-    pool: _Pool, remote: Remote, waiting: deque[int], pending: dict[Future[Outcome], int]
-) -> bool:
-    """Submit designs up to the pool's window; False if the pool is broken."""
+def _outcome(future: Future[Outcome], store: AtlasStore, index: int) -> Outcome:
     try:
-        while waiting and len(pending) < pool.window:
-            pending[pool.submit(run_remotely, remote, waiting[0])] = waiting[0]
-            waiting.popleft()
-    except BrokenExecutor:
-        return False
-    return True
-
-
-def _settle(
-    pending: dict[Future[Outcome], int],
-    done: set[Future[Outcome]],
-    remote: Remote,
-    on_outcome: OnOutcome,
-) -> list[int]:
-    """Report what has ended; return designs that ended with their worker."""
-    ended = [(future, pending.pop(future)) for future in done]
-    return [index for future, index in ended if not _reported(future, index, remote, on_outcome)]
-
-
-def _reported(future: Future[Outcome], index: int, remote: Remote, on_outcome: OnOutcome) -> bool:
-    """Report an outcome; False if there is none, as the worker died."""
-    try:
-        on_outcome(future.result())
-    except (BrokenExecutor, CancelledError):
-        return False
+        return future.result()
     except Exception as error:
         if type(error).__name__ != "KilledWorker":
             raise
-        on_outcome(_given_up(remote.store(), index))  # Dask has tried it again by then
-    return True
-
-
-def _given_up(store: AtlasStore, index: int) -> Outcome:
-    message = "its worker died repeatedly"
-    store.write_failure(index, message)
-    return index, message
+        message = "its worker died repeatedly"  # Dask has tried it again by then
+        store.write_status(index, message)
+        return index, message

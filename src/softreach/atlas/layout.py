@@ -13,22 +13,16 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
 
-__all__ = ["CHECKSUM", "CUBE", "FILES", "MISSING", "RESOLUTION", "SEAL", "Plan", "array_plans"]
+__all__ = ["CUBE", "MISSING", "PER_DESIGN", "RESOLUTION", "Plan", "array_plans"]
 
 RESOLUTION = 1e-5
 """Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
 
-SEAL = "metrics"
-"""The array that is created last: if it exists, so do all others."""
-
 CUBE = "unit_activation"
 """The array of activations that all designs share."""
 
-FILES = {"status": 0, "message": 0, "curvature": 3, "tip": 2, "metrics": 1}
-"""The arrays of which a design has a chunk -> their dimensions beside those of the designs."""
-
-CHECKSUM = "checksum"
-"""The array that binds these chunks to their design and store."""
+PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")
+"""The arrays whose chunks are designs."""
 
 MISSING = int(np.iinfo(np.int32).min)
 """Number in place of a tip that is NaN, or not stored."""
@@ -58,7 +52,7 @@ class Plan:
 
 
 def array_plans(command: Command) -> Iterator[Plan]:
-    """Every array of an atlas, the seal last."""
+    """Every array of an atlas."""
     yield from _parameters(command)
     yield _labels("metric", [metric.name for metric in command.numbers])
     yield _labels("axis", list(AXES))
@@ -73,10 +67,8 @@ def array_plans(command: Command) -> Iterator[Plan]:
         yield from _profiles(command)
     if command.keep_clouds:
         yield _tips(command)
-    attrs = {"long_name": f"checksum, place and store of {', '.join(FILES)}: of each in one"}
-    yield _per_design(command, CHECKSUM, np.uint32, 0, {"file": len(FILES)}, attrs)
     sizes = {"metric": len(command.numbers)}
-    yield _per_design(command, SEAL, np.float64, np.nan, sizes, _described(command))
+    yield _per_design(command, "metrics", np.float64, np.nan, sizes, _described(command))
 
 
 _CUBE = {

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -15,7 +13,7 @@ from softreach.support.arguments import as_instance, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError
 
-__all__ = ["Metric", "MetricFailed", "Need", "check_travels"]
+__all__ = ["Metric", "MetricFailed", "Need"]
 
 PROFILE = ("station", "quantile")
 
@@ -142,31 +140,3 @@ def place_of(compute: Callable[..., Any]) -> str:
         return compute.place
     named: Any = compute if hasattr(compute, "__qualname__") else type(compute)
     return f"{named.__module__}:{named.__qualname__}"
-
-
-def check_travels(metric: Metric, *, by_import: bool) -> None:
-    """Check that a metric can be sent to another process.
-
-    Args:
-        metric: Which one.
-        by_import: Whether that process imports functions by name, as those of Python's pools do,
-            and so lacks those typed into a session.
-
-    Raises:
-        InvalidInput: It cannot.
-    """
-    main = sys.modules["__main__"]
-    typed = getattr(metric.compute, "__module__", "") == "__main__" and not hasattr(
-        main, "__file__"
-    )
-    try:
-        pickle.dumps(metric.compute)
-    except Exception:
-        typed = by_import = True
-    if typed and by_import:
-        raise InvalidInput(
-            f"compute of metric {metric.name}",
-            place_of(metric.compute),
-            "a function of a module where worker processes compute it",
-            "lambdas and functions inside of functions cannot be sent to them",
-        )

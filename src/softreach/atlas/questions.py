@@ -12,6 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.shown import from_written, written_name
 from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
 from softreach.atlas.intermediates import activations_of
+from softreach.atlas.layout import PER_DESIGN
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
 from softreach.atlas.store import (
     DAMAGED,
@@ -19,7 +20,6 @@ from softreach.atlas.store import (
     FAILED,
     GAP,
     KNOWN,
-    PER_DESIGN,
     TODO,
     UNSTABLE,
     AtlasStore,
@@ -34,7 +34,7 @@ from softreach.support.arguments import (
     as_number,
     as_text,
 )
-from softreach.support.errors import InvalidInput, did_you_mean, warn
+from softreach.support.errors import InvalidInput, did_you_mean
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,18 +100,8 @@ def verify_atlas(store: StoreLike) -> AtlasStatus:
     Raises:
         InvalidInput: There is no atlas.
         DamagedStore: What all designs share is damaged.
-
-    Warns:
-        SoftreachWarning: An earlier version began it, which did not bind files to their place.
     """
-    opened = AtlasStore.open(a_store("store", store), "r")
-    if not opened.is_bound:
-        warn(
-            f"{opened.location} was begun by an earlier version of softreach: damage of a file is "
-            "noticed, but not a whole file of another design or atlas in its place; build it again "
-            "in a new folder to have that too"
-        )
-    return _verified(opened, tips=True)
+    return _verified(AtlasStore.open(a_store("store", store), "r"), tips=True)
 
 
 def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
@@ -233,9 +223,8 @@ def _is_small(store: AtlasStore) -> bool:
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
-    for plan in store.plans:
-        if plan.name not in PER_DESIGN:
-            store.array(plan.name)[...]
+    for name in store.watch.digests.keys() - {*PER_DESIGN}:
+        _ = store.array(name)[...]
     numbers = range(store.command.space.size) if tips else ()
     content = contents(store, tips_of=numbers)
     return _counted(content.status, content.messages, tips)

@@ -10,17 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.atlas.arguments import a_store, an_atlas
-from softreach.atlas.binding import bind
 from softreach.atlas.command import Command
-from softreach.atlas.layout import CHECKSUM
+from softreach.atlas.layout import PER_DESIGN, array_plans
 from softreach.atlas.metric import Metric, Need
-from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTABLE, AtlasStore
+from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
 from softreach.support.arguments import as_dataset, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
-from softreach.support.files.damage import Chunk, storage_errors
-from softreach.support.files.documents import ARRAYS
-from softreach.support.files.stores import READING, check_arrays
+from softreach.support.files.stores import ARRAYS, DIGEST, READING, Chunk, storage_errors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +30,7 @@ TOLD = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
 
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
-_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message", CHECKSUM)
+_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,8 +72,6 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     reader = _Reader(store)
     status = reader.read("status").ravel()
     store.watch.required = _required(store, status)
-    if store.is_bound:
-        reader.damaged |= bind(store, status, np.isin(status, KNOWN))
     names = ("metrics", "curvature") if store.command.profiles else ("metrics",)
     tables = {name: reader.table(name, status) for name in names if metrics}
     for index in tips_of if store.command.keep_clouds else ():
@@ -171,8 +166,8 @@ class _Reader:
         array = self._store.array(name)
         with self._store.watch.noting() as noted:
             values = np.array(array[place])
-        for chunk, line in noted.items():
-            self.damaged.setdefault(self._store.number(chunk), line)
+        for chunk, error in noted.items():
+            self.damaged.setdefault(self._store.number(chunk), str(error))
         return values
 
     def table(self, name: str, status: NDArray[np.uint8]) -> Array:
@@ -185,14 +180,12 @@ class _Reader:
 def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
     """Chunks that must be there, by the status of their designs."""
     known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
-    of_array = {"message": told, CHECKSUM: known | told}
 
     def required(chunk: Chunk) -> bool:
         if chunk.array not in PER_DESIGN:
             return True
-        if chunk.array == "status":
-            return False
-        return bool(of_array.get(chunk.array, known)[store.number(chunk)])
+        of_designs = told if chunk.array == "message" else known
+        return chunk.array != "status" and bool(of_designs[store.number(chunk)])
 
     return required
 
@@ -206,10 +199,11 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
         then = "left out; the command that built the atlas computes again what is damaged"
         warn(f"{content.damage} ({then})")
     with storage_errors(f"{atlas.location} cannot be read"):
-        check_arrays(atlas.opened)
         raw = xr.open_zarr(atlas.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates = _coordinates(atlas, raw)
-    raw.attrs.pop(ARRAYS)
+    for variable in (raw, *raw.variables.values()):
+        for name in (ARRAYS, DIGEST, OF):
+            variable.attrs.pop(name, None)
     variables = _variables(atlas, content) | (_metrics(atlas.command, content) if metrics else {})
     opened = raw.assign(variables).assign_coords(coordinates)
     opened.encoding["source"] = str(atlas.location)
@@ -223,8 +217,9 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     for index, message in content.messages.items():
         texts[index] = message
     values = {"status": content.status, "message": texts}
+    plans = {plan.name: plan for plan in array_plans(store.command)}
     return {
-        name: (space.dims, column.reshape(space.shape), store.array(name).attrs.asdict())
+        name: (space.dims, column.reshape(space.shape), plans[name].attrs)
         for name, column in values.items()
     }
 
@@ -253,9 +248,6 @@ def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
 def _coordinates(store: AtlasStore, raw: xr.Dataset) -> dict[str, Any]:
     """Parameters, length and number of every design."""
     space = store.command.space
-    for name, values in space.parameters:
-        if not np.array_equal(raw[name].values, values):
-            store.watch.report(Chunk(name, None), "with other values", "those of the command")
     numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
     coordinates: dict[str, Any] = {
         "length": ((), space.base.length, {"units": "m"}),

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm import design_file
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.calibration.baselines import constant_curvature, quadratic
 from softreach.calibration.errors import (
@@ -378,7 +377,7 @@ class Calibration:
         """Write the calibrated arm as a design file whose first lines say where it comes from.
 
         Raises:
-            InvalidInput: Something is there that is no design, and `overwrite` is not given.
+            InvalidInput: Something is there, and `overwrite` is not given.
             NotWritten: It cannot be written.
         """
         lines = [f"# {key}: {value}" for key, value in self.provenance.items()]
@@ -395,7 +394,7 @@ class Calibration:
         head = "\n".join(["# Calibrated from measured poses.", *lines, *numbers])
         text = f"{head}\n\n{self.arm.file_text}"
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
+        with writing(path, overwrite=overwrite) as stream:
             stream.write(text.encode())
 
     def save_table(

@@ -14,7 +14,7 @@ from softreach.calibration.report import (
 )
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, check_installed, format_of, text_with
+from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
 from softreach.support.files.templates import page_template, png_source
 from softreach.support.units import as_unit
 
@@ -23,14 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["REPORT", "write_report"]
 
-REPORT: Formats = {
-    ".html": FileKind(
-        "a report of a calibration",
-        text_with("<!doctype html", "softreach calibration"),
-        ("jinja2",),
-        "paper",
-    )
-}
+REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
 
 _DPI = 160
@@ -45,7 +38,7 @@ def write_report(
 ) -> None:
     """Write the numbers, errors, verdict and pictures of a calibration."""
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    kind = format_of(path, REPORT)
+    format_of(path, REPORT)
     check_installed(("matplotlib", "plot"))
     template = page_template("softreach.calibration", "report.html.jinja")
     length = result.arm.length
@@ -64,7 +57,7 @@ def write_report(
         inputs=list(zip(result.arm.input_names, result.data.input_names, strict=True)),
         design=result.arm.to_toml(),
     )
-    with writing(path, kind, overwrite=overwrite) as file:
+    with writing(path, overwrite=overwrite) as file:
         file.write(page.encode())
 
 

@@ -7,7 +7,6 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from softreach.sampling import sample_cube
 from softreach.support.arguments import as_flag, as_integer, as_names, as_number, as_path
 from softreach.support.errors import InvalidInput, Range, did_you_mean
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats
+from softreach.support.files.formats import FileFormat, Formats
 
 __all__ = ["PLAN", "PosePlan", "plan_poses"]
 
@@ -86,14 +85,14 @@ class PosePlan:
 
         Args:
             path: The file.
-            overwrite: Whether it may replace any file, and not only a plan without measurements.
+            overwrite: Whether it may replace a file.
 
         Raises:
             InvalidInput: Something else is there.
             NotWritten: It cannot be written.
         """
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, PLAN[".csv"], overwrite=overwrite) as file:
+        with writing(path, overwrite=overwrite) as file:
             file.write(self._csv().encode())
 
     def _csv(self) -> str:
@@ -274,12 +273,5 @@ def _gains(slopes: Array, total: Array) -> Array:
     return np.linalg.slogdet(np.eye(slopes.shape[1]) + along @ along.transpose(0, 2, 1))[1]
 
 
-def _is_empty_plan(path: Path) -> bool:
-    """True of a plan without a single measurement."""
-    head, *rows = path.read_text(encoding="utf-8", errors="replace").splitlines() or [""]
-    count = head.count("_mm") // 3 * 3
-    return head.startswith("sample,") and all(row.endswith("," * count) for row in rows)
-
-
-PLAN: Formats = {".csv": FileKind("a plan of poses without measurements", _is_empty_plan)}
+PLAN: Formats = {".csv": FileFormat()}
 """Formats of plans."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, format_of, text_with
+from softreach.support.files.formats import FileFormat, Formats, format_of
 from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TABLE", "residual_table", "write_table"]
 
-_HEAD = "row,run,held_out,"
-
-TABLE: Formats = {".csv": FileKind("a table of residuals", text_with(_HEAD))}
+TABLE: Formats = {".csv": FileFormat()}
 """Formats of such tables."""
 
 
@@ -30,8 +28,9 @@ def write_table(
 ) -> None:
     """Write `residual_table` as CSV."""
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    format_of(path, TABLE)
     table = residual_table(result, as_unit(unit, result.arm.length))
-    with writing(path, format_of(path, TABLE), overwrite=overwrite) as file:
+    with writing(path, overwrite=overwrite) as file:
         file.write(table.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode())
 
 

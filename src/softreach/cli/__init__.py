@@ -5,16 +5,19 @@ from __future__ import annotations
 import os
 import sys
 
-from softreach.cli.signals import end_on_signals
+from softreach.support.interruption import run_stoppable
 
 
 def main() -> None:
     """Run the command line and exit; a signal ends it at any time."""
-    end_on_signals()  # before anything large is imported
-    from softreach.cli.app import run
+    sys.exit(run_stoppable(_run))
+
+
+def _run() -> int:
+    from softreach.cli.app import run  # large
 
     for name in ("stdin", "stdout", "stderr"):  # else the next file opened would take its place
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever windows there are
-    sys.exit(run(sys.argv[1:]))
+    return run(sys.argv[1:])

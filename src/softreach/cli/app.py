@@ -14,7 +14,6 @@ from typing import Annotated, Any, cast
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from softreach.cli.console import HelpConsole, console
-from softreach.cli.signals import INTERRUPTED
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
@@ -129,9 +128,6 @@ def run(arguments: list[str]) -> int:
                 console.error(traceback.format_exc().rstrip())
             console.error(f"error: {_message(error)}")
             return 2
-        except KeyboardInterrupt as error:
-            console.error("; ".join([INTERRUPTED, *getattr(error, "__notes__", ())]))
-            return 130
     return code or 0
 
 

@@ -78,9 +78,6 @@ def build(
     keep_clouds: Annotated[
         bool, Parameter(negative="--no-keep-clouds", help="Store the tips.")
     ] = True,
-    workers: Annotated[
-        int | None, WHOLE, Parameter(help="Use this many processes instead of threads.")
-    ] = None,
     scheduler: Annotated[str | None, Parameter(help="Dask scheduler: tcp://host:port")] = None,
     scheduler_file: Annotated[Path | None, Parameter(help="Dask scheduler file.")] = None,
     shard: Shard = "0/1",
@@ -108,7 +105,7 @@ def build(
         alpha_over_length=0.05 if alpha is None else _over_length(alpha),
         metrics=groups,
         keep_clouds=keep_clouds,
-        executor=_executor(workers, scheduler, scheduler_file),
+        executor=_executor(scheduler, scheduler_file),
         shard=_shard(shard),
         durable=durable,
     )
@@ -252,15 +249,7 @@ def _key_and_values(text: str) -> tuple[str, str]:
     return (key, values) if sign else (text, "")
 
 
-def _executor(
-    workers: int | None, scheduler: str | None, scheduler_file: Path | None
-) -> ExecutorLike:
-    if workers is not None:
-        refuse("left out with --workers", scheduler=scheduler, scheduler_file=scheduler_file)
-        from softreach.atlas.processes import WORKERS, worker_processes
-        from softreach.support.arguments import as_integer
-
-        return worker_processes(as_integer("workers", workers, *WORKERS))
+def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:
     if scheduler is not None:
         refuse("left out with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:

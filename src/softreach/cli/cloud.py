@@ -15,7 +15,6 @@ from softreach.cli.options import (
     SAMPLING,
     AsJson,
     Design,
-    Durable,
     Overwrite,
     Sampling,
     Unit,
@@ -40,7 +39,6 @@ def cloud(
         out_option("Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out."),
     ] = None,
     overwrite: Overwrite = False,
-    durable: Durable = False,
     unit: Unit = None,
     json: AsJson = False,
 ) -> None:
@@ -50,18 +48,18 @@ def cloud(
     """
     from time import perf_counter
 
-    from softreach.cloud.clouds import cloud_store, compute_cloud, save_cloud
+    from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, save_cloud
     from softreach.rod.rods import tip_map
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     out = out or Path(f"{Path(design).stem}.zarr")
-    check_output(out, cloud_store(arm), overwrite)
+    check_output(out, CLOUD_STORE, overwrite)
     arguments = sampling.arguments
     start = perf_counter()
     dataset = compute_cloud(arm, **arguments, tol=tol)
     seconds = perf_counter() - start
-    save_cloud(dataset, out, durable=durable, overwrite=overwrite)
+    save_cloud(dataset, out, overwrite=overwrite)
     rows: Rows = {
         "samples": (sampling.count, ""),
         "sampler": (arguments["sampler"], ""),

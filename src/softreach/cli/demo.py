@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -12,10 +12,6 @@ from softreach.cli.lengths import Lengths
 from softreach.cli.options import AsJson, Overwrite, Unit, check_output, out_option
 from softreach.cli.values import WHOLE
 from softreach.cli.volume import check_hull_memory, volume_rows
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
-
 
 _FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
 
@@ -46,7 +42,7 @@ def demo(
     start = perf_counter()
     arm = designs.minimal_trunk()
     lengths = Lengths.of(arm, unit)
-    _check(out, arm, overwrite)
+    _check(out, overwrite)
     check_hull_memory(n)
     cloud = compute_cloud(arm, n)
     computed = perf_counter() - start
@@ -73,13 +69,13 @@ def demo(
     console.rows("minimal trunk, revolution 108°, taper 2°", rows, json, lengths)
 
 
-def _check(folder: Path, arm: Manipulator, overwrite: bool) -> None:
+def _check(folder: Path, overwrite: bool) -> None:
     """Look at every place before anything is written to one of them."""
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.cloud.clouds import cloud_store
+    from softreach.cloud.clouds import CLOUD_STORE
     from softreach.export.clouds import CLOUD_FILES
-    from softreach.support.files.kinds import PICTURES
+    from softreach.support.files.formats import PICTURES
 
-    formats = (DESIGN_FILE, cloud_store(arm), CLOUD_FILES, CLOUD_FILES, PICTURES)
+    formats = (DESIGN_FILE, CLOUD_STORE, CLOUD_FILES, CLOUD_FILES, PICTURES)
     for name, kinds in zip(_FILES, formats, strict=True):
         check_output(folder / name, kinds, overwrite)

@@ -74,14 +74,14 @@ def _cloud(
     unit: str | None,
     json: bool,
 ) -> None:
-    from softreach.cloud.clouds import cloud_store, save_cloud
+    from softreach.cloud.clouds import CLOUD_STORE, save_cloud
     from softreach.exchange.activefilaments import read_cloud, read_design
 
     if design is None:
         allowed = "the design that the cloud was computed for"
         raise InvalidInput("design", None, allowed, "pass --design filament.toml")
     arm = read_design(design) if design.endswith(".json") else design_from(design)
-    check_output(out, cloud_store(arm), overwrite)
+    check_output(out, CLOUD_STORE, overwrite)
     lengths = Lengths.of(arm, unit)
     cloud = read_cloud(arm, source, tol=tol)
     save_cloud(cloud, out, overwrite=overwrite)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.arm.manipulator import Manipulator
-    from softreach.support.files.kinds import Formats
+    from softreach.support.files.formats import Formats
 
 
 OUTPUT = Group("Output options", sort_key=3)
@@ -60,7 +60,7 @@ Durable = Annotated[
 ]
 Overwrite = Annotated[
     bool,
-    Parameter(group=OUTPUT, help="Replace any file, or store of softreach, that is in the way."),
+    Parameter(group=OUTPUT, help="Overwrite existing output."),
 ]
 
 
@@ -209,34 +209,33 @@ def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
     Args:
         path: Where it goes, if it is asked for.
         formats: What can be written there, by suffix.
-        overwrite: Whether it may replace anything else.
+        overwrite: Whether it may replace what is there.
 
     Raises:
-        InvalidInput: Another suffix, something else is there, the disk cannot hold it, or there is
-            nothing to overwrite.
+        InvalidInput: Another suffix, something is there, or there is nothing to overwrite.
         MissingExtra: A library that writes it is not installed.
         NotWritten: Nothing can be written there.
     """
     from softreach.support.files.atomic import check_place
-    from softreach.support.files.kinds import format_of
+    from softreach.support.files.formats import format_of
 
     if path is None:
         refuse("left out where no file is written: give --out too", overwrite=overwrite)
     else:
-        kind = format_of(path, formats, "out")
-        check_place(path, kind, overwrite=overwrite, name="out")
+        foreign = format_of(path, formats, "out").foreign
+        check_place(path, overwrite=overwrite, foreign=foreign, name="out")
 
 
 def check_picture(path: Path | None, overwrite: bool, *, page: bool = False) -> None:
     """Refuse a place for a picture, or for a page that turns, as `check_output`."""
-    from softreach.support.files.kinds import PAGES, PICTURES
+    from softreach.support.files.formats import PAGES, PICTURES
 
     check_output(path, {**PICTURES, **PAGES} if page else PICTURES, overwrite)
 
 
 def is_page(path: Path) -> bool:
     """True if a figure is asked for that turns in a browser."""
-    from softreach.support.files.kinds import PAGES
+    from softreach.support.files.formats import PAGES
 
     return path.suffix.lower() in PAGES
 

@@ -92,14 +92,14 @@ def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
         check_output(None, {}, overwrite)
         return
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.support.files.kinds import PAGES, PICTURES, check_installed
+    from softreach.support.files.formats import PAGES, PICTURES, check_installed
 
     formats = {**SURFACE_FILES, **PICTURES, **PAGES}
     needed = [
-        (library, kind.extra)
+        (library, known.extra)
         for path in outs
-        if (kind := formats.get(path.suffix.lower()))
-        for library in kind.libraries
+        if (known := formats.get(path.suffix.lower()))
+        for library in known.libraries
     ]
     if any(path.suffix.lower() in SURFACE_FILES for path in outs):
         needed.append(("skimage", "surface"))
@@ -112,7 +112,7 @@ def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
 
 
 def _is_picture(path: Path) -> bool:
-    from softreach.support.files.kinds import PICTURES
+    from softreach.support.files.formats import PICTURES
 
     return path.suffix.lower() in PICTURES
 

@@ -107,7 +107,6 @@ def search(
     from softreach.optimization.search_file import read_search
     from softreach.requirements.requirements import LONGEST
     from softreach.support import progress
-    from softreach.support.files.interruption import remarking
     from softreach.support.files.text import read_text
 
     options = {"designs": designs, "seed": seed, "accuracy": accuracy, "sampler": sampler}
@@ -131,8 +130,7 @@ def search(
         out.mkdir(parents=True, exist_ok=True)
         storage = out / "search.journal"
     watch = _Watch(asked.options)
-    kept = f"designs are kept in {storage}: the same command goes on from there"
-    with progress.bar(watch.label, watch.total) as step, remarking(lambda: kept):
+    with progress.bar(watch.label, watch.total) as step:
         result = optimization.search(
             base,
             asked.free,

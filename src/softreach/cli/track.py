@@ -49,15 +49,14 @@ def track(
     from softreach.export.clouds import path_csv
     from softreach.inverse.path import track_path
     from softreach.support.files.atomic import writing
-    from softreach.support.files.kinds import FileKind, text_with
+    from softreach.support.files.formats import FileFormat
 
-    table = {".csv": FileKind("a table of activations along a path", text_with(",tip_error_m\n"))}
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
-    check_output(out, table, overwrite)
+    check_output(out, {".csv": FileFormat()}, overwrite)
     first = None if start is None else activation_of(start, arm)
     tracked = track_path(arm, points_in("path", path, arm), first)
-    with writing(out, table[".csv"], overwrite=overwrite) as file:
+    with writing(out, overwrite=overwrite) as file:
         file.write(path_csv(tracked).encode())
     followed = int((tracked.status == 0).sum())
     share = f"{followed} of {tracked.sizes['point']} points followed"

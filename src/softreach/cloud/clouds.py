@@ -21,21 +21,18 @@ from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidDesign, InvalidInput
-from softreach.support.files.atomic import replacing
-from softreach.support.files.damage import Watch, raised_at_the_end, storage_errors
-from softreach.support.files.documents import ARRAYS
-from softreach.support.files.kinds import FileKind, Formats
+from softreach.support.errors import InvalidInput
+from softreach.support.files.atomic import place_to_read, replacing_folder
+from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.stores import (
+    ARRAYS,
+    DIGEST,
     READING,
-    REMEDY,
-    absence,
-    attributes_of,
-    check_arrays,
-    checked_place,
+    ROOT,
     foreign_entry,
-    list_arrays,
-    opened_root,
+    opened_store,
+    seal,
+    storage_errors,
 )
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, bar
@@ -110,19 +107,17 @@ def save_cloud(
     cloud: xr.Dataset,
     path: str | PathLike[str],
     *,
-    durable: bool = False,
     overwrite: bool = False,
 ) -> None:
-    """Write a cloud as a Zarr v3 store; it appears whole, in place of an older one, or not at all.
+    """Write a cloud as a Zarr v3 store; it appears whole or not at all.
 
     Every file carries a checksum, so that `open_cloud` notices damage.
 
     Args:
         cloud: From `compute_cloud`, or a part of its samples.
         path: The folder to write.
-        durable: Whether to return only when not even a power cut can lose it, which takes longer.
-        overwrite: Whether it may replace any file, an atlas and a cloud of another design; a folder
-            with anything in it that softreach did not write is never replaced.
+        overwrite: Whether it may replace a file or a store of softreach; a folder with anything in
+            it that softreach did not write is never replaced.
 
     Raises:
         InvalidInput: The dataset is no cloud, its design, bundles and length do not agree, or
@@ -130,11 +125,10 @@ def save_cloud(
         NotWritten: It cannot be written.
     """
     place = as_path("path", path)
-    overwrite, durable = as_flag("overwrite", overwrite), as_flag("durable", durable)
+    overwrite = as_flag("overwrite", overwrite)
     schema.check_stored_cloud(cloud)
-    kind = cloud_store(design_of(cloud))[".zarr"]
     with (
-        replacing(place, kind, overwrite=overwrite, durable=durable) as partial_path,
+        replacing_folder(place, foreign_entry, overwrite=overwrite) as partial_path,
         _few_chunks_at_a_time(),
     ):
         _write(schema.storable(cloud), partial_path)
@@ -146,21 +140,25 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     Raises:
         InvalidInput: There is no such store, or it holds something else.
         DamagedStore: It is not what was written; which array and chunk, and what to do.
-        StoreFailed: It cannot be read.
+        StoreFailed: It cannot be read, or was replaced meanwhile.
     """
     import xarray as xr
 
-    location = as_path("path", path)
-    opened = opened_root(location, "cloud")
+    location = place_to_read(as_path("path", path))
+    opened = opened_store(location, "cloud")
     if opened is None or "command" in opened.group.attrs:
-        hint = absence(location) if opened is None else "this is an atlas"
+        hint = f"it does not exist, or has no {ROOT}" if opened is None else "this is an atlas"
         raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
     opened.watch.required = lambda _: True
     with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
-        check_arrays(opened)
-        with raised_at_the_end(opened.watch), xr.open_zarr(opened.place, **READING) as stored:
-            cloud = stored.load()
-        cloud.attrs.pop(ARRAYS, None)
+        try:
+            opened.check_arrays()
+            with opened.watch.raising(), xr.open_zarr(opened.place, **READING) as stored:
+                cloud = stored.load()
+        finally:
+            opened.check_root()
+        for name in (ARRAYS, DIGEST):
+            del cloud.attrs[name]
         return schema.check_stored_cloud(cloud)
 
 
@@ -209,20 +207,8 @@ def _of_all_bundles(rod: TipMap) -> TipMap:
     return rod.base if isinstance(rod, View) else rod
 
 
-def _is_cloud_of(arm: Manipulator, path: Path) -> bool:
-    """True if the store of softreach at a path is a cloud of a design."""
-    try:
-        attributes = attributes_of(path)
-        text = "" if "command" in attributes else attributes.get("design", "")
-        return text == arm.to_toml() or Manipulator.from_toml(text) == arm
-    except (InvalidInput, InvalidDesign):
-        return False
-
-
-def cloud_store(arm: Manipulator) -> Formats:
-    """Stores that `save_cloud` writes, and replaces: clouds of the same design."""
-    kind = FileKind("a stored cloud of the same design", partial(_is_cloud_of, arm))
-    return {".zarr": kind._replace(foreign=foreign_entry)}
+CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}
+"""Format of a stored cloud."""
 
 
 def _write(cloud: xr.Dataset, path: Path) -> None:
@@ -235,17 +221,15 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
     chunk = min(cloud.sizes["sample"], _CHUNK)
     for name in ("tip", "activation"):
         encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
-    watch = Watch(location=path, remedy=REMEDY["cloud"])
-    place = checked_place(path, watch, mode="r+")
     cloud.to_zarr(
-        place,
+        path,
         mode="w",
         zarr_format=3,
         consolidated=False,
         encoding=encoding,
         write_empty_chunks=True,
     )
-    list_arrays(place, watch)
+    seal(path)
 
 
 def _few_chunks_at_a_time() -> AbstractContextManager[object]:

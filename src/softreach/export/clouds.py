@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-import zipfile
 from collections.abc import Iterator, Sequence
 from io import BufferedWriter
 from itertools import chain, count
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,7 +24,7 @@ from softreach.schema import a_cloud
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.kinds import Formats, beginning_with, text_with
+from softreach.support.files.formats import Formats
 from softreach.support.palette import activation_colors
 from softreach.support.units import METER, LengthUnit, as_unit
 
@@ -158,7 +156,7 @@ def export_cloud(
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
         path: The file; it is replaced only when the new one is complete.
         unit: Of the places: "m", "cm", "mm", or "L" if the cloud knows it.
-        overwrite: Whether it may replace any file, and not only a table of that format.
+        overwrite: Whether it may replace a file.
 
     Raises:
         InvalidInput: Unknown suffix or unit, not a cloud, more than the format can hold, or
@@ -308,31 +306,13 @@ def _point_mesh(table: CloudTable) -> Any:
     return meshio.Mesh(table.tip, cells, point_data=data)
 
 
-def _is_npz(path: Path) -> bool:
-    """True if it is an archive with the arrays of a cloud."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return {f"{name}.npy" for name in ("tip", "activation", "bundle")} <= set(
-                archive.namelist()
-            )
-    except zipfile.BadZipFile:
-        return False
-
-
-_UNIT_HEADERS = tuple(f'"x_{unit}","y_{unit}"'.encode() for unit in ("cm", "mm", "over_length"))
-
 CLOUD_FILES: Formats = {
-    ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
-    ".csv": format_file(
-        "a cloud's CSV",
-        beginning_with(b'"x","y","z",', b"x,y,z,gamma_", *_UNIT_HEADERS),
-        _write_csv,
-        "pyarrow",
-    ),
-    ".parquet": format_file("a Parquet", beginning_with(b"PAR1"), _write_parquet, "pyarrow"),
-    ".npz": format_file("a cloud's NPZ", _is_npz, _write_npz),
-    ".mat": format_file("a MAT", beginning_with(b"MATLAB "), _write_mat),
-    ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
-    ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
+    ".ply": format_file(_write_ply),
+    ".csv": format_file(_write_csv, "pyarrow"),
+    ".parquet": format_file(_write_parquet, "pyarrow"),
+    ".npz": format_file(_write_npz),
+    ".mat": format_file(_write_mat),
+    ".vtu": format_file(_write_vtu, "meshio"),
+    ".vtk": format_file(_write_vtk, "meshio"),
 }
 """Formats of clouds."""

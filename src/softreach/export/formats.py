@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, Recognizes, format_of
+from softreach.support.files.formats import FileFormat, Formats, format_of
 
 __all__ = [
     "format_file",
@@ -30,14 +30,9 @@ __all__ = [
 _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
 
-def format_file(
-    name: str,
-    recognizes: Recognizes,
-    write: Callable[[Any, BufferedWriter], None],
-    library: str = "",
-) -> FileKind:
-    """A row of a table of formats: name, content, writer, and the library that it needs."""
-    return FileKind(f"{name} file", recognizes, (library,) if library else (), "export", write)
+def format_file(write: Callable[[Any, BufferedWriter], None], library: str = "") -> FileFormat:
+    """A row of a table of formats: the writer, and the library that it needs."""
+    return FileFormat((library,) if library else (), "export", write)
 
 
 def write_by_suffix(
@@ -49,7 +44,7 @@ def write_by_suffix(
         path: The file.
         formats: What can be written, by suffix.
         content: What their writers take.
-        overwrite: Whether it may replace anything.
+        overwrite: Whether it may replace a file.
 
     Raises:
         InvalidInput: No writer for the suffix (the error lists those there are), or something else
@@ -57,10 +52,10 @@ def write_by_suffix(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    kind = format_of(path, formats)
-    assert kind.write is not None
-    with writing(path, kind, overwrite=overwrite) as file:
-        kind.write(content, file)
+    write = format_of(path, formats).write
+    assert write is not None
+    with writing(path, overwrite=overwrite) as file:
+        write(content, file)
 
 
 def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:

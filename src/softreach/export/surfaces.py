@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from io import BufferedWriter
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -28,7 +27,7 @@ from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
-from softreach.support.files.kinds import Formats, beginning_with, text_with
+from softreach.support.files.formats import Formats
 from softreach.support.palette import BODY, Color, bundle_color
 from softreach.support.units import METER, LengthUnit, as_unit
 
@@ -266,14 +265,6 @@ def _shiny(part: Part) -> Any:
     )
 
 
-def _is_stl(path: Path) -> bool:
-    """A binary STL has no signature: its number of triangles, after 80 bytes, tells its size."""
-    with path.open("rb") as file:
-        head = file.read(84)
-    size = 84 + 50 * int.from_bytes(head[80:], "little")
-    return head.startswith(b"solid ") or (len(head) == 84 and path.stat().st_size == size)
-
-
 def _part_name(names: tuple[str, ...], index: int) -> str:
     """The bundle's name, with its number where another part has that name."""
     taken = ("body", *names[:index])
@@ -281,11 +272,11 @@ def _part_name(names: tuple[str, ...], index: int) -> str:
 
 
 SURFACE_FILES: Formats = {
-    ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
-    ".stl": format_file("an STL", _is_stl, _write_stl, "trimesh"),
-    ".obj": format_file("an OBJ", text_with("\nv "), _write_obj, "trimesh"),
-    ".glb": format_file("a GLB", beginning_with(b"glTF"), _write_glb, "trimesh"),
-    ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
-    ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
+    ".ply": format_file(_write_ply),
+    ".stl": format_file(_write_stl, "trimesh"),
+    ".obj": format_file(_write_obj, "trimesh"),
+    ".glb": format_file(_write_glb, "trimesh"),
+    ".vtu": format_file(_write_vtu, "meshio"),
+    ".vtk": format_file(_write_vtk, "meshio"),
 }
 """Formats of surfaces and arms."""

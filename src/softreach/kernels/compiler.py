@@ -17,7 +17,7 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-from softreach.support.files.interruption import as_a_whole
+from softreach.support.interruption import check_stopped
 
 __all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 
@@ -130,16 +130,19 @@ class _Cache(FunctionCache):
 
     def _attempt(self, write: Callable[..., None], *arguments: Any) -> None:
         try:
-            with as_a_whole():
-                write(*arguments)
+            write(*arguments)
         except Exception as error:
             _LOG.info("%r cannot be written: %s: %s", self, type(error).__name__, error)
 
 
 class _Log(event.Listener):
-    """Logs what is being compiled; a library prints nothing, the command line listens."""
+    """Logs what is being compiled; a library prints nothing, the command line listens.
+
+    A process that is asked to end begins no further compilation.
+    """
 
     def on_start(self, event: event.Event) -> None:
+        check_stopped()
         function: Any = getattr((event.data or {}).get("dispatcher"), "py_func", None)
         if getattr(function, "__module__", "").startswith("softreach"):
             _LOG.info("compiling %s.%s", function.__module__, function.__qualname__)

@@ -7,16 +7,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softreach.arm.design_file import DESIGN_FILE
 from softreach.arm.number import unit_suffix
 from softreach.arm.parameters.shown import with_suffix
-from softreach.optimization.html_report import REPORT, check_libraries
+from softreach.optimization.html_report import check_libraries
 from softreach.optimization.problem import Candidate
 from softreach.optimization.report import shown_unit, value_text
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import SoftreachError
 from softreach.support.files.atomic import check_place, writing
-from softreach.support.files.kinds import FileKind, Formats, format_of, text_with
+from softreach.support.files.formats import FileFormat, Formats, format_of
 from softreach.support.units import LengthUnit, as_unit, readable_unit
 
 if TYPE_CHECKING:
@@ -27,17 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["TABLE", "check_folder", "design_table", "save", "write_table"]
 
 _FOUND = "# Found by a search of softreach"
-_HEAD = "design,front,fidelity,"
 
-TABLE: Formats = {".csv": FileKind("a table of a search", text_with(_HEAD))}
+TABLE: Formats = {".csv": FileFormat()}
 """Formats of such tables."""
 
-_FILES = {
-    "best.toml": DESIGN_FILE,
-    "front.csv": TABLE,
-    "candidates.csv": TABLE,
-    "report.html": REPORT,
-}
+_FILES = ("best.toml", "front.csv", "candidates.csv", "report.html")
 
 
 def check_folder(folder: Path, *, overwrite: bool) -> None:
@@ -49,21 +42,21 @@ def check_folder(folder: Path, *, overwrite: bool) -> None:
         MissingExtra: matplotlib or Jinja2 is not installed.
     """
     check_libraries()
-    for name, formats in _FILES.items():
-        kind = format_of(name, formats)
-        check_place(folder / name, kind, overwrite=overwrite, name="out")
+    for name in _FILES:
+        check_place(folder / name, overwrite=overwrite, name="out")
 
 
 def save(search: Search, folder: str | PathLike[str], unit: str | None, *, overwrite: bool) -> None:
-    """Write all files of a search into a folder, in place of those of an older one."""
+    """Write all files of a search into a folder."""
     place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)
     check_folder(place, overwrite=overwrite)
     names = _design_names(search)
     for name, each in zip(names, search.front, strict=True):
         if (text := _design_text(search, each)) is not None:
-            with writing(place / name, DESIGN_FILE[".toml"], overwrite=overwrite) as file:
+            with writing(place / name, overwrite=overwrite) as file:
                 file.write(text.encode())
-    _remove_older(place, names)
+    if overwrite:
+        _remove_older(place, names)
     search.save_table(place / "front.csv", unit=unit or "m", overwrite=overwrite)
     search.save_table(place / "candidates.csv", every=True, unit=unit or "m", overwrite=overwrite)
     search.save_report(place / "report.html", unit=unit, overwrite=overwrite)
@@ -111,7 +104,8 @@ def write_table(
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     length = float(str(search.attributes["length"]))
     table = design_table(search, as_unit(unit, length), every=as_flag("every", every))
-    with writing(path, format_of(path, TABLE), overwrite=overwrite) as file:
+    format_of(path, TABLE)
+    with writing(path, overwrite=overwrite) as file:
         file.write(table.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode())
 
 

@@ -18,7 +18,7 @@ from softreach.optimization.report import (
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import SoftreachError, counted
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, check_installed, format_of, text_with
+from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
 from softreach.support.files.templates import page_template, png_source
 from softreach.support.units import as_unit
 
@@ -27,14 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["REPORT", "check_libraries", "write_report"]
 
-REPORT: Formats = {
-    ".html": FileKind(
-        "a report of a search",
-        text_with("<!doctype html", "softreach search"),
-        ("jinja2",),
-        "paper",
-    )
-}
+REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
 
 _DPI = 160
@@ -54,7 +47,7 @@ def write_report(
 ) -> None:
     """Write the numbers, requirements, front and pictures of a search."""
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    kind = format_of(path, REPORT)
+    format_of(path, REPORT)
     check_libraries()
     template = page_template("softreach.optimization", "report.html.jinja")
     length = float(str(search.attributes["length"]))
@@ -78,7 +71,7 @@ def write_report(
         requirements=search.problem.requirements.to_toml(),
         design=_design(search),
     )
-    with writing(path, kind, overwrite=overwrite) as file:
+    with writing(path, overwrite=overwrite) as file:
         file.write(page.encode())
 
 

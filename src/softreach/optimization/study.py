@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -52,7 +53,7 @@ class Study:
             first: Number of designs, evenly spread, that come before those of the sampler.
 
         Raises:
-            InvalidInput: The storage cannot be opened or belongs to another search.
+            InvalidInput: The storage cannot be opened, or belongs to another search or program.
             MissingExtra: Optuna is not installed.
         """
         self.problem, self._first = problem, first
@@ -130,7 +131,7 @@ class Study:
         try:
             return optuna.create_study(
                 study_name=_NAME,
-                storage=None if place is None else _storage(optuna, place),
+                storage=None if place is None else _storage(place),
                 directions=["minimize"] * max(1, len(self.problem.goals)),
                 sampler=self._made_sampler(self.seed),
                 load_if_exists=True,
@@ -226,17 +227,55 @@ def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
         yield {each.name: each.at(float(x)) for each, x in zip(free, place, strict=True)}
 
 
-def _storage(optuna: Any, place: str) -> Any:
+def _storage(place: str) -> Any:
+    """Optuna's storage in a file, which is new or was begun by a search; others stay as they are.
+
+    A line that a killed process or a full disk cut off is removed: Optuna would append to it, and
+    could not read the journal from then on.
+    """
     path = Path(place)
-    if not path.parent.is_dir() or path.is_dir():
+    if not path.parent.is_dir() or (path.exists() and not path.is_file()):
         allowed = "a file in a folder that exists"
         raise InvalidInput("storage", place, allowed)
-    if path.suffix in (".db", ".sqlite", ".sqlite3"):
+    is_new = not path.exists() or not path.stat().st_size
+    is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
+    if not is_new and not (_is_own_database if is_database else _is_own_journal)(path):
+        raise InvalidInput("storage", place, "a new file, or that of a search: choose another name")
+    if is_database:
         return f"sqlite:///{path}"
     from optuna.storages import JournalStorage
-    from optuna.storages.journal import JournalFileBackend
+    from optuna.storages.journal import JournalFileBackend, JournalFileSymlinkLock
 
+    if not is_new:
+        lock = JournalFileSymlinkLock(str(path))
+        lock.acquire()  # another process may be in the middle of a line
+        try:
+            with path.open("r+b") as file:
+                file.truncate(file.read().rfind(b"\n") + 1)
+        finally:
+            lock.release()
     return JournalStorage(JournalFileBackend(str(path)))
+
+
+def _is_own_journal(path: Path) -> bool:
+    with path.open("rb") as file:
+        line = file.readline(4096)
+    try:
+        first = json.loads(line)
+        return first["op_code"] == 0 and first["study_name"] == _NAME
+    except (ValueError, KeyError, TypeError):
+        return False
+
+
+def _is_own_database(path: Path) -> bool:
+    import sqlite3
+
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+            names = database.execute("SELECT study_name FROM studies").fetchall()
+        return set(names) <= {(_NAME,)}
+    except sqlite3.Error:
+        return False
 
 
 def _library() -> Any:

@@ -9,14 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, text_with
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-_NOTES = FileKind("what a part of the report found", text_with('"folder": null,\n "part": '))
 
 
 @dataclass(frozen=True)
@@ -38,8 +34,6 @@ class Notebook:
     part: str
     key: Mapping[str, Any]
     """Everything that the results depend on; a notebook of another key is stale."""
-    overwrite: bool = False
-    """True if files of other kinds may be replaced."""
     numbers: dict[str, Any] = field(default_factory=dict)
     pictures: list[Picture] = field(default_factory=list)
     seconds: float = 0.0
@@ -53,7 +47,7 @@ class Notebook:
         from softreach.plot.style import pyplot, save_figure
 
         for suffix in ("png", "pdf"):
-            save_figure(figure, self.folder / f"{name}.{suffix}", overwrite=self.overwrite)
+            save_figure(figure, self.folder / f"{name}.{suffix}", overwrite=True)
         pyplot().close(figure.get_figure(root=True))
         self.pictures.append(Picture(label, name, caption))
 
@@ -61,8 +55,7 @@ class Notebook:
         """Write what was found; the last act, so that a file means a finished part."""
         self.seconds = seconds
         content = asdict(self) | {"folder": None, "key": dict(self.key)}
-        del content["overwrite"]
-        with writing(self._file, _NOTES, overwrite=self.overwrite) as file:
+        with writing(self._file, overwrite=True) as file:
             file.write(json.dumps(content, indent=1).encode())
 
     @classmethod

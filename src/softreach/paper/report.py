@@ -13,20 +13,9 @@ from typing import Any
 from softreach.paper.claims import CLAIMS, Verdict
 from softreach.paper.notebook import Notebook, Settings
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, text_with
 from softreach.support.files.templates import page_template, png_source
 
-__all__ = ["REPORT", "report_template", "write_report"]
-
-REPORT: Formats = {
-    ".html": FileKind(
-        "an older report",
-        text_with("<title>Minimal activation with maximal reach"),
-        ("jinja2",),
-        "paper",
-    )
-}
-"""Files that are written in the end."""
+__all__ = ["report_template", "write_report"]
 
 _NARROW = 900  # pixels; two such figures stand side by side
 
@@ -46,7 +35,7 @@ def write_report(
         notebooks: What each part found, by name.
         settings: The sizes it was computed with.
         quick: Whether these are small ones.
-        overwrite: Whether it may replace any file, and not only an older report.
+        overwrite: Whether it may replace a file.
 
     Returns:
         The file.
@@ -66,7 +55,7 @@ def write_report(
         version=version("softreach"),
         date=f"{datetime.now(UTC):%Y-%m-%d}",
     )
-    with writing(path, REPORT[".html"], overwrite=overwrite) as file:
+    with writing(path, overwrite=overwrite) as file:
         file.write(page.encode())
     return path
 

@@ -18,7 +18,7 @@ from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import PAGES, PICTURES, format_of
+from softreach.support.files.formats import PAGES, PICTURES, format_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,22 +94,24 @@ def save_figure(
     Args:
         figure: The figure, or axes in it.
         path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace any file, and not only a picture of that format.
+        overwrite: Whether it may replace a file.
 
     Raises:
-        InvalidInput: Unknown suffix, or something else is there.
+        InvalidInput: Unknown suffix, or something is there.
         NotWritten: It cannot be written.
     """
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     if isinstance(figure, Figure3D):
-        with writing(path, format_of(path, PAGES), overwrite=overwrite) as file:
+        format_of(path, PAGES)
+        with writing(path, overwrite=overwrite) as file:
             file.write(figure.html.encode())
         return
     if not hasattr(figure, "get_figure") or isinstance(figure, type):
         allowed = "a figure or axes of matplotlib, or one of plot_3d"
         raise InvalidInput("figure", as_given(figure), allowed)
-    kind, suffix = format_of(path, PICTURES), Path(path).suffix.lower()
-    with pyplot().rc_context(_SAVING), writing(path, kind, overwrite=overwrite) as file:
+    format_of(path, PICTURES)
+    suffix = Path(path).suffix.lower()
+    with pyplot().rc_context(_SAVING), writing(path, overwrite=overwrite) as file:
         root = figure.get_figure(root=True)
         if root is not None:
             root.savefig(file, dpi=DPI, format=suffix[1:], **_encoding(suffix))

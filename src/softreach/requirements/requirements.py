@@ -29,15 +29,9 @@ from softreach.support.arguments import (
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, text_with
 from softreach.support.files.text import read_text
 
 __all__ = ["Requirements"]
-
-REQUIREMENTS_FILE: Formats = {
-    ".toml": FileKind("a file of requirements", text_with("softreach requirements"))
-}
-"""Kind of file that requirements are saved as, and replace."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,11 +148,11 @@ class Requirements:
         return written(self)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-        """Write a TOML file; an older one of requirements is replaced.
+        """Write a TOML file.
 
         Args:
             path: The file.
-            overwrite: Replace any file.
+            overwrite: Whether it may replace a file.
 
         Raises:
             InvalidInput: Something else is there.
@@ -166,7 +160,7 @@ class Requirements:
         """
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         text = self.to_toml()
-        with writing(path, REQUIREMENTS_FILE[".toml"], overwrite=overwrite) as stream:
+        with writing(path, overwrite=overwrite) as stream:
             stream.write(text.encode())
 
     def __repr__(self) -> str:

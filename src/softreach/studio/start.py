@@ -17,7 +17,6 @@ from softreach.studio.snapshots import Snapshot
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.files.atomic import replacing
-from softreach.support.files.kinds import FileKind, text_with
 from softreach.support.files.text import read_text
 
 
@@ -84,7 +83,6 @@ def user_folder() -> Path:
 
 _LARGEST = 1 << 20  # bytes of a file
 _MOST = 200  # files that are read
-_STATE = FileKind("a state of the studio", text_with("softreach_studio"))
 
 
 class KeptWork:
@@ -144,8 +142,7 @@ class KeptWork:
         try:
             with (
                 self._writing,
-                # Whatever is in a folder of ours by that name is an older one, complete or not.
-                replacing(self._folder / name, _STATE, overwrite=True, durable=False) as partial,
+                replacing(self._folder / name, overwrite=True) as partial,
             ):
                 partial.write_text(text, encoding="utf-8")
         except (SoftreachError, OSError) as error:

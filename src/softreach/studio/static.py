@@ -40,7 +40,7 @@ from softreach.support.errors import (
     no_warnings,
 )
 from softreach.support.files.atomic import check_place, writing
-from softreach.support.files.kinds import FileKind, check_installed, text_with
+from softreach.support.files.formats import check_installed
 from softreach.support.progress import Progress, silent
 from softreach.support.quantity import quantity
 from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
@@ -54,9 +54,6 @@ _DETAIL = Detail(triangles=13_000, sides=24, stations=41)
 _LOOKED_AT = 20_000  # corners of a computed surface whose distance to the drawn one is measured
 _MARK = "// softreach design of a static page"
 _FOLDER = "designs"
-
-_PAGE = FileKind("a static page of designs", text_with("<!doctype html", "softreach static page"))
-_DESIGN = FileKind("a design of a static page", text_with(_MARK))
 
 _NUMBERS = {
     3: {"volume": 3, "unreachability": 0, "convex_volume": 3},
@@ -94,14 +91,14 @@ def write_static(
     """Write a page with sliders that shows the reachable set of each design of a grid.
 
     Designs whose files are there are not computed again: an interrupted call goes on, and a finer
-    grid takes what a coarser one has. Nothing in the folder is replaced but an older page.
+    grid takes what a coarser one has.
 
     Args:
         space: A grid of at most 1,000 designs.
         folder: Where `index.html` and a folder of designs go.
         unit: Of lengths: "m", "cm", "mm" or "L"; that of the design file if left out.
         title: Of the page.
-        overwrite: Whether other files may be replaced.
+        overwrite: Whether a page that is there may be replaced.
         progress: Called with the number of designs done.
 
     Raises:
@@ -115,20 +112,17 @@ def write_static(
     if space.layout != "grid" or space.size > _MOST:
         raise InvalidInput("designs", f"{space.size:,}", f"a grid of {_MOST:,} at most")
     index = place / "index.html"
-    check_place(index, _PAGE, overwrite=overwrite, name="static")
+    check_place(index, overwrite=overwrite, name="static")
     base = space.base
     shown = base.display_unit if unit is None else unit
     name = as_unit(handy_unit(base.length) if shown is None else shown, base.length).name
-    tasks = (
-        partial(_design, space, number, name, place / _FOLDER, overwrite)
-        for number in range(space.size)
-    )
+    tasks = (partial(_design, space, number, name, place / _FOLDER) for number in range(space.size))
     entries: list[_Entry] = []
     for entry in parallel.in_order(tasks):
         entries.append(entry)
         progress(1)
     page = _page(space, entries, name, title)
-    with writing(index, _PAGE, overwrite=overwrite, name="static") as file:
+    with writing(index, overwrite=overwrite) as file:
         file.write(page.encode())
     kept = {entry.file for entry in entries if entry.file is not None}
     _remove_older(place / _FOLDER, kept)
@@ -147,7 +141,7 @@ class _Entry(NamedTuple):
     computed: bool
 
 
-def _design(space: DesignSpace, number: int, unit: str, folder: Path, overwrite: bool) -> _Entry:
+def _design(space: DesignSpace, number: int, unit: str, folder: Path) -> _Entry:
     """A design from its file, or computed and written there."""
     try:
         arm = space.design(number)
@@ -160,7 +154,7 @@ def _design(space: DesignSpace, number: int, unit: str, folder: Path, overwrite:
     with parallel.undivided(), no_warnings():
         content = _content(arm, as_unit(unit, arm.length))
     body = f"receive({json.dumps(key)}, {script_text(content)});\n"
-    with writing(path, _DESIGN, overwrite=overwrite, name="static") as file:
+    with writing(path, overwrite=True) as file:
         file.write(f"{_MARK} {key} {_digest(body)}\n{body}".encode())
     return _Entry(_brief(content), path, True)
 
@@ -198,8 +192,8 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 def _remove_older(folder: Path, kept: set[Path]) -> None:
     """Remove designs that the page no longer shows."""
     for path in folder.glob("*.js"):
-        with suppress(OSError):
-            if path not in kept and _DESIGN.recognizes(path):
+        with suppress(OSError, UnicodeDecodeError):
+            if path not in kept and path.read_text("utf-8").startswith(_MARK):
                 path.unlink()
 
 

@@ -158,10 +158,9 @@ class NotWritten(SoftreachError, OSError):
         errno: The system's number of the reason, or 0.
     """
 
-    def __init__(self, path: str, number: int, reason: str, hint: str = "") -> None:
+    def __init__(self, path: str, number: int, reason: str) -> None:
         super().__init__(number, reason)
-        message = f"{in_short(path)} cannot be written: {' '.join(reason.split())}"
-        self._message = f"{message}; {hint}" if hint else message
+        self._message = f"{in_short(path)} cannot be written: {' '.join(reason.split())}"
 
     def __str__(self) -> str:
         return self._message

@@ -16,6 +16,8 @@ from functools import cache, partial
 from itertools import chain, islice
 from typing import Any, TypeVar
 
+from softreach.support.interruption import check_stopped
+
 __all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count", "threads_here", "undivided"]
 
 Result = TypeVar("Result")
@@ -137,6 +139,7 @@ _HERE = _Here()
 
 
 def _check_wanted() -> None:
+    check_stopped()
     if _HERE.wanted is not None:
         _HERE.wanted.check()
 

@@ -5,12 +5,11 @@ from softreach.arm.design_file.read import (
     LONGEST,
     Parts,
     document_of,
-    is_design,
     parse,
     text_of,
 )
 from softreach.arm.design_file.write import display_text, render
-from softreach.support.files.kinds import FileKind, Formats
+from softreach.support.files.formats import FileFormat, Formats
 
 __all__ = [
     "DESIGN_FILE",
@@ -24,5 +23,5 @@ __all__ = [
     "text_of",
 ]
 
-DESIGN_FILE: Formats = {".toml": FileKind("a design file", is_design)}
-"""Kind of file that a design is saved as, and replaces."""
+DESIGN_FILE: Formats = {".toml": FileFormat()}
+"""Format that a design is saved in."""

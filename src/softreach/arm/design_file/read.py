@@ -35,11 +35,11 @@ from softreach.arm.rest_shape import STRAIGHT, RestShape
 from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import PLACE, Located, Stations, placed
-from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
+from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 from softreach.support.files.text import read_text
 from softreach.support.units import UNITS
 
-__all__ = ["LONGEST", "Parts", "document_of", "is_design", "parse", "text_of"]
+__all__ = ["LONGEST", "Parts", "document_of", "parse", "text_of"]
 
 LONGEST = 250_000
 """Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
@@ -86,15 +86,6 @@ def text_of(path: str | PathLike[str]) -> str:
         InvalidInput: No file that can be read, one too large to be a design, or no text in UTF-8.
     """
     return read_text("design", path, LONGEST)
-
-
-def is_design(path: str | PathLike[str]) -> bool:
-    """True if a file has the tables of a design and no others, whatever is in them."""
-    try:
-        tables = set(document_of(text_of(path), ""))
-    except SoftreachError:
-        return False
-    return {name for name, (_, required) in LAYOUT.items() if required} <= tables <= set(LAYOUT)
 
 
 def document_of(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from io import BufferedWriter
 from itertools import chain
@@ -21,7 +20,7 @@ from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
-from softreach.support.files.kinds import FileKind, Formats
+from softreach.support.files.formats import FileFormat, Formats
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +88,7 @@ def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
         path: NAME.csv; each file is replaced only when the new one is complete.
-        overwrite: Whether they may replace any files, and not only such a pair.
+        overwrite: Whether they may replace files.
 
     Raises:
         InvalidInput: No cloud, one of an arm that ActiveFilaments.jl cannot have, or something else
@@ -98,11 +97,10 @@ def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool
     """
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     filament = filament_of(design_of(schema.check_cloud(cloud)))
-    kind = CLOUD_PAIR[".csv"]
-    check_place(path, kind, overwrite=overwrite)
-    with writing(gamma_path(path), kind, overwrite=overwrite) as file:
+    check_place(path, overwrite=overwrite)
+    with writing(gamma_path(path), overwrite=overwrite) as file:
         _write(file, cloud["activation"].values, filament)
-    with writing(path, kind, overwrite=overwrite) as file:
+    with writing(path, overwrite=overwrite) as file:
         _write(file, cloud["tip"].values)
 
 
@@ -115,22 +113,7 @@ def _write(file: BufferedWriter, values: Array, filament: Filament | None = None
         file.write(text.encode("ascii"))
 
 
-def _is_of_pair(path: Path) -> bool:
-    """True if a file holds numbers alone, and the other file of a cloud is beside it."""
-    tips = path.with_name(f"{path.stem.removesuffix(_ENDING)}{path.suffix}")
-    if not (tips.is_file() and gamma_path(tips).is_file()):
-        return False
-    with path.open("rb") as file:
-        first = file.readline(1 << 16)
-    try:
-        return all(math.isfinite(float(part)) for part in first.split(b","))
-    except ValueError:
-        return False
-
-
-CLOUD_PAIR: Formats = {
-    ".csv": FileKind("one of NAME.csv and NAME_gamma.csv of numbers alone", _is_of_pair)
-}
+CLOUD_PAIR: Formats = {".csv": FileFormat()}
 """Format of `write_cloud`."""
 
 

@@ -16,21 +16,18 @@ from softreach.exchange.activefilaments.filament import (
 )
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, beginning_with
+from softreach.support.files.formats import FileFormat, Formats
 
 __all__ = ["FILAMENT_SCRIPT", "design_script", "write_design"]
 
-_TITLE = "# The filament of ActiveFilaments.jl with the tips of a design of softreach."
-_HEAD = f"""\
-{_TITLE}
+_HEAD = """\
+# The filament of ActiveFilaments.jl with the tips of a design of softreach.
 # Lengths in m, angles in rad, E in Pa, density in kg/m^3.
 using ActiveFilaments
 """
 
 
-FILAMENT_SCRIPT: Formats = {
-    ".jl": FileKind("a filament's definition by softreach", beginning_with(_TITLE.encode()))
-}
+FILAMENT_SCRIPT: Formats = {".jl": FileFormat()}
 """Format of `write_design`."""
 
 
@@ -40,7 +37,7 @@ def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool
     Args:
         arm: The design.
         path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace any file, and not only a definition that softreach wrote.
+        overwrite: Whether it may replace a file.
 
     Raises:
         InvalidInput: The arm has what no filament there has: another profile than a linear taper,
@@ -49,7 +46,7 @@ def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool
     """
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     script = design_script(arm)
-    with writing(path, FILAMENT_SCRIPT[".jl"], overwrite=overwrite) as file:
+    with writing(path, overwrite=overwrite) as file:
         file.write(script.encode())
 
 

@@ -1,47 +1,29 @@
-"""Zarr stores that let no damage through: one checksum a chunk, and one digest of all the rest.
+"""Zarr stores that let no damage through: crc32c in each chunk, sha256 of the documents.
 
-Every chunk ends with the checksum of Zarr's crc32c codec. The root lists the digest of what
-describes each array, and ends with its own: any change of any file is noticed when it is read.
-Chunks that are written only once are listed with their checksums, by what describes their array or
-by the root, so that a whole chunk of another store or place is noticed too. Stores of earlier
-versions have no such lists.
+The root lists the sha256 of the `zarr.json` of each array, and ends with its own. So a changed bit
+of any file is noticed when the file is read, and so is a missing chunk, which Zarr itself reads as
+fill values. A whole chunk of another place, or an older copy of the store, is not noticed.
 """
 
 from __future__ import annotations
 
 import asyncio
 import copy
+import hashlib
 import json
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import google_crc32c
 from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
 
-from softreach.support.errors import InvalidInput
-from softreach.support.files.atomic import sync_file_in
-from softreach.support.files.damage import (
-    DOCUMENT,
-    MISPLACED,
-    Chunk,
-    DamagedStore,
-    Watch,
-    storage_errors,
-)
-from softreach.support.files.documents import (
-    ARRAYS,
-    CHUNKS,
-    Broken,
-    check_kind,
-    described,
-    digest_of,
-    parsed,
-    sealed,
-    unsealed,
-)
-from softreach.support.files.kinds import first_entry
+from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.files.atomic import place_to_read, sync
 
 if TYPE_CHECKING:
     import zarr
@@ -52,11 +34,11 @@ if TYPE_CHECKING:
 Kind = Literal["cloud", "atlas"]
 Mode = Literal["r", "r+"]
 
-REMEDY = {
-    "cloud": "compute the cloud again, or bring back a copy",
-    "atlas": "the command that built the atlas computes again what is damaged",
-}
-"""Remedy of damage, by the kind of store."""
+ROOT = "zarr.json"
+ARRAYS, DIGEST = "arrays", "sha256"
+"""Attributes of a root: digest of each array's document by the array's name; digest of the root."""
+BLANK = "0" * 64
+"""What stands in place of a root's own digest when that is computed."""
 READING: Mapping[str, Any] = {
     "consolidated": False,
     "zarr_format": 3,
@@ -65,8 +47,95 @@ READING: Mapping[str, Any] = {
 }
 """Options with which xarray reads a store: as it was written, and numbers as numbers."""
 
+_REMEDY = {
+    "cloud": "compute the cloud again, or bring back a copy",
+    "atlas": "the command that built the atlas computes again what is damaged",
+}
 _ALLOWED = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
+_KEY = re.compile(r"([^/]+)/c((?:/\d+)*)", re.ASCII)
+_PARTIAL = re.compile(r"\.[0-9a-f]{32}\.partial$")  # what a killed writer of Zarr leaves
 _CHECKSUM = 4  # bytes at the end of every chunk, by the crc32c codec
+
+
+class StoreFailed(SoftreachError):
+    """The store cannot be written to, for instance because the disk is full; it can be resumed."""
+
+
+class DamagedStore(InvalidInput):
+    """A store that holds something else than softreach wrote.
+
+    Attributes:
+        location: The store.
+        array: Which of its arrays; empty for the store itself.
+        chunk: Which chunk of the array, such as (0, 3); None for what describes the array.
+    """
+
+    def __init__(self, location: object, chunk: Chunk, found: str, remedy: str) -> None:
+        self.location, self.array, self.chunk = str(location), *chunk
+        place = "" if chunk.place is None else "/".join(map(str, chunk.place)) or "0"
+        what = f"chunk {place} of array {chunk.array}" if place else f"array {chunk.array}"
+        where = f"{what} in {location}" if chunk.array else f"{ROOT} of {location}"
+        super().__init__(where, found, "as softreach wrote it", remedy)
+
+
+class Chunk(NamedTuple):
+    """A file of a store: a chunk of an array, or what describes an array or the store."""
+
+    array: str
+    """Empty for the store itself."""
+    place: tuple[int, ...] | None
+    """None for what describes the array."""
+
+    @classmethod
+    def of_key(cls, key: str) -> Self | None:
+        """The file with this key, from the root of the store on; None for any other."""
+        if key == ROOT or key.endswith(f"/{ROOT}"):
+            return cls(key.removesuffix(ROOT).rstrip("/"), None)
+        if (found := _KEY.fullmatch(key)) is None:
+            return None
+        return cls(found[1], tuple(map(int, found[2].split("/")[1:])))
+
+
+@dataclass(eq=False)
+class Watch:
+    """What is known of the files of a store that is read, and what becomes of damaged ones."""
+
+    location: object
+    kind: Kind
+    required: Callable[[Chunk], bool] = lambda _: False
+    """True for chunks that must exist; others that are missing hold fill values."""
+    digests: dict[str, str] = field(default_factory=dict)
+    """Digest of what describes each array, as the root lists it."""
+    _noted: dict[Chunk, DamagedStore] | None = None
+
+    def report(self, chunk: Chunk, found: str) -> None:
+        """Raise damage, or note it where that is asked for."""
+        error = DamagedStore(self.location, chunk, found, _REMEDY[self.kind])
+        if self._noted is None:
+            raise error
+        self._noted[chunk] = error
+
+    @contextmanager
+    def noting(self) -> Iterator[dict[Chunk, DamagedStore]]:
+        """Read damaged files as missing ones, and collect what is wrong with each."""
+        before, self._noted = self._noted, {}
+        try:
+            yield self._noted
+        finally:
+            self._noted = before
+
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """Read to the end before the first damage is raised.
+
+        Zarr reads chunks at once: it would lose all errors but the first, and print them at exit.
+        """
+        with self.noting() as noted:
+            try:
+                yield
+            finally:
+                if noted:
+                    raise next(iter(noted.values())) from None
 
 
 class Opened(NamedTuple):
@@ -76,32 +145,56 @@ class Opened(NamedTuple):
     place: StorePath
     """For xarray."""
     watch: Watch
-    durable: bool = False
+    durable: bool
+
+    def check_arrays(self) -> None:
+        """Check what describes each array.
+
+        Raises:
+            DamagedStore: It is missing, or changed.
+        """
+        for name in self.watch.digests:
+            _ = self.group[name]
+
+    def check_root(self) -> None:
+        """Check that the store is still the one that was opened.
+
+        Raises:
+            StoreFailed: Another took its place, and some of what was read may be of that one.
+        """
+        import zarr
+
+        again = zarr.open_group(self.place, mode="r", zarr_format=3)
+        if again.attrs[DIGEST] != self.group.attrs[DIGEST]:
+            raise StoreFailed(
+                f"{self.watch.location} was replaced while it was read: open it again"
+            )
 
 
-def opened_root(
+def opened_store(
     location: StoreLike, kind: Kind, mode: Mode = "r", *, durable: bool = False
 ) -> Opened | None:
-    """The root of a store of softreach, if there is any.
+    """A store of softreach, if there is any.
 
     Raises:
         InvalidInput: No place of a store, or something else is there.
-        DamagedStore: What describes the store is not as softreach wrote it.
+        DamagedStore: Its root is not as softreach wrote it.
         StoreFailed: It cannot be reached.
     """
     import zarr
+    from zarr.storage import StorePath
 
-    watch = Watch(location=location, remedy=REMEDY[kind])
     if isinstance(location, str) and "://" not in location:
         if Path(location).is_file():
             raise InvalidInput("store", location, _ALLOWED[kind], "it is a file")
         if not Path(location).is_dir():
             return None
+    watch = Watch(location, kind)
     with storage_errors(f"{location} cannot be opened"):
         try:
-            place = checked_place(location, watch, mode=mode, durable=durable)
-            group = zarr.open_group(place, mode=mode, zarr_format=3)
-            return Opened(group, place, watch, durable)
+            store, path = (place := place_of(location, mode)).store, place.path
+            place = StorePath(CheckedStore(store, watch, path, durable=durable), path)
+            return Opened(zarr.open_group(place, mode=mode, zarr_format=3), place, watch, durable)
         except FileNotFoundError:
             return None
         except DamagedStore:
@@ -110,141 +203,22 @@ def opened_root(
             raise InvalidInput("store", location, _ALLOWED[kind], str(error)) from None
 
 
-def checked_place(location: Any, watch: Watch, *, mode: Mode, durable: bool = False) -> StorePath:
-    """The place, of which every file is checked when it is read."""
+def place_of(location: Any, mode: Mode) -> StorePath:
+    """The place behind a path, a URL, a mapping or a Zarr store."""
     from zarr.abc.store import Store
-    from zarr.storage import StorePath
+    from zarr.storage import FsspecStore, MemoryStore, StorePath
 
-    at = location if isinstance(location, StorePath) else None
-    inner, root = (at.store, at.path) if at else (absolute(location), "")
-    store = inner if isinstance(inner, Store) else _store(inner, mode)
-    return StorePath(CheckedStore(store, watch, root, durable=durable), root)
-
-
-def list_arrays(place: StorePath, watch: Watch) -> None:
-    """List the chunks that were written with each array, and the arrays in their root."""
-    import zarr
-
-    group = zarr.open_group(place, mode="r+", zarr_format=3)
-    for name, array in list(group.arrays()):
-        array.attrs[CHUNKS] = checksums_by_key(watch, name)
-    group.attrs[ARRAYS] = dict(watch.digests)
-
-
-def checksums_by_key(watch: Watch, *arrays: str) -> dict[str, int]:
-    """The checksums of the chunks of arrays that were written."""
-    chunks = sorted(chunk for chunk in watch.written if chunk.array in arrays)
-    return {chunk.key: watch.written[chunk] for chunk in chunks}
-
-
-def bound_checksum(watch: Watch, chunk: Chunk, content: int) -> int:
-    """The checksum of what a chunk holds, of its place and of the root of its store."""
-    return google_crc32c.value(f"{watch.root} {chunk.key} ".encode() + content.to_bytes(4))
-
-
-def check_arrays(opened: Opened) -> None:
-    """Check that the arrays of a store are there, and agree on the sizes of their dimensions.
-
-    Raises:
-        DamagedStore: One is missing or foreign, or of another size, or has no dimensions.
-    """
-    arrays = _arrays(opened)
-    sizes: dict[str, tuple[int, str]] = {}
-    for name, array in arrays.items():
-        dims = array.metadata.dimension_names or ()
-        if len(dims) != array.ndim or None in dims:
-            opened.watch.report(Chunk(name, None), f"over {dims}", f"over {array.ndim} dimensions")
-        for dim, size in zip(map(str, dims), array.shape, strict=False):
-            known, other = sizes.setdefault(dim, (size, name))
-            if known != size:
-                allowed = f"of {known} as {other} is"
-                opened.watch.report(Chunk(name, None), f"of {size} along {dim}", allowed)
-
-
-def _arrays(opened: Opened) -> dict[str, Any]:
-    """The arrays of a store; on disk, one looks first at what describes each.
-
-    Zarr opens all at once and loses every error but the first; it would be printed in the end.
-    """
-    watch = opened.watch
-    if isinstance(watch.location, str) and "://" not in watch.location:
-        for path in sorted(Path(watch.location).glob(f"*/{DOCUMENT}")):
-            chunk = Chunk(path.parent.name, None)
-            try:
-                described(watch, chunk, _bytes_of(path))
-            except Broken as broken:
-                watch.report(chunk, broken.found, broken.allowed)
-    arrays = dict(opened.group.arrays())
-    for name in watch.digests:
-        if name not in arrays:
-            watch.report(Chunk(name, None), "missing")
-    return arrays
-
-
-def _bytes_of(path: Path) -> bytes:
-    """Content of a file that describes a store or an array.
-
-    Raises:
-        Broken: It is no file.
-    """
-    if path.is_dir() or _is_endless(path):
-        raise Broken("no file")
-    return path.read_bytes()
-
-
-def _is_endless(path: Path) -> bool:
-    """True if a pipe or a device is in the place of a file: reading it would never end."""
-    return path.exists() and not (path.is_file() or path.is_dir())
-
-
-def absence(location: StoreLike) -> str:
-    """Reason why there is no store at a place: it does not exist, or holds something else."""
-    if isinstance(location, str) and "://" not in location and Path(location).exists():
-        return "there is none in it"
-    return "it does not exist"
-
-
-def kind_of(path: str | os.PathLike[str]) -> Kind:
-    """The kind of a store on disk.
-
-    Raises:
-        InvalidInput: No store of softreach.
-    """
-    return "atlas" if "command" in attributes_of(path) else "cloud"
-
-
-def attributes_of(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """Attributes of a store on disk.
-
-    Raises:
-        InvalidInput: No store of softreach.
-    """
-    try:
-        return unsealed(_bytes_of(Path(path) / DOCUMENT))["attributes"]
-    except (OSError, Broken) as error:
-        reason = f"its {DOCUMENT} is {error.found}" if isinstance(error, Broken) else str(error)
-        reason = reason if Path(path).exists() else absence(os.fspath(path))
-        raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], reason) from None
-
-
-def foreign_entry(path: Path) -> str:
-    """The first thing in a folder that is none of a store of softreach; empty if there is none."""
-    try:
-        arrays = unsealed((path / DOCUMENT).read_bytes())["attributes"].get(ARRAYS)
-    except FileNotFoundError:
-        return first_entry(path)
-    except (OSError, Broken):
-        return DOCUMENT
-    known = {"", *(arrays if isinstance(arrays, dict) else ())}
-    for folder, folders, files in os.walk(path):
-        inside = Path(folder).relative_to(path)
-        for name in sorted([*folders, *files]):
-            key = (inside / name).as_posix()
-            # A folder is one of an array, or holds its chunks.
-            chunk = Chunk.of_key(key if name in files or "/" in key else f"{key}/c")
-            if chunk is None or chunk.array not in known:
-                return key
-    return ""
+    if isinstance(location, StorePath):
+        return location
+    if isinstance(location, dict):
+        location = MemoryStore(location)
+    elif isinstance(location, str) and "://" in location:
+        location = FsspecStore.from_url(location)
+    elif isinstance(location, str | os.PathLike):
+        location = LocalStore(Path(location), read_only=mode == "r")
+    elif not isinstance(location, Store):
+        location = FsspecStore.from_mapper(location)
+    return StorePath(location)
 
 
 def absolute(location: StoreLike) -> StoreLike:
@@ -286,103 +260,146 @@ class CheckedStore(WrapperStore[Any]):
         Raises:
             DamagedStore: It is not what was written, or it is missing.
         """
-        chunk = self._chunk(key)
-        if isinstance(self._store, LocalStore) and _is_endless(self._store.root / key):
-            if chunk is not None:
-                self.watch.report(chunk, "no file")
-            return None
         content = await super().get(key, prototype, byte_range)
-        if chunk is None or (chunk.place is None and content is None):
-            return content
-        try:
-            if chunk.place is None:
-                return self._document(chunk, content)
-            self._check(chunk, content)
-        except Broken as broken:
-            self.watch.report(chunk, broken.found, broken.allowed)
-            return None
-        return content
+        chunk = self._chunk(key)
+        fault = self._fault(chunk, content) if chunk else ""
+        if chunk and fault:
+            self.watch.report(chunk, fault)
+        return None if fault else content
 
     async def set(self, key: str, value: Buffer) -> None:
-        """Write a file, with its digest if it describes the store."""
-        await super().set(key, self._written(key, value))
-        await self._sync(key)
+        """Write a file.
 
-    async def set_if_not_exists(self, key: str, value: Buffer) -> None:
-        """Write a file unless it exists."""
-        await super().set_if_not_exists(key, self._written(key, value))
-        await self._sync(key)
+        Raises:
+            StoreFailed: It describes an array otherwise than the root lists.
+        """
+        chunk = self._chunk(key)
+        listed = self.watch.digests.get(chunk.array) if chunk and chunk.place is None else None
+        if listed and listed != sha256(value.to_bytes()):
+            raise StoreFailed(f"{key} of {self.watch.location} was written by another Zarr release")
+        await super().set(key, value)
+        if self.durable and isinstance(self._store, LocalStore):
+            await asyncio.to_thread(_sync_in, self._store.root / key, self._store.root)
+
+    async def list_dir(self, prefix: str) -> AsyncIterator[str]:
+        """The arrays of the root, without what killed writers or others left beside them."""
+        async for name in super().list_dir(prefix):
+            if name in self.watch.digests:
+                yield name
 
     def _chunk(self, key: str) -> Chunk | None:
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
 
-    def _document(self, chunk: Chunk, content: Any) -> Buffer:
-        """Description of the store or one of its arrays, without digests and checksums."""
-        text = content.to_bytes()
-        if chunk.array:
-            document = described(self.watch, chunk, text)
-        else:
-            document = unsealed(text)
-            self.watch.root = digest_of(document)
-            digests = document["attributes"].get(ARRAYS)
-            if isinstance(digests, dict):
-                self.watch.digests, self.watch.listed = digests, True
-        self.watch.listed_checksums |= document["attributes"].pop(CHUNKS, {})
-        return type(content).from_bytes(json.dumps(document).encode())
-
-    def _check(self, chunk: Chunk, content: Buffer | None) -> None:
-        """Check the checksum of a chunk, and that it is of this store and place."""
+    def _fault(self, chunk: Chunk, content: Buffer | None) -> str:
+        """What is wrong with a file; empty if nothing is."""
+        watch = self.watch
         if content is None:
-            if self.watch.required(chunk):
-                raise Broken("missing")
-            return
+            needed = chunk.array in watch.digests if chunk.place is None else watch.required(chunk)
+            return "missing" if needed else ""
+        if chunk.place is None:
+            try:
+                return self._fault_of_document(chunk.array, content.to_bytes())
+            except ValueError as error:
+                return str(error)
         numbers: Any = content.as_numpy_array()
-        if len(numbers) <= _CHECKSUM:
-            raise Broken(f"{len(numbers)} bytes long")
-        checksum = _checksum(content)
-        if google_crc32c.value(numbers[:-_CHECKSUM]) != checksum:
-            raise Broken("of a wrong checksum")
-        listed = self.watch.listed_checksums.get(chunk.key, checksum)
-        if listed != checksum or not self.watch.belongs(chunk, checksum):
-            raise Broken(MISPLACED)
+        checksum = google_crc32c.value(numbers[:-_CHECKSUM]).to_bytes(_CHECKSUM, "little")
+        whole = len(numbers) > _CHECKSUM and numbers[-_CHECKSUM:].tobytes() == checksum
+        return "" if whole else "of a wrong checksum"
 
-    def _written(self, key: str, value: Buffer) -> Buffer:
-        """Bytes that are written for a value: the root with its digest, all else as it is."""
-        chunk = self._chunk(key)
-        if chunk is None:
-            return value
-        if chunk.place is not None:
-            self.watch.written[chunk] = _checksum(value)
-            return value
-        if not chunk.array:
-            return type(value).from_bytes(sealed(value.to_bytes()))
-        check_kind(document := parsed(value.to_bytes()))
-        digest = digest_of(document)
-        if self.watch.listed and self.watch.digests.get(chunk.array) != digest:
-            allowed = "as the release of Zarr that began the store describes it"
-            raise InvalidInput(f"array {chunk.array}", "described otherwise", allowed)
-        self.watch.digests[chunk.array] = digest
-        return value
-
-    async def _sync(self, key: str) -> None:
-        if self.durable and isinstance(self._store, LocalStore):
-            await asyncio.to_thread(sync_file_in, self._store.root / key, self._store.root)
+    def _fault_of_document(self, array: str, text: bytes) -> str:
+        if not array:
+            self.watch.digests = unsealed(text)[ARRAYS]
+            return ""
+        same = self.watch.digests.get(array) == sha256(text)
+        return "" if same else "changed since it was written"
 
 
-def _store(location: Any, mode: Mode) -> Store:
-    """The store behind a path, a URL or a mapping."""
-    from zarr.storage import FsspecStore, MemoryStore
-
-    if isinstance(location, dict):
-        return MemoryStore(location)
-    if not isinstance(location, str):
-        return FsspecStore.from_mapper(location)
-    if "://" in location:
-        return FsspecStore.from_url(location)
-    return LocalStore(location, read_only=mode == "r")
+def _sync_in(path: Path, root: Path) -> None:
+    """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
+    sync(path)
+    for folder in path.parents:
+        sync(folder)
+        if folder == root:
+            return
 
 
-def _checksum(content: Buffer) -> int:
-    """The checksum at the end of a chunk."""
-    numbers: Any = content.as_numpy_array()
-    return int.from_bytes(numbers[-_CHECKSUM:].tobytes(), "little")
+def sha256(text: bytes) -> str:
+    """The digest of a text, as hexadecimal digits."""
+    return hashlib.sha256(text).hexdigest()
+
+
+def sealed(text: bytes) -> bytes:
+    """A root with its digest instead of `BLANK`."""
+    return text.replace(BLANK.encode(), sha256(text).encode())
+
+
+def unsealed(text: bytes) -> dict[str, Any]:
+    """Attributes of a root.
+
+    Raises:
+        ValueError: It was changed, or is not of softreach.
+    """
+    try:
+        attributes = json.loads(text)["attributes"]
+        if sealed(text.replace(attributes[DIGEST].encode(), BLANK.encode())) == text:
+            return {ARRAYS: {}, **attributes}
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        pass
+    raise ValueError("changed since it was written, or not of softreach")
+
+
+def seal(folder: Path) -> None:
+    """List what describes the arrays of a new store on disk in its root."""
+    digests = {
+        path.parent.name: sha256(path.read_bytes()) for path in sorted(folder.glob(f"*/{ROOT}"))
+    }
+    root = json.loads((folder / ROOT).read_bytes())
+    root["attributes"] |= {ARRAYS: digests, DIGEST: BLANK}
+    (folder / ROOT).write_bytes(sealed(json.dumps(root, indent=2).encode()))
+
+
+def attributes_of(path: str | os.PathLike[str]) -> Mapping[str, Any]:
+    """Attributes of a store on disk.
+
+    Raises:
+        InvalidInput: No store of softreach.
+    """
+    try:
+        return unsealed(Path(place_to_read(path), ROOT).read_bytes())
+    except (OSError, ValueError) as error:
+        raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], str(error)) from None
+
+
+def foreign_entry(folder: Path) -> str:
+    """The first thing in a folder that is none of a store of softreach; empty if there is none."""
+    try:
+        arrays = attributes_of(folder)[ARRAYS]
+    except InvalidInput:
+        return ROOT if (folder / ROOT).exists() else min(os.listdir(folder), default="")
+    own = {"", *arrays}
+    for parent, folders, files in os.walk(folder):
+        for name in sorted([*folders, *files]):
+            key = Path(parent, name).relative_to(folder).as_posix()
+            # A folder is one of an array, or holds its chunks.
+            chunk = Chunk.of_key(key if name in files or "/" in key else f"{key}/c")
+            if (chunk is None or chunk.array not in own) and not _PARTIAL.search(name):
+                return key
+    return ""
+
+
+def writing(location: object) -> AbstractContextManager[None]:
+    """Raise any error of writing as `StoreFailed`, with what to do."""
+    then = "; what is done is safe, and the same command continues once that is fixed"
+    return storage_errors(f"{location} cannot be written", then)
+
+
+@contextmanager
+def storage_errors(what: str, then: str = "") -> Iterator[None]:
+    """Raise any error of any kind of store as `StoreFailed`, in one line."""
+    try:
+        yield
+    except SoftreachError:
+        raise
+    except Exception as error:
+        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise StoreFailed(f"{what}: {' '.join(reason.split())}{then}") from error

@@ -1,4 +1,4 @@
-"""Text that others wrote, read up to a limit that is checked before anything is read."""
+"""Text that others wrote, read up to a limit."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ MEGABYTE = 1_000_000
 def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
     """The text of a file in UTF-8, its lines ended by line feeds whatever ended them.
 
-    Folders, pipes and devices are refused: some never end.
-
     Args:
         name: What errors call the file.
         path: Where it is.
@@ -26,40 +24,24 @@ def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
     Raises:
         InvalidInput: No such file, another kind of file, too large a one, or no text in UTF-8.
     """
-    content = _bytes_of(name, path, most)
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise _no_text(name, path, f"byte {error.start} is none") from None
-    if (place := text.find("\0")) >= 0:
-        raise _no_text(name, path, f"character {place} is NUL")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _bytes_of(name: str, path: str | os.PathLike[str], most: int) -> bytes:
     shown = os.fspath(path)
     try:
-        status = os.stat(path)
-        if not stat.S_ISREG(status.st_mode):
+        if not stat.S_ISREG(os.stat(path).st_mode):  # some never end
             raise InvalidInput(name, shown, "a file, not a folder, a pipe or a device")
-        if status.st_size > most:
-            raise _too_large(name, shown, status.st_size, most)
         with Path(path).open("rb") as stream:
             content = stream.read(most + 1)
     except FileNotFoundError:
         raise InvalidInput(name, shown, "a file that exists") from None
     except OSError as error:
         raise InvalidInput(name, shown, f"a file that can be read; {error.strerror}") from None
-    if len(content) > most:  # such as those of /proc, which tell no size
-        raise _too_large(name, shown, len(content), most)
-    return content
-
-
-def _too_large(name: str, shown: str, size: int, most: int) -> InvalidInput:
-    file = f"{shown}, of {size / MEGABYTE:,.3g} MB"
-    return InvalidInput(name, file, f"at most {most / MEGABYTE:,.3g} MB large")
-
-
-def _no_text(name: str, path: str | os.PathLike[str], why: str) -> InvalidInput:
-    allowed = f"text in UTF-8, but {why}: save it in that encoding"
-    return InvalidInput(name, os.fspath(path), allowed)
+    if len(content) > most:
+        raise InvalidInput(name, shown, f"at most {most / MEGABYTE:,.3g} MB large")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        allowed = f"text in UTF-8, but byte {error.start} is none: save it in that encoding"
+        raise InvalidInput(name, shown, allowed) from None
+    if (place := text.find("\0")) >= 0:
+        allowed = f"text in UTF-8, but character {place} is NUL: save it in that encoding"
+        raise InvalidInput(name, shown, allowed)
+    return text.replace("\r\n", "\n").replace("\r", "\n")

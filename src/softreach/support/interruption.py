@@ -1,0 +1,66 @@
+"""End of a command by a signal: Ctrl-C, a request to terminate, a terminal that is closed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+__all__ = ["INTERRUPTED", "check_stopped", "run_stoppable"]
+
+INTERRUPTED = "interrupted: nothing half-written was left behind"
+
+_came: list[int] = []  # signals that asked this process to end
+
+
+def check_stopped() -> None:
+    """Raise KeyboardInterrupt if a signal has asked for the end; called once an item.
+
+    Python loses an exception that a handler of signals raises while a finalizer runs.
+    """
+    if _came:
+        raise KeyboardInterrupt
+
+
+def run_stoppable(run: Callable[[], int]) -> int:
+    """Run a command that SIGTERM and SIGHUP end as Ctrl-C does, with one line.
+
+    They raise KeyboardInterrupt on the main thread once the kernel or the compilation that runs
+    there has ended. What ignores a signal goes on ignoring it, as under `nohup`.
+
+    Returns:
+        The exit code. If a signal came, the process ends here with 128 + its number.
+    """
+    numbers = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")]
+    heeded = [n for n in numbers if n is not None and signal.getsignal(n) is not signal.SIG_IGN]
+    code = -1
+    try:
+        for number in heeded:
+            signal.signal(number, _stop)
+        sys.unraisablehook = _unraisable
+        code = run()
+    except BaseException:  # if the terminal is gone, it may be an error of writing there
+        if not _came:
+            raise
+    for number in heeded:  # a command that is done has the exit code of its work
+        signal.signal(number, signal.SIG_IGN)
+    if not _came or code == 0:
+        return code
+    with suppress(OSError):
+        sys.stdout.flush()
+    with suppress(OSError):
+        os.write(2, f"{INTERRUPTED}\n".encode())
+    os._exit(128 + _came[0])  # else asyncio prints what Zarr had begun
+
+
+def _stop(number: int, _: object) -> None:
+    _came.append(number)
+    raise KeyboardInterrupt
+
+
+def _unraisable(lost: Any) -> None:
+    if not isinstance(lost.exc_value, KeyboardInterrupt):  # `check_stopped` raises it again
+        sys.__unraisablehook__(lost)
