@@ -119,15 +119,12 @@ class Base(Part):
 
 
 class _Reading(NamedTuple):
-    """Rotation that `points` means."""
-
     matrix: Array
     wrong: str = ""
     """Fault of `points`; empty if there is none."""
 
 
 def _as_rotation(points: Any) -> _Reading:
-    """The rotation that words or numbers mean."""
     if isinstance(points, str):
         rows = POINTS.get(points)
         return _Reading(np.array(rows or POINTS["up"]), "" if rows else _ALLOWED)

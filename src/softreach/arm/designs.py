@@ -247,7 +247,6 @@ def helical_tendon_robot() -> Manipulator:
 def _backbone(
     length: float, radius: float, matter: Material, tendons: tuple[Tendon, ...]
 ) -> Manipulator:
-    """A solid round wire."""
     wire = Ring(inner_ratio=0.0, material=matter, name="backbone")
     return Manipulator(
         profile=LinearTaper(length=length, outer_radius=radius),

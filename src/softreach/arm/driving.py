@@ -236,7 +236,6 @@ def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:
 
 
 def _by_tension(body: Manipulator, bounds: Array) -> Iterator[object]:
-    """Actuators with tendons by tension in place of those by length."""
     first = 0
     for actuator in body.actuators:
         last = first + actuator.bundles

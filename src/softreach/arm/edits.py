@@ -83,7 +83,6 @@ def with_actuator_ring(arm: Manipulator, name: str, ring: int) -> Manipulator:
 
 
 def _with_changed(arm: Manipulator, name: str, /, **changes: Any) -> Manipulator:
-    """The arm with an actuator changed."""
     return arm.replace(
         actuators=tuple(
             actuator.replace(**changes) if actuator.name == name else actuator
@@ -119,7 +118,9 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
     if len(rings) == 1:
         raise InvalidInput("rings", ring_label(arm, index), "more than one to remove one of them")
     inside = [
-        actuator.name for actuator in _in_rings(arm) if arm.section.ring(actuator.ring) is gone
+        part.name
+        for part in arm.actuators
+        if isinstance(part, SectorActuator) and arm.section.ring(part.ring) is gone
     ]
     if inside:
         hint = f"move or remove {', '.join(inside)} first"
@@ -222,7 +223,6 @@ def _moment(arm: Manipulator) -> float:
 
 
 def _rounded(value: float) -> float:
-    """Two digits, as a person would write it."""
     return float(f"{value:.2g}")
 
 
@@ -238,10 +238,6 @@ def _new_name(kind: str, taken: Iterable[str]) -> str:
     known = set(taken)
     names = (f"{kind} {number}" for number in itertools.count(1))
     return next(name for name in names if name not in known)
-
-
-def _in_rings(arm: Manipulator) -> list[SectorActuator]:
-    return [actuator for actuator in arm.actuators if isinstance(actuator, SectorActuator)]
 
 
 def _shifted(actuator: Actuator, arm: Manipulator, kept: tuple[Ring, ...]) -> Actuator:

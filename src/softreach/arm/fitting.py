@@ -70,18 +70,14 @@ def part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
     if not isinstance(arm.rest, RestShape):
         yield Fault("rest", arm.rest, "must be a RestShape, such as RestShape(curvature_x=2.0)")
-    yield from _sequence_faults(arm)
-    unit = arm.display_unit
-    if unit is not None and not (isinstance(unit, str) and unit in UNITS):
-        yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
-    yield from kind_faults(arm.actuators)
-
-
-def _sequence_faults(arm: Manipulator) -> Iterator[Fault]:
     for name, kind in (("rigid_pieces", RigidPiece), ("markers", Marker)):
         parts = getattr(arm, name)
         if not isinstance(parts, tuple | list) or not all(isinstance(x, kind) for x in parts):
             yield Fault(name, parts, f"must be {kind.__name__}s")
+    unit = arm.display_unit
+    if unit is not None and not (isinstance(unit, str) and unit in UNITS):
+        yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
+    yield from kind_faults(arm.actuators)
 
 
 def kind_faults(actuators: Any) -> Iterator[Fault]:

@@ -448,13 +448,11 @@ class Manipulator:
         )
 
     def _repr_html_(self) -> str:
-        """A small picture and the size of the arm, for notebooks."""
         from softreach.arm.skin import arm_card
 
         return arm_card(self)
 
     def _fiber_index(self, fiber: str | int) -> int:
-        """Index of a fiber architecture or muscle among the actuators, from its name or index."""
         names = {
             k: actuator.name
             for k, actuator in enumerate(self.actuators)

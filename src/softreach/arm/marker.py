@@ -42,6 +42,5 @@ class Marker(Located):
     """(x, y, z) from the center of its section, in the directors [m]."""
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + (
-            [] if self.name else [Fault("name", self.name, "must be given")]
-        )
+        unnamed = [] if self.name else [Fault("name", self.name, "must be given")]
+        return super()._faults() + unnamed

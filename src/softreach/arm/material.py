@@ -94,7 +94,8 @@ def material_record(name: str) -> MaterialRecord:
     """
     library = _library()
     if name not in library:
-        raise _unknown(name, tuple(library))
+        allowed = "a material of the library"
+        raise InvalidInput("material", name, allowed, _hint(name, tuple(library)))
     return library[name]
 
 
@@ -144,10 +145,6 @@ def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
     return MaterialRecord(
         material=material, modulus=row["modulus"], sources=sources, note=row["note"]
     )
-
-
-def _unknown(name: object, names: tuple[str, ...]) -> InvalidInput:
-    return InvalidInput("material", name, "a material of the library", _hint(name, names))
 
 
 def _hint(name: object, names: tuple[str, ...]) -> str:

@@ -74,7 +74,6 @@ class Station(float):
     name: str
 
     def __new__(cls, name: str, z: float) -> Self:
-        """The place of a name."""
         station = super().__new__(cls, z)
         station.name = name
         return station
@@ -137,8 +136,9 @@ class Number:
         if self.shape == "several":
             return self._faults_of_several(value)
         if self.shape == "triple":
-            allowed = "must be three finite numbers"
-            return [] if _is_triple(value) else [Fault(self.field, value, allowed)]
+            numbers = as_numbers(value)
+            sound = numbers.shape == (3,) and np.isfinite(numbers).all()
+            return [] if sound else [Fault(self.field, value, "must be three finite numbers")]
         if self.along is not None and isinstance(value, self.along):
             outside = [element for element in value.values if not self.allowed.admits(element)]  # pyright: ignore
             return [Fault(self.field, element, self.allowed) for element in outside]
@@ -152,22 +152,17 @@ class Number:
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
-        if self.shape in ("triple", "series", "stations", "several"):
+        if self.shape in ("triple", "series", "stations", "several") or self._is_pair(value):
             return tuple(np.asarray(value, float).tolist())
-        if value is None or (self.along is not None and isinstance(value, self.along)):
+        is_function = self.along is not None and isinstance(value, self.along)
+        if value is None or is_function or self._is_name(value):
             return value
-        if self._is_name(value):
-            return value
-        if self._is_pair(value):
-            return tuple(np.asarray(value, float).tolist())
         return int(plain(value)) if self.allowed.whole else float(plain(value))
 
     def _is_name(self, value: Any) -> bool:
-        """The name of a station, or its place with its name."""
         return self.named and isinstance(value, str | Station)
 
     def _is_pair(self, value: Any) -> bool:
-        """Two values, where the part begins and where it ends."""
         return self.pair and as_numbers(value).shape == (2,)
 
     def _faults_of_several(self, value: Any) -> list[Fault]:
@@ -247,6 +242,7 @@ def number(
 def fields_of(kind: type) -> Mapping[str, Number]:
     """Numbers of a kind of part by their fields, those of the kind itself before inherited ones."""
     numbers: dict[str, Number] = {}
+    inherited: dict[str, dataclasses.Field[Any]] = getattr(kind, "__dataclass_fields__", {})
     fields = [(owner, field) for owner in kind.__mro__ for field in _own_fields(owner)]
     known = {field.name for owner, field in fields if "number" in field.metadata or _is_ours(owner)}
     for owner, field in fields:
@@ -254,7 +250,7 @@ def fields_of(kind: type) -> Mapping[str, Number]:
         if declared is None and field.name not in known:
             declared = _plain_number(owner, field)
         if declared and field.name not in numbers:
-            optional = declared.optional or _default(kind, field.name) is None
+            optional = declared.optional or inherited[field.name].default is None
             numbers[field.name] = dataclasses.replace(declared, field=field.name, optional=optional)
     return MappingProxyType(numbers)
 
@@ -274,7 +270,8 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
         per_station: One for each station; else one for each gap between them.
     """
     stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])
-    if stations.ndim != 1 or len(stations) < 2 or not _ascends_from_0_to_1(stations):
+    ends = stations.ndim == 1 and len(stations) > 1 and stations[0] == 0.0 and stations[-1] == 1.0
+    if not ends or not np.isfinite(stations).all() or (np.diff(stations) < _NEAREST).any():
         allowed = (
             "must be two or more numbers that rise from 0 (base) to 1 (tip), "
             f"each by {_NEAREST:g} or more"
@@ -298,7 +295,6 @@ def as_numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def _own_fields(owner: type) -> list[dataclasses.Field[Any]]:
-    """Fields that a dataclass declares itself."""
     declared: dict[str, dataclasses.Field[Any]] = vars(owner).get("__dataclass_fields__", {})
     inherited = [getattr(base, "__dataclass_fields__", {}) for base in owner.__bases__]
     return [
@@ -329,20 +325,5 @@ def _is_ours(owner: type) -> bool:
 
 
 def _type_text(kind: Any) -> str:
-    """`float`, `float | None` or `tuple[float, float]`, as it is written."""
     optional = re.sub(r"typing\.Optional\[(\w+)\]", r"\1 | None", str(kind))
     return kind.__name__ if isinstance(kind, type) and str(kind).startswith("<class") else optional
-
-
-def _default(kind: type, field: str) -> Any:
-    return getattr(kind, "__dataclass_fields__")[field].default  # noqa: B009
-
-
-def _is_triple(value: Any) -> bool:
-    triple = as_numbers(value)
-    return triple.shape == (3,) and bool(np.isfinite(triple).all())
-
-
-def _ascends_from_0_to_1(stations: np.ndarray[Any, np.dtype[np.float64]]) -> bool:
-    ends = stations[0] == 0.0 and stations[-1] == 1.0
-    return bool(ends and np.isfinite(stations).all() and (np.diff(stations) >= _NEAREST).all())

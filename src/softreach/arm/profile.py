@@ -219,11 +219,7 @@ class LinearTaper(Profile):
 
 
 def _taper_to(tip_radius: Any, length: Any, outer_radius: Any, taper: Any) -> float:
-    """φ [rad] by which a cone ends with a radius; 0 if the cone is wrong anyway.
-
-    Raises:
-        InvalidDesign: No radius of a tip, or a taper beside it.
-    """
+    """φ [rad] by which a cone ends with a radius; 0 if the cone is wrong anyway."""
     positive = Range(0.0, unit="m", open_low=True)
     if not positive.admits(tip_radius):
         raise InvalidDesign([Fault("tip_radius", tip_radius, positive)])
@@ -236,8 +232,6 @@ def _taper_to(tip_radius: Any, length: Any, outer_radius: Any, taper: Any) -> fl
 
 @dataclass(frozen=True, kw_only=True)
 class _RadiiAtStations(Profile):
-    """Radii at stations."""
-
     stations_over_length: tuple[float, ...] = stations("station of a radius")
     """Z/L of the radii [-], from 0 to 1, rising."""
     radii: tuple[float, ...] = number(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from softreach.arm.profile import Profile
@@ -39,28 +37,21 @@ def body_mass(profile: Profile, section: Section) -> float:
 
 def scale_warnings(profile: Profile, section: Section) -> tuple[str, ...]:
     """One line for a length that looks like one in mm, and one for an arm that is not slender."""
-    return (*_long(profile, section), *_stout(profile))
-
-
-def _long(profile: Profile, section: Section) -> Iterator[str]:
-    length = profile.length
+    length, radius = profile.length, float(profile.radius(0.0))
+    warnings: list[str] = []
     if length >= _LONG:
         known = not section.density_faults("")
         heavy = f" and weighs {body_mass(profile, section):.3g} kg" if known else ""
-        yield (
+        warnings.append(
             f"the arm is {length:g} m long{heavy}; if that is meant in mm: lengths are in m, "
             f"{length:g} mm are {length / 1e3:g}"
         )
-
-
-def _stout(profile: Profile) -> Iterator[str]:
-    radius = float(profile.radius(0.0))
-    slenderness = profile.length / radius
-    if slenderness < _SLENDER:
+    if (slenderness := length / radius) < _SLENDER:
         meant = f"lengths are in m, {radius:g} mm are {radius / 1e3:g}"
         cause = f"if that is meant in mm: {meant}" if radius >= _WIDE else "is it a diameter?"
-        yield (
+        warnings.append(
             f"the arm is {slenderness:.3g} times as long as its outer radius at the base, "
             f"{radius:g} m, and the theory is one of slender arms, {_SLENDER:g} times or more; "
             f"{cause}"
         )
+    return tuple(warnings)

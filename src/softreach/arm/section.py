@@ -299,7 +299,6 @@ def _modulus_faults(section: Section) -> Iterator[Fault]:
 
 
 def _missing(section: Section, field: str, unit: str, why: str) -> Iterator[Fault]:
-    """A fault for each material of the section that lacks a field."""
     allowed = f"must be given in {unit} {why}"
     if section.core is not None and getattr(section.core, field) is None:
         yield Fault(f"core.{field}", None, allowed)

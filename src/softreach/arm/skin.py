@@ -294,7 +294,6 @@ def _line_tube(span: _Span, radius: float) -> Surface:
 
 
 def _lumen(span: _Span) -> Surface:
-    """A tube, round in the sections."""
     radius = 0.5 * (span.outer_ratio - span.inner_ratio) * span.arm_radius
     return tube_surface(
         span.curve(), span.directors[:, 0], span.directors[:, 1], radius, _LUMEN_SIDES

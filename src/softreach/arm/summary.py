@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
+from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.lines import line_strains
@@ -90,7 +90,8 @@ def describe(arm: Manipulator) -> DesignSummary:
     """
     check_extension(a_manipulator("arm", arm))
     tip_radius = float(arm.profile.radius(arm.length))
-    body = arm.profile, arm.section
+    body, alone = (arm.profile, arm.section), list(_alone(arm))
+    limits = (f"{part.default_name}: {part.validity}" for part in arm.actuators if part.validity)
     return DesignSummary(
         helical_angles=np.array([_angle_at_start(fiber, arm) for fiber in arm.fibers]),
         revolutions=np.array([fiber.revolution_on(*body) for fiber in arm.fibers]),
@@ -103,19 +104,14 @@ def describe(arm: Manipulator) -> DesignSummary:
             smallest_bending(arm).value * arm.length,
             largest_bending(arm).value * arm.length,
         ),
-        bundle_extension=_pairs(extension_range(alone) for alone in _alone(arm)),
-        bundle_bending=_pairs(_slender_bending(alone) for alone in _alone(arm)),
+        bundle_extension=np.array([extension_range(each) for each in alone]).reshape(-1, 2),
+        bundle_bending=np.array([_slender_bending(each) for each in alone]).reshape(-1, 2),
         bundle_strain=line_strains(arm),
         breakpoints=arm.breakpoints,
-        validity=tuple(dict.fromkeys(_validity(each) for each in arm.actuators if each.validity)),
+        validity=tuple(dict.fromkeys(limits)),
         warnings=design_warnings(arm),
         **_of_matter(arm),
     )
-
-
-def _pairs(values: Iterator[tuple[float, float]]) -> Array:
-    """Shape (n, 2), also of none."""
-    return np.array(list(values)).reshape(-1, 2)
 
 
 def _of_matter(arm: Manipulator) -> dict[str, Any]:
@@ -134,14 +130,9 @@ def _of_matter(arm: Manipulator) -> dict[str, Any]:
 
 
 def _lacking(what: str, faults: list[Fault], known: str) -> Iterator[str]:
-    """Property to give, and what is known then."""
     if faults:
         owners = dict.fromkeys(fault.path.rpartition(".")[0] for fault in faults)
         yield f"give {what} of {', '.join(owners)} to know {known}"
-
-
-def _validity(actuator: Actuator) -> str:
-    return f"{actuator.default_name}: {actuator.validity}"
 
 
 def _alone(arm: Manipulator) -> Iterator[Manipulator]:
@@ -259,7 +250,11 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
     Different rings may overlap on purpose, each with its own stiffness: they do not share matter.
     """
     z = both_sides(arm, arm.profile.station(np.linspace(0.0, arm.profile.slender_length, 201)))
-    outline, rings = arm.outline(z), _ring_of_each_bundle(arm)
+    outline, ring_of = arm.outline(z), arm.section.ring_index
+    rings = [
+        ring_of(actuator.ring) if isinstance(actuator, SectorActuator) else None
+        for actuator in arm.bundle_actuators
+    ]
     for first, second in combinations(range(arm.bundles), 2):
         if rings[first] is None or rings[first] != rings[second]:
             continue
@@ -273,7 +268,6 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
 
 
 def _chambers_outside(arm: Manipulator) -> Iterator[str]:
-    """Lumens that the arm does not enclose somewhere along it."""
     z = both_sides(arm, np.linspace(0.0, arm.length, 201))
     outline = arm.outline(z)
     reached = np.where(outline.acts, outline.outer_ratio, 0.0)
@@ -284,14 +278,6 @@ def _chambers_outside(arm: Manipulator) -> Iterator[str]:
                 f"{name} reaches out to {outer:.3g} R2 at Z = {place / arm.length:.2f} L: "
                 "the arm does not enclose its lumen there"
             )
-
-
-def _ring_of_each_bundle(arm: Manipulator) -> list[int | None]:
-    """Index of the ring that a bundle fills a sector of; None for other kinds."""
-    return [
-        arm.section.ring_index(actuator.ring) if isinstance(actuator, SectorActuator) else None
-        for actuator in arm.bundle_actuators
-    ]
 
 
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
@@ -305,7 +291,7 @@ def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float
         return 0.0, 0.0
     extent = outline.extent[pair].mean()
     apart = outline.center[:, second] - outline.center[:, first]
-    depth = extent - np.abs(_wrapped(apart))
+    depth = extent - np.abs((apart + np.pi) % (2 * np.pi) - np.pi)
     # Where the distance passes a whole turn between two stations, the overlap there is complete.
     turns = np.round(apart / (2 * np.pi))
     passes = (np.diff(np.sign(apart - 2 * np.pi * turns)) != 0) & (np.diff(turns) == 0)
@@ -323,8 +309,3 @@ def _first_contact(z: Array, depth: Array, shares: NDArray[np.bool_]) -> float:
     if first == 0 or not shares[first - 1]:
         return float(z[first])
     return float(np.interp(0.0, depth[first - 1 : first + 1], z[first - 1 : first + 1]))
-
-
-def _wrapped(angle: Array) -> Array:
-    """The angles in [-π, π)."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi

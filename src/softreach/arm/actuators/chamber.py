@@ -70,8 +70,8 @@ class Chamber(PolarActuator):
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = A and M = p × A e3 with the effective area A and the center p: theory (53)."""
         del section
-        area = np.pi * self.area_factor * self._radius(profile, z) ** 2
-        arm = area * self._distance(profile, z)
+        area = np.pi * self.area_factor * self._size("radius", profile, z) ** 2
+        arm = area * self._size("distance", profile, z)
         angle = self.start_angles
         along = np.zeros((len(z), self.bundles))
         moment = [arm[:, None] * np.sin(angle), -arm[:, None] * np.cos(angle), along]
@@ -81,7 +81,7 @@ class Chamber(PolarActuator):
         """Round lumens."""
         del section
         each, outer = np.ones(self.bundles), profile.radius(z)
-        distance, radius = self._distance(profile, z), self._radius(profile, z)
+        distance, radius = (self._size(name, profile, z) for name in ("distance", "radius"))
         share = float(np.max(radius / np.maximum(distance, radius)))
         return Outline(
             center=np.broadcast_to(self.start_angles, (len(z), self.bundles)),
@@ -108,26 +108,17 @@ class Chamber(PolarActuator):
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
         """Value of a number; of a length and its ratio, the one not given follows at the base."""
-        base = np.array([0.0])
-        if field in ("distance", "distance_ratio"):
-            length = float(self._distance(profile, base)[0])
-        elif field in ("radius", "radius_ratio"):
-            length = float(self._radius(profile, base)[0])
-        else:
+        name = field.removesuffix("_ratio")
+        if name not in ("distance", "radius"):
             return super().value_on(field, profile, section)
-        return length / float(profile.radius(0.0)) if field.endswith("_ratio") else length
+        length = float(self._size(name, profile, np.array([0.0]))[0])
+        return length if name == field else length / float(profile.radius(0.0))
 
-    def _distance(self, profile: Profile, z: Array) -> Array:
-        return _length(self.distance, self.distance_ratio, profile, z)
-
-    def _radius(self, profile: Profile, z: Array) -> Array:
-        return _length(self.radius, self.radius_ratio, profile, z)
+    def _size(self, name: str, profile: Profile, z: Array) -> Array:
+        """Distance or radius [m], constant or in proportion to R2(Z)."""
+        length, ratio = getattr(self, name), getattr(self, f"{name}_ratio")
+        return np.full(len(z), length) if ratio is None else ratio * profile.radius(z)
 
     def _faults(self) -> list[Fault]:
         sizes = (length_or_ratio_faults(vars(self), field) for field in ("distance", "radius"))
         return [*super()._faults(), *(fault for size in sizes for fault in size)]
-
-
-def _length(length: float | None, ratio: float | None, profile: Profile, z: Array) -> Array:
-    """A length that is constant, or in proportion to R2(Z) [m]."""
-    return ratio * profile.radius(z) if ratio is not None else np.full(len(z), length)

@@ -154,13 +154,11 @@ def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Arra
 def _constant_gap(
     profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array
 ) -> Array:
-    """Over pieces of one angle each, which begin at `start`."""
     along = profile.surface_coordinate(end, ratio) - profile.surface_coordinate(start, ratio)
     return along * np.tan(angle((start + 1e-13 * profile.length) / profile.length))
 
 
 def _smooth_gap(profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array) -> Array:
-    """By Gauss quadrature."""
     half = 0.5 * (end - start)[..., None]
     z = start[..., None] + half * (1.0 + _NODES)
     secant = np.hypot(1.0, ratio * profile.slope(z)) / (ratio * profile.radius(z))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -110,14 +109,13 @@ class SectorActuator(PolarActuator):
         if self.bundles != 1:
             hint = "its bundles are independent already"
             raise InvalidInput(f"{self.name}.bundles", self.bundles, "1 to be split", hint)
-        return tuple(self._parts(int(count), keep_extent)) if count > 1 else (self,)
-
-    def _parts(self, count: int, keep_extent: bool) -> Iterator[Self]:
-        extent = self.extent if keep_extent else self.extent / count
-        for k in range(count):
-            offset = self.offset + (k - (count - 1) / 2) * extent
-            name = f"{self.name} {k + 1}" if self.name else ""
-            yield self.replace(name=name, offset=offset, extent=extent)
+        if count == 1:
+            return (self,)
+        extent = self.extent if keep_extent else self.extent / int(count)
+        names = [f"{self.name} {k + 1}" if self.name else "" for k in range(count)]
+        places = [self.offset + (k - (int(count) - 1) / 2) * extent for k in range(count)]
+        same = zip(names, places, strict=True)
+        return tuple(self.replace(name=name, offset=x, extent=extent) for name, x in same)
 
     def _faults(self) -> list[Fault]:
         return super()._faults() + ring_name_faults(self.ring)

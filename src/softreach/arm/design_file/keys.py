@@ -219,7 +219,6 @@ class WrittenFloat(float):
     """A number that remembers how it was written, so that degrees convert without a lost digit."""
 
     def __new__(cls, text: str) -> WrittenFloat:
-        """The number of a text."""
         number = super().__new__(cls, text)
         number.text = text
         return number
@@ -253,7 +252,6 @@ def _radians(text: str) -> float:
 
 
 def _decimal_text(number: str) -> str:
-    """A TOML float, without an exponent unless it is far from 1."""
     plain = -6 < Decimal(number).adjusted() < 16
     text = f"{Decimal(number):f}" if plain else number
     return text if "." in text or "e" in text else f"{text}.0"

@@ -132,8 +132,6 @@ def parse(text: str, source: str) -> Parts:
 
 
 class _DesignReader(TableReader):
-    """Reads the tables of a design in the order in which they refer to each other."""
-
     def __init__(self, document: dict[str, Any]) -> None:
         super().__init__()
         self._document = document
@@ -142,11 +140,13 @@ class _DesignReader(TableReader):
         self._unknown_kinds: list[Any] = []
 
     def parts(self) -> Parts | None:
-        """The parts of the arm; None where there are faults."""
         self._check_layout()
         profile = self._profile()
-        self._materials = dict(self._own_materials())
-        rings = [self._ring(k, raw) for k, raw in self._tables("rings")]
+        self._materials = {
+            name: self.part(Material, raw, f"materials.{key_text(name)}", ("name",), name=name)
+            for name, raw in (self._table("materials") or {}).items()
+        }
+        rings = [self.part(Ring, raw, f"rings[{k}]") for k, raw in self._tables("rings")]
         section = self._section(rings)
         tables = self._document.get("actuators")
         if isinstance(tables, list) and len(tables) > MOST_BUNDLES:
@@ -195,7 +195,6 @@ class _DesignReader(TableReader):
         )
 
     def _stations(self) -> Stations | None:
-        """Places of stations by name; None where there are faults."""
         before = len(self.faults)
         places = {
             name: self.number(PLACE, raw, f"stations.{key_text(name)}")
@@ -210,7 +209,6 @@ class _DesignReader(TableReader):
         return stations if len(self.faults) == before else None
 
     def _display_unit(self) -> str | None:
-        """Unit that the table of the display names, if there is one."""
         raw = self._table("display") or {}
         for key in raw:
             if key != "unit":
@@ -251,12 +249,10 @@ class _DesignReader(TableReader):
                     self.refused(f"{key}[{k}]", table, "must be a table")
 
     def _table(self, key: str) -> dict[str, Any] | None:
-        """A table at the top; None if there is none, or something else."""
         value = self._document.get(key)
         return value if isinstance(value, dict) else None
 
     def _tables(self, key: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Index and content of those under a key that are tables."""
         for k, raw in enumerate(self._document.get(key, ())):
             if isinstance(raw, dict):
                 yield k, raw
@@ -269,15 +265,7 @@ class _DesignReader(TableReader):
             return self.part(PROFILES[kind], raw, "profile")
         return self._own_part(Profile, kind, raw, "profile")
 
-    def _own_materials(self) -> Iterator[tuple[str, Material | None]]:
-        for name, raw in (self._table("materials") or {}).items():
-            yield (
-                name,
-                self.part(Material, raw, f"materials.{key_text(name)}", ("name",), name=name),
-            )
-
     def material(self, raw: Any, path: str) -> Any:
-        """A material by its name or its values; a blank one, and a fault, if there is none."""
         if isinstance(raw, dict):
             return super().material(raw, path)
         if not isinstance(raw, str):
@@ -292,9 +280,6 @@ class _DesignReader(TableReader):
         self._unknown_material = True
         self.refused(path, raw, _materials_text(raw, [*self._materials]))
         return Material()
-
-    def _ring(self, k: int, raw: dict[str, Any]) -> Ring | None:
-        return self.part(Ring, raw, f"rings[{k}]")
 
     def _section(self, rings: list[Ring | None]) -> Section | None:
         made = tuple(ring for ring in rings if ring is not None)
@@ -339,7 +324,6 @@ class _DesignReader(TableReader):
         return f"section.{owner}.{key}" if owner == "core" else f"{owner}.{key}"
 
     def _material_name(self, owner: str) -> Any:
-        """Name of the material of the core, or of a ring such as `rings[0].material`."""
         if owner == "core":
             return (self._table("section") or {}).get("core")
         k = int(owner.partition("[")[2].partition("]")[0])
@@ -352,7 +336,6 @@ class _DesignReader(TableReader):
         return self._own_part(Actuator, kind, raw, path)
 
     def _own_part(self, of: type[Kind], kind: Any, raw: dict[str, Any], path: str) -> Kind | None:
-        """An actuator or a profile of a kind that is not softreach's."""
         own = own_kind(of, kind) if isinstance(kind, str) else None
         if own is None:
             path = f"{path}.kind"
@@ -374,11 +357,11 @@ class _DesignReader(TableReader):
         stations: Stations,
         actuators: list[tuple[int, Actuator]],
     ) -> None:
-        """Faults that keep actuators from driving this body."""
         lacking: list[Fault] = []
         for k, actuator in actuators:
             named = dataclasses.replace(actuator, name=actuator.name or f"actuators[{k}]")
-            for fault in _fit_faults(named, profile, section, stations):
+            faults = _place_faults(named, profile, stations)
+            for fault in faults or placed(named, stations).section_faults(profile, section):
                 if fault.path.startswith(("rings", "core")):
                     lacking.append(fault)
                 else:
@@ -386,16 +369,7 @@ class _DesignReader(TableReader):
         self.faults += self._of_section(lacking)
 
 
-def _fit_faults(
-    actuator: Actuator, profile: Profile, section: Section, stations: Stations
-) -> list[Fault]:
-    """Faults that keep one actuator from driving a body."""
-    faults = _place_faults(actuator, profile, stations)
-    return faults or placed(actuator, stations).section_faults(profile, section)
-
-
 def _place_faults(part: Located, profile: Profile, stations: Stations) -> list[Fault]:
-    """Faults of the places of a part along an arm."""
     try:
         return placed(part, stations).place_faults(profile.length)
     except InvalidDesign as error:
@@ -403,11 +377,7 @@ def _place_faults(part: Located, profile: Profile, stations: Stations) -> list[F
 
 
 def _of_own_kind(kind: type[Kind], table: Mapping[str, Any]) -> Kind:
-    """A part of a class outside softreach from its fields as they are in Python, in SI units.
-
-    Raises:
-        InvalidDesign: Fields that it does not have or that are wrong.
-    """
+    """A part of a class outside softreach, from its fields in Python and in SI units."""
     values = {key: _plain(value) for key, value in table.items() if key != "kind"}
     try:
         return kind(**values)
@@ -442,14 +412,12 @@ def _place(key: str) -> str:
 
 
 def _materials_text(name: str, own: list[str]) -> str:
-    """Materials that are allowed."""
     hint = did_you_mean(name, [*own, *material_names()]) or LIBRARY_HINT
     here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
     return f"must be a material {here}, or of the library; {hint}"
 
 
 def _kinds_text(of: type[Any], kind: Any) -> str:
-    """Kinds of actuators or profiles that are allowed."""
     known = KINDS[of]
     if kind is None:
         return f"required key is missing: one of {', '.join(known)}"

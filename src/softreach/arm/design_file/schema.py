@@ -152,7 +152,6 @@ def _table(
     kind: str = "",
     without: tuple[str, ...] = (),
 ) -> _Schema:
-    """The schema of the table of a kind of part."""
     keys = {name: key for name, key in keys_of(part).items() if name not in without}
     properties = {"kind": {"const": kind}} if kind else {}
     properties |= {name: _value(part, key) for name, key in keys.items()}
@@ -164,7 +163,6 @@ def _table(
 
 
 def _value(part: type, key: Key) -> _Schema:
-    """The schema of one key."""
     if key.of_names:
         return {**_TEXT, "description": f"Name of a station, in place of {key.field}_m"}
     if key.number is not None:
@@ -192,7 +190,6 @@ def _value(part: type, key: Key) -> _Schema:
 
 
 def _number(number: Number) -> _Schema:
-    """The schema of a number, with its limits in the units of files."""
     allowed = in_file_units(number.allowed)
     assert isinstance(allowed, Range)
     about = {"description": f"{number.symbol}: {number.meaning} [{allowed.unit or '-'}]"}

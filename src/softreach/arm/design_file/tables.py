@@ -229,7 +229,6 @@ def _in_keys(fault: Fault, keys: Mapping[str, str], raw: Mapping[str, Any], path
 
 
 def _example(key: Key) -> Any:
-    """A sound value of a required key."""
     if key.number is None:
         return {"name": "drive", "gains": {"bundle": 1.0}}.get(key.field, (0.0, 1.0))  # or bounds
     if key.number.shape in ("series", "stations"):
@@ -238,7 +237,6 @@ def _example(key: Key) -> Any:
 
 
 def _floats(raw: Any) -> Any:
-    """Numbers in lists and tables as Python's own."""
     if isinstance(raw, dict):
         return {name: _floats(value) for name, value in raw.items()}
     if isinstance(raw, list):

@@ -70,7 +70,10 @@ def render(
     blocks = [
         ["version = 2"] if actuators else ["version = 2", "actuators = []"],
         ["[profile]", *_part_lines(profile, PROFILES)],
-        *(_material_block(name, material) for name, material in names.items()),
+        *(
+            [f"[materials.{key_text(name)}]", *_lines(material, without=("name",))]
+            for name, material in names.items()
+        ),
         *_section_blocks(section, names),
     ]
     if stations:
@@ -98,10 +101,11 @@ def display_text(unit: str | None) -> str:
 
 def _part_lines(part: Actuator | Profile, kinds: Mapping[str, type]) -> Iterator[str]:
     """Kind and fields; of a class outside softreach the fields as they are in Python."""
-    if (kind := _kind_of(part, kinds)) is not None:
-        yield f"kind = {value_text(kind)}"
-        yield from _lines(part)
-        return
+    for name, kind in kinds.items():
+        if kind is type(part):
+            yield f"kind = {value_text(name)}"
+            yield from _lines(part)
+            return
     yield f"kind = {value_text(type(part).__name__)}"
     for field in fields(part):  # pyright: ignore[reportArgumentType]
         if field.init and (value := getattr(part, field.name)) is not None:
@@ -118,24 +122,13 @@ def _plain_text(part: object, name: str, value: Any) -> str:
         raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
 
 
-def _kind_of(part: object, kinds: Mapping[str, type]) -> str | None:
-    return next((name for name, kind in kinds.items() if kind is type(part)), None)
-
-
 def _named_materials(section: Section) -> dict[str, Material]:
-    """The materials that get a table: those with a name, the first of each."""
-    used = [ring.material for ring in section.rings]
-    if section.core is not None:
-        used.insert(0, section.core)
+    used = [*([section.core] if section.core else []), *(ring.material for ring in section.rings)]
     named: dict[str, Material] = {}
     for material in used:
         if material.name:
             named.setdefault(material.name, material)
     return named
-
-
-def _material_block(name: str, material: Material) -> list[str]:
-    return [f"[materials.{key_text(name)}]", *_lines(material, without=("name",))]
 
 
 def _section_blocks(section: Section, names: Mapping[str, Material]) -> Iterator[list[str]]:
@@ -153,7 +146,6 @@ def _section_blocks(section: Section, names: Mapping[str, Material]) -> Iterator
 
 
 def _material_text(material: Material, names: Mapping[str, Material]) -> str:
-    """The name of a material that has a table, else its values."""
     if repr(names.get(material.name)) == repr(material):
         return value_text(material.name)
     return inline_table(_pairs(material))
@@ -189,7 +181,6 @@ def _text(key: str, value: Any) -> str:
 
 
 def _along_text(along: AlongArm, number: Callable[[float], str]) -> str:
-    """The inline table of a function of Z/L; `number` writes its values."""
     kind = along.interpolation if isinstance(along, Samples) else "constant"
     pairs = [
         ("stations_over_length", value_text(along.stations_over_length)),

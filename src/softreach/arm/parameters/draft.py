@@ -97,15 +97,12 @@ def part_of(arm: Manipulator, key: PartKey) -> Any:
 
 @dataclass
 class _PartDraft:
-    """Changes of one part."""
-
     start: Any
     """The part before."""
     values: dict[tuple[str, tuple[str | int, ...]], float] = field(default_factory=dict)
     """Field and place -> new value."""
 
     def made(self, **others: Any) -> Any:
-        """The changed part, with other parts in some fields."""
         changes = others | self.changes()
         return self.start.replace(**changes) if changes else self.start
 
@@ -127,8 +124,6 @@ class _PartDraft:
 
 @dataclass
 class _ActuatorDraft(_PartDraft):
-    """Changes of one actuator."""
-
     revolution: float | None = None
     """Revolution that it gets unless its own parameters say how it winds [rad]."""
 
@@ -141,10 +136,7 @@ class _ActuatorDraft(_PartDraft):
         return changes if bounds is None else changes | {"activation_bounds": bounds}
 
     def _bounds(self, bundles: Any) -> Any:
-        """New bounds, or None if they stay as they are.
-
-        Each bundle keeps its own while their number stays the same; else all have the first's.
-        """
+        """New bounds or None; where the number of bundles changes, all start from the first's."""
         start: NDArray[np.float64] = self.start.bounds
         if not isinstance(bundles, int) or bundles < 1:
             return None
@@ -170,7 +162,6 @@ class Draft:
     """
 
     def __init__(self, arm: Manipulator) -> None:
-        """Begin without a change."""
         self.arm = arm
         self._parts = {
             key: (_ActuatorDraft if isinstance(part, Actuator) else _PartDraft)(part)
@@ -275,7 +266,6 @@ class Draft:
         return Fault(", ".join(names), value, fault.allowed)
 
     def _path(self, key: PartKey | None, field: str) -> str:
-        """Path of faults of a field of a part."""
         if key is None:
             return field
         number = fields_of(type(self._parts[key].start)).get(field)
@@ -284,7 +274,6 @@ class Draft:
 
 
 def _along(before: AlongArm, field: str, inner: str, numbers: tuple[Any, ...]) -> AlongArm:
-    """The function along the arm with other stations or values."""
     try:
         return before.replace(**{inner: numbers})
     except InvalidDesign as error:

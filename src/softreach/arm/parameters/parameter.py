@@ -139,16 +139,12 @@ class _Place(OwnParameter):
     """The place of a named station: what begins, ends or stands there moves with it."""
 
     def values(self, arm: Manipulator) -> tuple[float, ...]:
-        """Z [m]."""
         return (arm.stations[self.path.field],)
 
 
 @dataclass(frozen=True, kw_only=True)
 class _OfDrive(OwnParameter):
-    """A bound, a gain or an offset of a drive."""
-
     def values(self, arm: Manipulator) -> tuple[float, ...]:
-        """Its value [unit]."""
         return (part_of(arm, self.path.part).value_of(self.path.field),)
 
 
@@ -157,28 +153,22 @@ class _Taper(OwnParameter):
     """The taper angle: when it changes, revolutions stay and helical angles follow."""
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change the profile; the fibers keep their revolutions."""
         draft.keep_revolutions()
         super().change(draft, value)
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Shared(Parameter):
-    """The same field of several parts at once."""
-
     parts: tuple[Parameter, ...]
 
     def values(self, arm: Manipulator) -> tuple[float, ...]:
-        """Those of all of them."""
         return tuple(value for part in self.parts for value in part.values(arm))
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change all of them, under the name that they share."""
         for part in self.parts:
             dataclasses.replace(part, name=self.name).change(draft, value)
 
     def shift(self, draft: Draft, amount: float) -> None:
-        """Shift all of them, under the name that they share."""
         for part in self.parts:
             dataclasses.replace(part, name=self.name).shift(draft, amount)
 
@@ -192,7 +182,6 @@ class _OuterRadius(Parameter):
         return (float(arm.profile.radius(0.0)),)
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change all radii."""
         radii: tuple[float, ...] = getattr(draft.arm.profile, "radii")  # noqa: B009
         scaled = [value if k == 0 else radius * value / radii[0] for k, radius in enumerate(radii)]
         if not all(self.range.admits(plain(radius)) for radius in scaled):
@@ -204,23 +193,18 @@ class _OuterRadius(Parameter):
 
 @dataclass(frozen=True, kw_only=True)
 class _Revolution(Parameter):
-    """The revolution of all that is helical; each keeps its sense, what is straight stays so.
-
-    Angles that are given along the arm stay as they are.
-    """
+    """Revolution of all that is helical, each in its sense; angles along the arm stay as given."""
 
     def values(self, arm: Manipulator) -> tuple[float, ...]:
         """|Ω| of all helical fibers and tendons [rad]; 0 without one."""
         return tuple(abs(turn) for turn in _revolutions(arm).values() if turn) or (0.0,)
 
     def change(self, draft: Draft, value: float) -> None:
-        """Wind fibers and tendons."""
         for part, turn in _revolutions(draft.arm).items():
             if turn:
                 draft.wind(self.name, part, math.copysign(value, turn))
 
     def shift(self, draft: Draft, amount: float) -> None:
-        """Wind each further, in its own sense."""
         for part, turn in _revolutions(draft.arm).items():
             if turn:
                 draft.wind(self.name, part, turn + math.copysign(1.0, turn) * amount)
@@ -244,7 +228,6 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
 
 
 def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
-    """Parameters of the arm as a whole, from those of its parts."""
     plain = {parameter.name: parameter for parameter in own if not parameter.owner}
     if any(parameter.path.field == "revolution" and parameter.unit == "rad" for parameter in own):
         turn = fields_of(FiberArchitecture)["revolution"]
@@ -352,5 +335,4 @@ def _revolutions(arm: Manipulator) -> dict[PartKey, float]:
 
 
 def _float(value: Any) -> float:
-    """The value, or NaN where it is left out or no number."""
     return float(value) if isinstance(value, int | float | np.number) else _NAN
