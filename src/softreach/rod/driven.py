@@ -136,7 +136,7 @@ class DrivenRod(DerivedMap):
         return inner, lost
 
     def _drop(self, lost: NDArray[np.intp], status: Status | None, *values: Array | None) -> None:
-        drop(lost, status, *(some for some in values if some is not None))
+        drop(lost, status, *values)
         if status is not None:
             status[lost] = TipStatus.UNDECIDED
 

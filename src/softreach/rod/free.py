@@ -115,7 +115,9 @@ class FreeRod(ArmRod):
     ) -> Frames:
         gamma, lost = self.with_arms(self.box.check(activations))
         z = self.check_stations(stations)
-        table, ends = self._station_table(z)
+        is_tip = len(z) == 1 and z[0] == self.length
+        packed = self.rule.packed_stations
+        table, ends = self._tip_table if is_tip else packed(z, self._shape_steps)
         result = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
         parallel.run(
             partial(frames.frames, table, ends, gamma[b], result.position[b], result.directors[b])
@@ -143,12 +145,6 @@ class FreeRod(ArmRod):
     def strain_range(self, stations: ArrayLike) -> StrainRange:
         z = self.check_stations(stations, ascending=False)
         return strain_range(tables(self.arm, z), self.box)
-
-    def _station_table(self, z: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Packed tables with a step boundary at every station, and the steps up to each."""
-        if len(z) == 1 and z[0] == self.length:
-            return self._tip_table
-        return self.rule.packed_stations(z, self._shape_steps)
 
     @lazy
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:

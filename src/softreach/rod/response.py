@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.rigid import RigidPiece
 from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
 from softreach.rod.arm_rod import ArmRod
@@ -108,18 +107,13 @@ def _places(arm: Manipulator, stations: Array, moving_ends: bool) -> Array:
     breaks += [arm.length * x for x in arm.section.breaks]
     spans = [*arm.actuators, *arm.rigid_pieces]
     ends = [(a.station_at("start", arm.length), a.station_at("end", arm.length)) for a in spans]
-    breaks += [z for piece in arm.rigid_pieces for z in _inside(piece, arm.length)]
+    rigid = [z for pair in ends[len(arm.actuators) :] for z in pair]
+    breaks += [z for z in rigid if 0.0 < z < arm.length]
     if moving_ends:
         breaks += [0.0 for start, _ in ends if start <= 0.0]
         breaks += [arm.length for _, end in ends if end >= arm.length]
     points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
     return np.sort([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
-
-
-def _inside(piece: RigidPiece, length: float) -> list[float]:
-    """Ends of a rigid piece between base and tip [m]."""
-    ends = piece.station_at("start", length), piece.station_at("end", length)
-    return [z for z in ends if 0.0 < z < length]
 
 
 def step_grid(
@@ -350,8 +344,6 @@ def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) ->
 
 @dataclass(frozen=True, eq=False)
 class _Job:
-    """Everything that the response of a sample needs."""
-
     table: NodeTables
     state: RodState
     changes: _Changes
@@ -361,7 +353,6 @@ class _Job:
     marks: NDArray[np.intp]
 
     def respond(self, rows: slice, moves: Array, turns: Array, works: Array) -> None:
-        """Put the response of some samples into place."""
         for row in range(rows.start, rows.stop):
             self._respond(row, moves[row], turns[row], works[row])
 

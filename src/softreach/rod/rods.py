@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
@@ -91,45 +91,36 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
         steps: Along the arm, if nothing breaks it.
         like: A tip map whose tolerance and frame it has.
     """
-    if arm.inner is not arm:
-        inner = in_steps(arm.inner, steps, like)
-        assert isinstance(inner, ArmRod | PlacedRod)
-        return DrivenRod(inner, arm)
-    if like.frame == "world" and not arm.base.is_identity:
-        rod = in_steps(arm, steps, _from_base(like))
-        assert isinstance(rod, ArmRod)
-        return PlacedRod(rod)
-    if arm.loads is None:
-        return FreeRod(arm, like.tol).in_steps(steps)
-    from softreach.rod.loaded.rod import LoadedRod
-
-    return LoadedRod(arm, like.tol).in_steps(steps)
+    return _new(arm, like.tol, like.frame, steps)
 
 
 @lru_cache(maxsize=64)
 def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> TipMap:
+    return _new(arm, tol, frame)
+
+
+def _new(arm: Manipulator, tol: float, frame: Frame, steps: int | None = None) -> TipMap:
+    inside = _of_arm if steps is None else partial(_new, steps=steps)
     if arm.inner is not arm:
-        inner = _of_arm(arm.inner, tol, frame)
+        inner = inside(arm.inner, tol, frame)
         assert isinstance(inner, ArmRod | PlacedRod)
         return DrivenRod(inner, arm)
     if frame == "world" and not arm.base.is_identity:
-        rod = _of_arm(arm, tol, "base")
+        rod = inside(arm, tol, "base")
         assert isinstance(rod, ArmRod)
         return PlacedRod(rod)
     if arm.loads is None:
-        return FreeRod(arm, tol)
-    from softreach.rod.loaded.rod import LoadedRod
+        rod = FreeRod(arm, tol)
+    else:
+        from softreach.rod.loaded.rod import LoadedRod
 
-    return LoadedRod(arm, tol)
+        rod = LoadedRod(arm, tol)
+    return rod if steps is None else rod.in_steps(steps)
 
 
 @lru_cache(maxsize=64)
 def _warn_of_large_loads(arm: Manipulator) -> None:
-    """Warn once of an arm that is loaded beyond what was verified; one text for all.
-
-    Raises:
-        InvalidDesign: Moduli or densities are missing.
-    """
+    """Warn once of an arm that is loaded beyond what was verified; one text for all."""
     if is_overloaded(arm):
         issue_warning(
             f"the load number is above {VERIFIED_LOAD_NUMBER:g}, up to which shapes under loads "

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -146,11 +145,19 @@ class StepRule:
         """
         check_tol(tol)
         at_all = enough_for_all_breaks(self.arm)
-        exact = self._fewest(tol, self._tip_differences, MOST_TURN_OF_STEP, at_all)
-        if at_all:
-            differences = partial(self._differences_from, self.packed_nodes(exact))
-            return self._search(tol, differences, MOST_TURN_OF_STEP, 0, at_all - 1) or exact
-        return exact
+
+        def halving(steps: int) -> Differences:
+            return _tips_apart(*self._halves(steps))
+
+        exact = self._fewest(tol, halving, MOST_TURN_OF_STEP, at_all)
+        if not at_all:
+            return exact
+        fine = self.packed_nodes(exact)
+
+        def from_fine(steps: int) -> Differences:
+            return _tips_apart(self.packed_nodes(steps), fine)
+
+        return self._search(tol, from_fine, MOST_TURN_OF_STEP, 0, at_all - 1) or exact
 
     def steps_for_shapes(self, tol: float) -> int:
         """As `steps_for`, for the largest error of the centerline anywhere along the arm."""
@@ -215,14 +222,6 @@ class StepRule:
     def pilot(self) -> Array:
         """Activations on which steps are judged, shape (n, bundles)."""
         return pilot_activations(self.arm, self.box)
-
-    def _tip_differences(self, steps: int) -> Differences:
-        """Distances [m] between the tips with `steps` and with twice as many."""
-        return _tips_apart(*self._halves(steps))
-
-    def _differences_from(self, fine: Array, steps: int) -> Differences:
-        """Distances [m] between the tips with `steps` and those of other packed tables."""
-        return _tips_apart(self.packed_nodes(steps), fine)
 
     def _shape_differences(self, steps: int) -> Differences:
         """Largest distances [m] along the centerlines with `steps` and with twice as many."""
@@ -318,7 +317,10 @@ def _bending_corners(arm: Manipulator) -> Array:
     vertex toward a heading has every bundle at the bound that helps. Along the arm the heading
     turns as the fibers of each bundle do, or not at all.
     """
-    z = _stations(arm)
+    ends = np.array([0.0, *arm.breakpoints, arm.length])
+    z = np.linspace(0.0, arm.length, _PROBED_STATIONS)
+    if arm.breakpoints:  # one station within each smooth stretch too
+        z = np.union1d(z, 0.5 * (ends[1:] + ends[:-1]))
     plane = tables(arm, z).curvature[:, :2]
     start = 2.0 * np.pi * np.arange(_HEADINGS) / _HEADINGS
     directions = np.unwrap(np.arctan2(plane[:, 1], plane[:, 0]), axis=0)
@@ -328,13 +330,6 @@ def _bending_corners(arm: Manipulator) -> Array:
     along = np.einsum("htsc,scb->htsb", np.stack([np.cos(heading), np.sin(heading)], -1), plane)
     helps = np.concatenate([along.reshape(-1, arm.bundles), along.sum(2).reshape(-1, arm.bundles)])
     return np.unique((helps > 0).astype(float), axis=0)
-
-
-def _stations(arm: Manipulator) -> Array:
-    """Even ones, and one within each smooth stretch of the arm."""
-    ends = np.array([0.0, *arm.breakpoints, arm.length])
-    even = np.linspace(0.0, arm.length, _PROBED_STATIONS)
-    return np.union1d(even, 0.5 * (ends[1:] + ends[:-1])) if arm.breakpoints else even
 
 
 def worsened(

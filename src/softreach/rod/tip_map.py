@@ -363,10 +363,11 @@ class TipMotions(NamedTuple):
     """ω [rad], shape (n, 3, bundles): ∂d3/∂γ = ω × d3."""
 
 
-def drop(lost: NDArray[np.intp], status: Status | None, *values: Array) -> None:
+def drop(lost: NDArray[np.intp], status: Status | None, *values: Array | None) -> None:
     """Make rows NaN, with the status `NO_EQUILIBRIUM` where it is asked for."""
     for some in values:
-        some[lost] = np.nan
+        if some is not None:
+            some[lost] = np.nan
     if status is not None:
         status[lost] = TipStatus.NO_EQUILIBRIUM
 

@@ -175,7 +175,7 @@ class PlacedRod(DerivedMap):
     ) -> None:
         """Put tips, and what else is asked for, into place; they are turned and moved there."""
         self.base.fill(gamma, tips, slopes, twists=twists, status=status, directions=directions)
-        rotation, position = self._pose
+        rotation, position = np.array(self.pose.rotation), np.array(self.pose.position)
         move(tips, rotation, position)
         if slopes is not None:
             turn(slopes, rotation)
@@ -187,11 +187,6 @@ class PlacedRod(DerivedMap):
                 v, w = twists[:, :3], twists[:, 3:]
                 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                     v[:, i] += position[j] * w[:, k] - position[k] * w[:, j]
-
-    @lazy
-    def _pose(self) -> tuple[Array, Array]:
-        """Rotation and position as the kernels take them."""
-        return np.array(self.pose.rotation), np.array(self.pose.position)
 
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
@@ -264,32 +259,23 @@ class View(DerivedMap):
     ) -> None:
         if self.only_stable and status is None:
             status = np.empty(len(gamma), np.int8)
-        base_slopes, base_twists = self._room(slopes), self._room(twists)
+        rooms = [  # for derivatives along all bundles of the base
+            values
+            if values is None or self._is_plain
+            else np.empty((*values.shape[:2], len(self.scale)))
+            for values in (slopes, twists)
+        ]
         at = self.activations(gamma)
-        self.base.fill(
-            at, tips, base_slopes, twists=base_twists, status=status, directions=directions
-        )
-        self._put(base_slopes, slopes)
-        self._put(base_twists, twists)
+        self.base.fill(at, tips, rooms[0], twists=rooms[1], status=status, directions=directions)
+        for room, values in zip(rooms, (slopes, twists), strict=True):
+            if room is not None and room is not values:
+                np.multiply(room[:, :, self._columns], self.measures, out=values)
         self._drop(status, tips, slopes, twists, directions)
-
-    def _room(self, values: Array | None) -> Array | None:
-        """Room for derivatives along all bundles of the base."""
-        if values is None or self._is_plain:
-            return values
-        return np.empty((*values.shape[:2], len(self.scale)))
-
-    def _put(self, of_base: Array | None, values: Array | None) -> None:
-        """Put derivatives along x into place, from those along all bundles of the base."""
-        if of_base is not None and values is not None and of_base is not values:
-            np.multiply(of_base[:, :, self._columns], self.measures, out=values)
 
     def _drop(self, status: Status | None, *values: Array | None) -> None:
         """Make NaN, and say that there is no equilibrium, where only stable ones count."""
-        if not self.only_stable or status is None:
-            return
-        lost = np.flatnonzero(status != TipStatus.STABLE)
-        drop(lost, status, *(some for some in values if some is not None))
+        if self.only_stable and status is not None:
+            drop(np.flatnonzero(status != TipStatus.STABLE), status, *values)
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         return self.base.extension_and_turn(self.activations(gamma))

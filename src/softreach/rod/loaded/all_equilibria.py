@@ -31,7 +31,6 @@ from softreach.rod.driven import inner_rod
 from softreach.rod.kinematics import configuration, shape_dataset, stations_along
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.rods import tip_map
 from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
@@ -187,7 +186,10 @@ def equilibria(
     loaded = tip_map(inner, frame="base")  # where all directions of the search are
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
-    _check_loads(loaded.tables)
+    if not loaded.tables.one_direction:
+        crossing = ", ".join(_crossing(loaded.loads, loaded.tables.axes[0]))
+        allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
+        raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
     solver = _resolving(Solver(loaded.tables, loaded.unloaded_steps, rod.tol), at)
     branch = solver.find(at)
     known = branch.frame[has_tip(branch.status)]
@@ -197,22 +199,12 @@ def equilibria(
 
 
 def _one(rod: TipMap, activations: ArrayLike) -> Array:
-    """Activations (1, bundles)."""
     gamma = as_floats("activations", activations)
     gamma = rod.check_activations("activations", gamma[None] if gamma.ndim == 1 else gamma)
     if len(gamma) != 1:
         allowed = f"({rod.box.bundles},) or (1, {rod.box.bundles}): one activation at a time"
         raise InvalidInput("activations.shape", gamma.shape, allowed)
     return gamma
-
-
-def _check_loads(tables: LoadTables) -> None:
-    """Refuse loads for which more than a direction is unknown."""
-    if tables.one_direction:
-        return
-    crossing = ", ".join(_crossing(tables.loads, tables.axes[0]))
-    allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
-    raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
 
 
 def _crossing(loads: Loads, direction: Array) -> list[str]:

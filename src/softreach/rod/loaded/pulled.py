@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,14 +18,9 @@ from numpy.typing import NDArray
 from softreach.arm.tables import quadrature
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.response import (
-    NodeTables,
-    linear_response,
-    node_tables,
-    rod_state,
-    step_grid,
-)
+from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.support import parallel
+from softreach.support.arrays import rows
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
@@ -90,9 +86,7 @@ class LoadedLengths:
         def fill(block: slice) -> None:
             tension[block], taut[block] = self._of_block(bundles[block])
 
-        parallel.run(
-            (lambda block=block: fill(block)) for block in parallel.blocks(len(bundles), _BLOCK)
-        )
+        parallel.run(partial(fill, block) for block in parallel.blocks(len(bundles), _BLOCK))
         return Tensions(tension, taut)
 
     def _of_block(self, bundles: Array) -> Tensions:
@@ -104,36 +98,31 @@ class LoadedLengths:
         slopes = np.broadcast_to(
             law.shortening_slopes(inner)[..., law.columns], (n, *law.compliance.shape * 2)
         )
-        rows = np.arange(n)
         state = _State(start.tension, self.shortening(inner), slopes.copy())
-        state, rows = self._lowered(state, rows, bundles)
+        state, left = self._lowered(state, bundles)
         for _ in range(_MOST_STEPS):
-            if not len(rows):
+            if not len(left):
                 break
-            aim = self._aimed(state, pulled[rows])
-            open_ = ~self._is_solved(state, pulled[rows])
-            tension[rows[~open_]], taut[rows[~open_]] = (
-                state.tension[~open_],
-                aim.is_taut[~open_],
-            )
-            rows, state, aimed = rows[open_], _rows(state, open_), aim.tension[open_]
-            state, kept = self._stepped(state, aimed, bundles[rows])
-            rows, state = rows[kept], _rows(state, kept)
+            aim = self._aimed(state, pulled[left])
+            open_ = ~self._is_solved(state, pulled[left])
+            done = left[~open_]
+            tension[done], taut[done] = state.tension[~open_], aim.is_taut[~open_]
+            left, state, aimed = left[open_], rows(state, open_), aim.tension[open_]
+            state, kept = self._stepped(state, aimed, bundles[left])
+            left, state = left[kept], rows(state, kept)
         return Tensions(tension, taut)
 
-    def _lowered(
-        self, state: _State, rows: NDArray[np.intp], bundles: Array
-    ) -> tuple[_State, NDArray[np.intp]]:
-        """Tensions that have an equilibrium to start with: less and less of the first ones."""
+    def _lowered(self, state: _State, bundles: Array) -> tuple[_State, NDArray[np.intp]]:
+        """Tensions that have an equilibrium to start with, halves of the first; and their rows."""
         for _ in range(_HALVINGS):
             lost = np.flatnonzero(_has_nan(state.shortening))
             if not len(lost):
-                return state, rows
+                break
             state.tension[lost] *= 0.5
-            inner = self.law.inner(bundles[rows[lost]], state.tension[lost])
+            inner = self.law.inner(bundles[lost], state.tension[lost])
             state.shortening[lost] = self.shortening(inner)
         kept = ~_has_nan(state.shortening)
-        return _rows(state, kept), rows[kept]
+        return rows(state, kept), np.flatnonzero(kept)
 
     def _aimed(self, state: _State, pulled: Array) -> Tensions:
         """Tensions of the complementarity problem of s linearized."""
@@ -204,10 +193,6 @@ class LoadedLengths:
         blocks = parallel.blocks(len(inner), _BLOCK)
         none = np.empty((0, len(self.law.columns)))
         return np.concatenate([none, *(self.shortening(inner[block]) for block in blocks)])
-
-
-def _rows(state: _State, chosen: NDArray[np.bool_]) -> _State:
-    return _State(*(values[chosen] for values in state))
 
 
 def _has_nan(values: Array) -> NDArray[np.bool_]:

@@ -159,7 +159,14 @@ class Solver:
         guesses: Array | None = None,
     ) -> None:
         """Search at some rows, and put down what is found."""
-        self._put(equilibria, rows, rung, self._shoot(gamma[rows], search, guesses))
+        tips, frame, margin, state = self._shoot(gamma[rows], search, guesses)
+        good = (state == _FOUND) & np.isfinite(tips).all(axis=1) & ~np.isnan(margin)
+        stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
+        equilibria.tips[rows] = np.where(good[:, None], tips, np.nan)
+        equilibria.frame[rows], equilibria.margin[rows] = frame, margin
+        none = np.where(state == _ENDED, TipStatus.NO_EQUILIBRIUM, TipStatus.UNDECIDED)
+        equilibria.status[rows] = np.where(good, stable, none)
+        equilibria.rung[rows] = np.where(good, rung, Rung.NONE)
         if self.tables.phase.squeeze >= 1.0:
             self._give_up_squeezed(gamma, rows, equilibria)
 
@@ -177,23 +184,6 @@ class Solver:
         equilibria.tips[squeezed] = np.nan
         equilibria.status[squeezed] = TipStatus.NO_EQUILIBRIUM
         equilibria.rung[squeezed] = Rung.NONE
-
-    def _put(
-        self,
-        equilibria: Equilibria,
-        rows: slice | NDArray[np.intp],
-        rung: Rung,
-        shots: Shots,
-    ) -> None:
-        """Put down what a search found at some rows."""
-        tips, frame, margin, state = shots
-        good = (state == _FOUND) & np.isfinite(tips).all(axis=1) & ~np.isnan(margin)
-        stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
-        equilibria.tips[rows] = np.where(good[:, None], tips, np.nan)
-        equilibria.frame[rows], equilibria.margin[rows] = frame, margin
-        none = np.where(state == _ENDED, TipStatus.NO_EQUILIBRIUM, TipStatus.UNDECIDED)
-        equilibria.status[rows] = np.where(good, stable, none)
-        equilibria.rung[rows] = np.where(good, rung, Rung.NONE)
 
     def _shoot(self, gamma: Array, search: Search, guesses: Array | None) -> Shots:
         """One search for each activation (n, bundles)."""
@@ -274,14 +264,12 @@ class Solver:
         lost = np.isnan(tips[:, 0])
         # An equilibrium that was found and not found again is in doubt, not gone.
         status = np.where(lost & has_tip(known.status), TipStatus.UNDECIDED, known.status)
-        d3 = self._tip_directions(tips, walked.trace, fine) if directions else np.empty((0, 3))
+        d3 = np.empty((0, 3))
+        if directions:
+            rows, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
+            shapes = shapes_of(tips, walked.trace, rows, self._force_at(fine, rows), at_tip)
+            d3 = shapes.frames.directors[:, 0, 2]
         return Response(tips, twists, walked.compliance, d3, status.astype(np.int8))
-
-    def _tip_directions(self, tips: Array, trace: Array, table: StepTables) -> Array:
-        """d3 of tips whose sections were kept, (n, 3)."""
-        rows, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
-        shapes = shapes_of(tips, trace, rows, self._force_at(table, rows), at_tip)
-        return shapes.frames.directors[:, 0, 2]
 
     def shapes(
         self,
@@ -305,28 +293,16 @@ class Solver:
         shapes = Shapes.empty(len(gamma), len(stations))
 
         def fill(block: slice) -> None:
-            at = gamma[block]
-            equilibria = self.find(at) if known is None else known.of(block)
-            shapes.put(block, self._shapes_of(at, equilibria, stations, table, rows))
+            equilibria = self.find(gamma[block]) if known is None else known.of(block)
+            walked = self._near(gamma[block], equilibria, table, trace=True)
+            tips, force = walked.shots.tips, self._force_at(table, rows)
+            shapes.put(block, shapes_of(tips, walked.trace, rows, force, stations))
             if status is not None:
                 status[block] = equilibria.status
 
         size = max(1, _TRACED // (len(edges) * TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
         return shapes
-
-    def _shapes_of(
-        self,
-        gamma: Array,
-        known: Equilibria,
-        stations: Array,
-        table: StepTables,
-        rows: NDArray[np.intp],
-    ) -> Shapes:
-        """Arms at stations, which are these boundaries of the steps; on the calling thread."""
-        walked = self._near(gamma, known, table, trace=True)
-        force = self._force_at(table, rows)
-        return shapes_of(walked.shots.tips, walked.trace, rows, force, stations)
 
     def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""

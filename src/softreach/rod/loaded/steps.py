@@ -60,27 +60,24 @@ def fewest_steps(
         Steps; None where even the most are too few, `UNJUDGED` where nothing can be judged.
     """
     steps = max(steps, _FEWEST_STEPS)
-    enough = _enough(solver_of, _few(pilot), steps, differences)
+    others = pilot[_FEW:]  # behind the first, which are corners
+    few = np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
+    enough = _enough(solver_of, few, steps, differences)
     if enough is None:
         return None
     return _enough(solver_of, pilot, enough or steps, differences)
 
 
-def _few(pilot: Array) -> Array:
-    """The first of the pilot, which are corners, and as many of the others."""
-    others = pilot[_FEW:]
-    return np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
-
-
 def _enough(
     solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
 ) -> int | None:
-    """As `fewest_steps`, by these activations."""
     tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
     while steps <= max(_MOST_STEPS, _FINER * at_all):
         solver = solver_of(steps)
         allowed = tol * solver.tables.arm.length / _SAFETY
-        errors = _bulk(differences(solver, *_settled(solver, gamma)))
+        equilibria = solver.find(gamma, patient=False)
+        settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
+        errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
         if not len(errors):
             return UNJUDGED
         error = float(errors.max())
@@ -90,13 +87,6 @@ def _enough(
         if steps > _MOST_STEPS:
             steps = max(steps, at_all)
     return None
-
-
-def _settled(solver: Solver, gamma: Array) -> tuple[Array, Equilibria]:
-    """The activations that judge the steps, and their equilibria."""
-    equilibria = solver.find(gamma, patient=False)
-    settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
-    return gamma[settled], equilibria.of(settled)
 
 
 def _bulk(distances: Array) -> Array:
