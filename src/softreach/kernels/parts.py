@@ -83,12 +83,9 @@ class _Key:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _PartLowering(NativeLowering):
-    """Lowering without compilation."""
-
     _name = "softreach_part_lowering"
 
     def run_pass(self, state: Any) -> Literal[True]:
-        """Lower the function into a library of its own."""
         state.flags.no_compile = True
         state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.inlined = state.flags.forceinline
@@ -103,7 +100,6 @@ class _PartCompiler(CompilerBase):
     """Numba's passes, the last of which does not compile."""
 
     def define_pipelines(self) -> list[Any]:
-        """The one pipeline."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.passes = [
             (_PartLowering, text) if step is NativeLowering else (step, text)
@@ -117,7 +113,6 @@ class _Pause:
     """Stops the collection of cyclic garbage, of which a compiler makes none worth the search."""
 
     def __init__(self) -> None:
-        """Running."""
         self._lock, self._depth, self._resume = threading.Lock(), 0, False
 
     def __enter__(self) -> None:

@@ -161,7 +161,6 @@ def _factored(a, order, kept, size, factor):
 
 @inline
 def _substituted(factor, size, values):
-    """Solve with the factor and its transpose, in place."""
     for i in range(size):
         total = values[i]
         for k in range(i):

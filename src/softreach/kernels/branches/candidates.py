@@ -127,7 +127,6 @@ def _place(gamma, v, w):
 
 @inline
 def _put(guess, q, axes, det, low, high, n, start, inverse):
-    """Write start n."""
     scale = 1.0 / det if det != 0.0 else 0.0
     for i in range(3):
         start[n, i] = min(max(guess[i], low[i]), high[i])

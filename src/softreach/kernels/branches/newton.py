@@ -152,7 +152,6 @@ def conditions(slopes, smallest, condition):
 
 @inline
 def _largest(a):
-    """Largest singular value, from the trigonometric roots of the cubic of AᵀA."""
     x, y, z = (
         (a[0][0], a[1][0], a[2][0]),
         (a[0][1], a[1][1], a[2][1]),

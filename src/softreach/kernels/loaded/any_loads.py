@@ -89,7 +89,6 @@ def _put_frame(w, i, g, h):
 
 @inline
 def _move(w, i):
-    """Turn the frame of the tip by the step."""
     x = get(w, STEP, i)
     angle = math.sqrt(dot(x, x))
     a = times(math.tan(0.5 * min(angle, 3.0)) / angle if angle > 1e-9 else 0.5, x)

@@ -126,7 +126,6 @@ def _advance_with(newton, move, go_back, go_on):
 
 @inline
 def _apart(w, a, b, i):
-    """Distance of two unknowns."""
     square = 0.0
     for row in range(6):
         square += (w[a + row * LANES + i] - w[b + row * LANES + i]) ** 2

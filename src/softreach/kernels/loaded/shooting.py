@@ -113,7 +113,6 @@ def _aim(w, work, gravity):
 
 @inline
 def _set_out(w, work, guesses, first, count, increment, widest):
-    """Begin from the unloaded arm, or where a guess is given, there."""
     for i in range(LANES):
         put(w, TRIAL, i, get(w, TARGET, i))
     start(w, increment, widest)

@@ -37,7 +37,6 @@ GAUSS = np.array(
 
 @inline
 def _skew(v, out):
-    """The matrix of v × ."""
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
     out[0, 1], out[1, 0] = -v[2], v[2]
     out[0, 2], out[2, 0] = v[1], -v[1]
@@ -46,7 +45,6 @@ def _skew(v, out):
 
 @inline
 def _product(factor, a, b, out):
-    """Add factor a b to out."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
             value = factor * a[i, j]
@@ -64,7 +62,6 @@ def _copy(a, out):
 
 @inline
 def _add(factor, a, out):
-    """Add factor a to out."""
     for i in range(out.shape[0]):
         for c in range(out.shape[1]):
             out[i, c] += factor * a[i, c]

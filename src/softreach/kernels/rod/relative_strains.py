@@ -46,7 +46,6 @@ def relative_strains(centers, offset, stretch, curvature, longest, bending):
 
 @inline
 def _add_products(factors, gamma, out):
-    """Add Σ factor γ of every cell."""
     for j in range(len(factors)):
         for i in range(_TOGETHER):
             out[i] += factors[j] * gamma[j, i]
