@@ -54,7 +54,6 @@ class AlphaComplex:
     """Volumes of the tetrahedra [m³], shape (m,)."""
 
     def __post_init__(self) -> None:
-        """Measure the tetrahedra."""
         radii, volumes = _measure(self.triangulation)
         object.__setattr__(self, "radii", radii)
         object.__setattr__(self, "volumes", volumes)
@@ -101,9 +100,8 @@ class AlphaComplex:
             return float(covering)
         later = np.flatnonzero(self.radii > covering)
         order = later[np.argsort(self.radii[later])]
-        return float(
-            kernels.radius_of_one_region(mesh.neighbors, self.radii, parent, regions, order)
-        )
+        asked = parent, regions, order
+        return float(kernels.radius_of_one_region(mesh.neighbors, self.radii, *asked))
 
     def _joined(self, alpha: float) -> tuple[np.ndarray, int]:
         """Forest for `kernels.join_regions` to add further tetrahedra, and the number of parts."""
@@ -179,11 +177,7 @@ def _give_up() -> bool:
 
 
 def _piece(
-    points: Points,
-    alpha: float,
-    part: Mask | None,
-    box: Array,
-    lies_on_curve: Callable[[], bool],
+    points: Points, alpha: float, part: Mask | None, box: Array, lies_on_curve: Callable[[], bool]
 ) -> _Piece:
     """Triangulate the points around a box, and keep the tetrahedra with centers in it."""
     members = np.flatnonzero(_near(points, alpha, box))
@@ -221,9 +215,8 @@ def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
     counts = np.array([piece.number for piece in pieces])
     firsts = np.cumsum(counts) - counts
     faces = np.concatenate([piece.faces for piece in pieces])
-    regions = np.concatenate(
-        [first + piece.regions for first, piece in zip(firsts, pieces, strict=True)]
-    )
+    each = zip(firsts, pieces, strict=True)
+    regions = np.concatenate([first + piece.regions for first, piece in each])
     inner = np.zeros(len(faces), bool)
     table = np.full(1 << (2 * len(faces)).bit_length(), -1)
     parent = np.arange(counts.sum())
@@ -232,12 +225,10 @@ def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
 
 
 def _boxes(points: Points, alpha: float, most: int) -> list[Array]:
-    """Boxes that together are all of space, with about as many points within alpha of each.
-
-    They decide how long the shape takes, and nothing else: so a sample of the points will do.
-    """
+    """Boxes that together are all of space, with about as many points within alpha of each."""
     if min(most, len(points)) <= 1 or not np.isfinite(alpha):
         return [WHOLE]
+    # A sample will do: the boxes decide how long the shape takes, and nothing else.
     chosen = np.random.default_rng(0).integers(len(points), size=SAMPLED)
     return _divided(points[chosen], alpha, WHOLE, most)
 
@@ -320,16 +311,8 @@ def _measure(mesh: Delaunay) -> tuple[Array, Array]:
     names = np.arange(len(points))
 
     def task(part: slice) -> Callable[[], object]:
-        return partial(
-            kernels.measure_cells,
-            points,
-            mesh.tetrahedra[part],
-            names,
-            WHOLE,
-            scratch(),
-            radii[part],
-            volumes[part],
-        )
+        given = points, mesh.tetrahedra[part], names, WHOLE, scratch()
+        return partial(kernels.measure_cells, *given, radii[part], volumes[part])
 
     parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))
     return np.ldexp(radii, exponent), np.ldexp(volumes, 3 * exponent)

@@ -60,7 +60,6 @@ class Hull:
         return None if self.volume_corrected is None else self.volume - self.volume_corrected
 
     def _repr_html_(self) -> str:
-        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Skin, html_card
 
         return html_card(repr(self), Skin(self.vertices, self.faces))
@@ -89,25 +88,17 @@ class Hull:
 
     def __repr__(self) -> str:
         regions = f"{self.regions:,} region" + ("s" if self.regions != 1 else "")
+        bias, shape = "", "convex hull"
+        if self.volume_corrected is not None:
+            bias = f" (without sampling bias about {self.volume_corrected:.4g} m³)"
+        if np.isfinite(self.alpha):
+            ratio = f" ({self.alpha / self.spacing:.2g} mean spacings)" if self.volume > 0 else ""
+            shape = f"alpha shape, alpha = {self.alpha:.4g} m{ratio},"
         return (
-            f"Hull: volume {quantity(self.volume, 'm³')}{self._bias_text}, "
+            f"Hull: volume {quantity(self.volume, 'm³')}{bias}, "
             f"area {quantity(self.area, 'm²')}, {regions}, {len(self.faces):,} triangles\n"
-            f"  {self._shape_text} of {self.n:,} points"
+            f"  {shape} of {self.n:,} points"
         )
-
-    @property
-    def _bias_text(self) -> str:
-        """Effect of the sampling on the volume, if asked for."""
-        if self.volume_corrected is None:
-            return ""
-        return f" (without sampling bias about {self.volume_corrected:.4g} m³)"
-
-    @property
-    def _shape_text(self) -> str:
-        if np.isinf(self.alpha):
-            return "convex hull"
-        spacings = f" ({self.alpha / self.spacing:.2g} mean spacings)" if self.volume > 0 else ""
-        return f"alpha shape, alpha = {self.alpha:.4g} m{spacings},"
 
 
 def convex_hull(points: np.ndarray) -> Hull:

@@ -189,7 +189,6 @@ def _taken(components: Array, order: Index) -> Array:
 
 
 def _finite_values(values: object, n: int) -> Array:
-    """Values as floats, shape (n, m), or a clear error."""
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.ndim != 2 or len(array) != n:
         raise InvalidInput("values", f"array of shape {array.shape}", f"of shape ({n}, m)")

@@ -161,7 +161,9 @@ def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
         ahead, slopes[working] = _linearized(image, points[working], across)
         missing[working] = np.linalg.norm(ahead - value, axis=1)
         step = _newton(slopes[working], -(ahead @ across.T))
-        points[working] = _moved(points[working], step)
+        first, second = tangents_at(points[working])
+        moved = points[working] + step[:, :1] * first + step[:, 1:] * second
+        points[working] = _unit(moved)
         before, last[working] = last[working], np.linalg.norm(step, axis=1)
         # Where the map is nearly singular, rounding alone keeps steps from becoming any smaller.
         at_noise = (last[working] >= before) & (missing[working] < _RESIDUAL)
@@ -191,11 +193,6 @@ def _newton(slopes: Array, missing: Array) -> Array:
     step = np.stack([d * x - b * y, a * y - c * x], axis=1) / determinant[:, None]
     size = np.linalg.norm(step, axis=1, keepdims=True)
     return step * np.minimum(1.0, _WIDEST / np.maximum(size, 1e-300))
-
-
-def _moved(points: Array, step: Array) -> Array:
-    first, second = tangents_at(points)
-    return _unit(points + step[:, :1] * first + step[:, 1:] * second)
 
 
 def tangents_at(points: Array) -> Array:

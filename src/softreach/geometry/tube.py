@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.geometry.surface import Surface
-from softreach.support.arrays import Array, Faces, Index
+from softreach.support.arrays import Faces, Index
 from softreach.support.errors import InvalidInput
 
 __all__ = ["grid_faces", "joined", "ribbon_surface", "tube_surface"]
@@ -38,7 +38,9 @@ def tube_surface(
     Raises:
         InvalidInput: Fewer than two stations or three sides.
     """
-    center = _check_curve(centerline)
+    center = np.asarray(centerline, float)
+    if center.ndim != 2 or center.shape[1] != 3 or len(center) < 2:
+        raise InvalidInput("centerline.shape", center.shape, "(stations, 3) with stations >= 2")
     if sides < 3:
         raise InvalidInput("sides", sides, "at least 3")
     angles = 2 * np.pi * np.arange(sides) / sides
@@ -94,13 +96,6 @@ def joined(parts: Sequence[Surface]) -> Surface:
         vertices=np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
         faces=np.concatenate([np.empty((0, 3), np.int64), *faces]),
     )
-
-
-def _check_curve(points: ArrayLike) -> Array:
-    curve = np.asarray(points, float)
-    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2:
-        raise InvalidInput("centerline.shape", curve.shape, "(stations, 3) with stations >= 2")
-    return curve
 
 
 def _tube_faces(stations: int, sides: int) -> Faces:
