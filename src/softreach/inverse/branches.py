@@ -90,22 +90,16 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
 
 
 def _sets(order: Index, size: int) -> list[Index]:
-    """Sets of about this size, each of groups of neighbors from everywhere.
-
-    Neighbors share candidates, and near a place that is reached in many ways all of them are hard.
-    """
+    """Sets of about this size, of groups of neighbors (alike in work) from everywhere."""
     groups = [order[block] for block in parallel.blocks(len(order), _SMALLEST)]
     number = -(-len(order) // size)
     return [np.concatenate(groups[k::number]) for k in range(number)]
 
 
 def _set_size(prepared: PreparedMap, count: int) -> int:
-    """Number of targets to solve together: enough of them for kernels, enough sets for threads.
-
-    Rods under loads are work enough to be shared out among threads by themselves.
-    """
+    """Number of targets to solve together: enough of them for kernels, enough sets for threads."""
     if prepared.branch_map.supports_unstable:
-        return _LARGEST_LOADED
+        return _LARGEST_LOADED  # work enough to be shared out among threads
     return min(_LARGEST, max(_SMALLEST, -(-count // (_SHARES * parallel.thread_count()))))
 
 
@@ -144,7 +138,9 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
         tips, slopes = rod.tips_and_slopes(search.trial[active])
         newton.newton_step(search, active, tips, slopes, low, high, request.residual)
         if rod.supports_unstable:
-            _give_up(search, active)
+            # A search whose step leads nowhere has ended, as where the tip moves without limit.
+            lost = active[~np.isfinite(search.trial[active]).all(axis=1)]
+            search.trial[lost], search.state[lost] = search.gamma[lost], STAGNATED
     converged = np.flatnonzero(search.state == CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     trial, goal = search.trial[converged], goal[converged]
@@ -204,12 +200,6 @@ def _improved(rod: TipMap, goal: Array, starts: Starts) -> Array:
         row, miss = row[nearer], next_miss[nearer]
         gamma[row] = trial[nearer]
     return gamma
-
-
-def _give_up(search: Search, active: Index) -> None:
-    """End searches whose step leads nowhere, as where the tip moves without limit."""
-    lost = active[~np.isfinite(search.trial[active]).all(axis=1)]
-    search.trial[lost], search.state[lost] = search.gamma[lost], STAGNATED
 
 
 def _search(goal: Array, start: Array) -> Search:

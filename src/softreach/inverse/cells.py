@@ -39,7 +39,8 @@ def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[Activatio
         depth: Most halvings of a cell where det J is uneven or changes sign.
     """
     lattice = _Lattice(rod, cells << depth)
-    low, width = _even_cells(cells, depth)
+    axis, width = np.arange(cells) << depth, 1 << depth  # in steps of the finest lattice
+    low = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
     kept: list[Index] = []
     total = len(low)
     for level in range(depth + 1):
@@ -58,7 +59,10 @@ def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[Activatio
         torn |= mesh.interpolation_error > _TORN * rod.length
     if torn.any():
         mesh = _mesh(lattice, corner[~torn])
-    return mesh, _torn(lattice, corner[torn], cells)
+    vertex = np.unique(corner[torn])
+    vertex = vertex[np.isfinite(lattice.det[vertex])]
+    found = lattice.gamma[vertex], lattice.tip[vertex], lattice.slope[vertex]
+    return mesh, TornCells.at(*found, rod.box.widths / cells)
 
 
 def image_tree(mesh: ActivationMesh) -> SpaceTree:
@@ -80,7 +84,6 @@ class ImageLeaves:
     """
 
     def __init__(self, mesh: ActivationMesh) -> None:
-        """Boxes round all images."""
         self._mesh, self._boxes, self._rounding = mesh, _image_boxes(mesh), _rounding(mesh)
         self._low, self._high = np.ascontiguousarray(np.moveaxis(self._boxes, 0, 2))
         self._root = _root(self._boxes)
@@ -146,12 +149,6 @@ class TornCells(NamedTuple):
         return np.nonzero(near)[0], vertex[near]
 
 
-def _even_cells(cells: int, depth: int) -> tuple[Index, int]:
-    """First corners of the coarsest cells, in steps of the finest lattice, and their width."""
-    axis = np.arange(cells) << depth
-    return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3), 1 << depth
-
-
 def _uneven(det: Array) -> Mask:
     """Cells in which det J changes sign or nearly so: there the map folds or is about to."""
     small, large = np.abs(det).min(axis=1), np.abs(det).max(axis=1)
@@ -187,14 +184,6 @@ class _Lattice:
         self.slope = np.concatenate([self.slope, slope])
         with np.errstate(invalid="ignore"):  # where there is no equilibrium
             self.det = np.concatenate([self.det, np.linalg.det(slope)])
-
-
-def _torn(lattice: _Lattice, corner: Index, cells: int) -> TornCells:
-    """The corners that have a tip, of cells of which some have none or are on another branch."""
-    vertex = np.unique(corner)
-    vertex = vertex[np.isfinite(lattice.det[vertex])]
-    widths = lattice.rod.box.widths / cells
-    return TornCells.at(lattice.gamma[vertex], lattice.tip[vertex], lattice.slope[vertex], widths)
 
 
 def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:
@@ -278,24 +267,15 @@ class _Growing:
         self.child.append(child)
         leaf = ~open_nodes
         count = np.where(leaf, self.count, 0)
-        listed = (
-            np.repeat(leaf, self.count) if len(self.count) > 1 else np.zeros(len(self.item), bool)
-        )
+        several = len(self.count) > 1
+        listed = np.repeat(leaf, self.count) if several else np.zeros(len(self.item), bool)
         self.done.append((self.listed + np.cumsum(count) - count, count))
         self.items.append(self.item[listed])
         self.listed += int(count.sum())
 
     def finished(self) -> SpaceTree:
-        """The tree with its last nodes as leaves."""
         self._close(np.zeros(len(self.count), bool))
         first, count = (np.concatenate(part) for part in zip(*self.done, strict=True))
-        return SpaceTree(
-            self.planes,
-            self.boxes,
-            self.low,
-            self.size,
-            np.concatenate(self.child),
-            first,
-            count,
-            np.concatenate(self.items),
-        )
+        child, items = np.concatenate(self.child), np.concatenate(self.items)
+        space = self.planes, self.boxes, self.low, self.size
+        return SpaceTree(*space, child, first, count, items)

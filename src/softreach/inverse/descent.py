@@ -11,7 +11,7 @@ import numpy as np
 from softreach.kernels.box.box_newton import box_steps
 from softreach.rod.activation_box import ActivationBox, damped_steps
 from softreach.rod.tip_map import BLOCK, TipMap
-from softreach.support.arrays import Array, Index, Mask, rows
+from softreach.support.arrays import Array, Index, Mask
 
 _FEW = BLOCK // 8
 _MOST_ITERATIONS = 60
@@ -55,7 +55,9 @@ def descend(
         if not len(active):
             break
         goal, gamma = targets[active], ends.gamma[active]
-        trial = _trials(rod, rows(ends, active), goal, damping[active])
+        gap, slope = (ends.tip[active] - goal) / rod.length, ends.slope[active] / rod.length
+        softness = damping[active] * ends.residual[active] / rod.length
+        trial = damped_steps(rod.box, gamma, gap, slope, softness)[0]
         tip, slope = linearized(rod, trial)
         miss = np.linalg.norm(tip - goal, axis=1)
         better = miss < ends.residual[active]
@@ -104,7 +106,8 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Arra
         taken = active[accepted]
         gamma[taken] = trial[accepted]
         value[taken], gradient[taken], hessian[taken] = (part[accepted] for part in ahead)
-        damping[active] = _next_damping(damped, accepted)
+        eased = np.where(damped > 1e-6, 0.1 * damped, 0.0)
+        damping[active] = np.where(accepted, eased, np.maximum(10 * damped, 1e-3))
         active = active[~still & (damping[active] < _LARGEST_NEWTON_DAMPING)]
     return gamma, value
 
@@ -178,12 +181,6 @@ class Descent(NamedTuple):
     """|tip - target| [m], shape (n,)."""
 
 
-def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
-    """The end of each step."""
-    miss, softness = (at.tip - targets) / rod.length, damping * at.residual / rod.length
-    return damped_steps(rod.box, at.gamma, miss, at.slope / rod.length, softness)[0]
-
-
 class _Expansion(NamedTuple):
     """Functions to second order about a point each."""
 
@@ -191,11 +188,6 @@ class _Expansion(NamedTuple):
     gradient: Array
     hessian: Array
     """NaN where it was not asked for."""
-
-
-def _next_damping(damping: Array, accepted: Mask) -> Array:
-    eased = np.where(damping > 1e-6, 0.1 * damping, 0.0)
-    return np.where(accepted, eased, np.maximum(10 * damping, 1e-3))
 
 
 def _expanded(

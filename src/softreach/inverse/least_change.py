@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -86,8 +87,6 @@ def _random_activations(rod: TipMap, request: Request) -> Iterator[Array]:
 
 
 class _Families:
-    """Activations of each target that are apart from each other."""
-
     def __init__(self, first: Array, most: int, scales: Array) -> None:
         """Begin with one of each target, shape (t, m); `most` is for how many there is room."""
         self.members = np.repeat(first[:, None], most, axis=1)
@@ -100,12 +99,9 @@ class _Families:
         return np.arange(self.members.shape[1]) < self.counts[:, None]
 
     def add(self, rows: Index, other: Array, near: Array | None) -> None:
-        """Add one activation to some targets, if it is a new one, and put the least change first.
+        """Add one activation each to some targets if it is new; the least change comes first.
 
-        Args:
-            rows: Numbers of the targets.
-            other: An activation for each.
-            near: Activations from which changes count; None where the first stays first.
+        Changes count from `near`; without it the first stays first.
         """
         apart = np.abs(self.members[rows] - other[:, None]) / self._scales
         distance = np.where(self.is_member[rows], apart.max(axis=2), np.inf)
@@ -144,20 +140,17 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
     """
     count, rod = len(request.targets), prepared.rod
     every = _starts(prepared, request)
-    owner, start = _promising(prepared, request, *every)
+    # The best searches of each target after a few steps, those that are apart.
+    survey = sqp(prepared.coarse_rod, request, *every, most=_SURVEY)
+    places = _by_owner(every[0], survey.merit, count)
+    owner, start = prepared.seeds.starts(survey.gamma[places], _SURVIVORS, _MERGED)
     if known is not None:
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
     coarse = sqp(prepared.coarse_rod, request, owner, start, settled=_SETTLED, most=_MOST_COARSE)
     leading = _leading(prepared, request, owner, coarse)
-    fine = sqp(
-        rod,
-        request,
-        owner[leading],
-        coarse.gamma[leading],
-        proximity=coarse.proximity[leading],
-        settled=_POLISHED,
-        most=_MOST_POLISHING,
-    )
+    start, begin = coarse.gamma[leading], coarse.proximity[leading]
+    polish = partial(sqp, settled=_POLISHED, most=_MOST_POLISHING)
+    fine = polish(rod, request, owner[leading], start, proximity=begin)
     # Where a search lost its target, that lies next to a fold or a boundary.
     lost = np.zeros(count, bool)
     off = (fine.residual > _NEARLY_HIT * rod.length) | (fine.penalty > _STEEP)
@@ -207,25 +200,15 @@ def _on_target(rod: TipMap, request: Request, owner: Index, ends: Minima) -> Rea
 def _searched_again(
     prepared: PreparedMap, request: Request, ends: Reached, lost: Index, owner: Index, start: Array
 ) -> Reached:
-    """Search once more for some targets, from every start and on the exact map alone.
-
-    Then first for the target, and for less change without leaving it.
-    """
+    """Search again on the exact map from every start, also with the target before less change."""
     rod, chosen = prepared.rod, np.isin(owner, lost)
     owner = np.concatenate([owner[chosen], lost])
     start = np.concatenate([start[chosen], ends.gamma[lost]])
-    plain = sqp(rod, request, owner, start, settled=_POLISHED, most=_MOST_AGAIN)
+    search = partial(sqp, settled=_POLISHED, most=_MOST_AGAIN)
+    plain = search(rod, request, owner, start)
     at = descend(rod, request.targets[owner], start, request.residual)
     hit = np.flatnonzero(at.residual <= request.residual)
-    kept = sqp(
-        rod,
-        request,
-        owner[hit],
-        at.gamma[hit],
-        penalty=_HIGH_PENALTY,
-        settled=_POLISHED,
-        most=_MOST_AGAIN,
-    )
+    kept = search(rod, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY)
     found = [
         ends,
         _on_target(rod, request, owner, plain),
@@ -255,29 +238,16 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     return np.concatenate(owners), np.concatenate(starts)
 
 
-def _promising(
-    prepared: PreparedMap, request: Request, owner: Index, start: Array
-) -> tuple[Index, Array]:
-    """Activations of the best searches of each target after a few steps, those that are apart."""
-    ends = sqp(prepared.coarse_rod, request, owner, start, most=_SURVEY)
-    places = _by_owner(owner, ends.merit, len(request.targets))
-    return prepared.seeds.starts(ends.gamma[places], _SURVIVORS, _MERGED)
-
-
 def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:
     """The best compromise of change and direction that keeps the position, from several starts."""
     count = len(known)
     owner, start = _starts(prepared, request)
     owner, start = np.concatenate([np.arange(count), owner]), np.concatenate([known, start])
     gamma, residual = constrained_minima(prepared.rod, request.of(owner), start)
-    cost = np.where(
-        residual <= request.residual, _cost(prepared.rod, request.of(owner), gamma), np.inf
-    )
-    gamma, cost = (
-        np.concatenate([gamma, known]),
-        np.concatenate([cost, _cost(prepared.rod, request, known)]),
-    )
-    owner = np.concatenate([owner, np.arange(count)])
+    cost = _cost(prepared.rod, request.of(owner), gamma)
+    cost = np.where(residual <= request.residual, cost, np.inf)
+    cost = np.concatenate([cost, _cost(prepared.rod, request, known)])
+    gamma, owner = np.concatenate([gamma, known]), np.concatenate([owner, np.arange(count)])
     return gamma[first_of_each(owner, cost, count)]
 
 

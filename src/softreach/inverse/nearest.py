@@ -109,8 +109,6 @@ def _nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
 
 
 class _Effort(NamedTuple):
-    """Searches spent on a target that is still left."""
-
     neighbors: int
     """Seeds looked at."""
     starts: int

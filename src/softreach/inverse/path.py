@@ -140,7 +140,10 @@ class Continuation:
         while done < 1.0:
             part = min(part, 1.0 - done)
             last = part >= 1.0 - done
-            substep = self._substep(point, end if last else begin + (done + part) * (end - begin))
+            target = end if last else begin + (done + part) * (end - begin)
+            substep = self._predicted(point, target)
+            if substep.end is not None and (beside := self._beside(point, target)) is not None:
+                substep = _Substep(point=beside)  # as near as tips can tell where a bound is met
             if substep.end is not None:
                 return substep.end._replace(done=done, error=shortest * distance)
             torn = torn or substep.torn
@@ -155,12 +158,6 @@ class Continuation:
             else:
                 part *= substep.shorten
         return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
-
-    def _substep(self, point: BranchPoint, target: Array) -> _Substep:
-        """A substep to the target, or as near to it as tips can tell where a bound is met."""
-        substep = self._predicted(point, target)
-        beside = None if substep.end is None else self._beside(point, target)
-        return substep if beside is None else _Substep(point=beside)
 
     def _predicted(self, point: BranchPoint, target: Array) -> _Substep:
         """Predict and correct; bundles that would leave their bounds are held there."""
@@ -192,10 +189,8 @@ class Continuation:
         return _Substep(end=BranchEnd(PathStatus.BOUND, point, bundle, upper))
 
     def _beside(self, point: BranchPoint, target: Array) -> BranchPoint | None:
-        """The point of the branch that is at a place as far as tips can tell; None if none is.
-
-        All of the way there has to be as near to the reachable set: half of it is looked at.
-        """
+        """The point of the branch that is at a place as far as tips can tell; None if none is."""
+        # All of the way there has to be as near to the reachable set: half of it is looked at.
         beside = self._within_bounds(point.gamma, np.array([0.5 * (point.tip + target), target]))
         if beside is None or self._left_branch(point, beside.gamma, beside):
             return None
@@ -248,7 +243,6 @@ class Continuation:
         return bool(sizes[2] > _FOLDED * self.rod.length)
 
     def _clipped(self, point: BranchPoint) -> BranchPoint:
-        """The point moved inside the bounds."""
         gamma = self.box.clip(point.gamma)
         return point if np.array_equal(gamma, point.gamma) else self.at(gamma)
 
@@ -259,9 +253,8 @@ class Continuation:
         """The part of a substep that ends just inside the bounds."""
         bound = np.where(corrected > self.box.high, self.box.high, self.box.low)
         inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales / np.abs(corrected - gamma).clip(1e-300)
-        part = (
-            (bound - gamma)[over] / (corrected - gamma)[over] * np.minimum(inside[over], 1 - 1e-6)
-        )
+        part = (bound - gamma)[over] / (corrected - gamma)[over]
+        part *= np.minimum(inside[over], 1 - 1e-6)
         return float(np.clip(part.min(), 1e-6, 0.9999))
 
 
@@ -310,7 +303,6 @@ def _least_norm(slope: Array, moving: Mask) -> Array:
 def _best_start(
     rod: TipMap, tracker: Continuation, target: Array, residual: float
 ) -> BranchPoint | None:
-    """The best-conditioned solution for the first target, if there is one."""
     solution = solve_inverse(rod, target[None], residual_over_length=residual)[0]
     if not len(solution):
         return None
@@ -335,7 +327,6 @@ def _followed(
 def _dataset(
     rod: TipMap, points: Array, followed: list[Array], end: BranchEnd | None
 ) -> xr.Dataset:
-    """The result; `end` is None if there was nothing to begin with."""
     import xarray as xr
 
     box, n, units = rod.box, len(followed), activation_attributes(rod.arm, rod.box.names)

@@ -87,19 +87,18 @@ def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough
     """Halve the cells of some targets until they are far enough away or too many."""
     near = [coarse.near(*case) for case in zip(targets, enough, strict=True)]
     counts = np.array([len(rows) for rows in near])
-    most = _most_cells(rod.box.dimension)
+    most = _MOST_EXCLUSION_CELLS if rod.box.dimension <= _MOST_BUNDLES else 0
+    most = _MOST_OF_THREE if rod.box.dimension <= 3 else most
     few = counts <= most
     owner, half = np.repeat(np.arange(len(enough)), counts * few), coarse.half
-    center = coarse.center[
-        np.concatenate([cells[: len(cells) * ok] for cells, ok in zip(near, few, strict=True)])
-    ]
+    kept = [cells[: len(cells) * ok] for cells, ok in zip(near, few, strict=True)]
+    center = coarse.center[np.concatenate(kept)]
     least = np.where(few, enough, 0.0)
     spent = np.zeros(len(enough), np.int64)
     while len(owner):
         blocks = [slice(first, first + _BLOCK) for first in range(0, len(owner), _BLOCK)]
-        bounds = np.concatenate(
-            [_distances(rod, half, center[b], targets[owner[b]]) for b in blocks]
-        )
+        each = [_distances(rod, half, center[b], targets[owner[b]]) for b in blocks]
+        bounds = np.concatenate(each)
         spent += np.bincount(owner, minlength=len(enough))
         left = bounds < enough[owner]
         halves = np.bincount(owner[left], minlength=len(enough)) * 2
@@ -109,13 +108,6 @@ def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough
         half, center = _halved(rod, half, center[left])
         owner = np.repeat(owner[left], 2)
     return np.maximum(least, 0.0)
-
-
-def _most_cells(bundles: int) -> int:
-    """Most cells that are examined for one target."""
-    if bundles <= 3:
-        return _MOST_OF_THREE
-    return _MOST_EXCLUSION_CELLS if bundles <= _MOST_BUNDLES else 0
 
 
 def _halved(rod: TipMap, half: Array, center: Array) -> tuple[Array, Array]:

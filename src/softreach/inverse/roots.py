@@ -118,7 +118,10 @@ def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index
             part = left[first : first + _BLOCK]
             near = prepared.seeds.nearest(request.targets[part], neighbors)
             owner, start = prepared.seeds.starts(near, most, apart)
-            roots = roots.joined(_from_starts(prepared.rod, request, part[owner], start))
+            goal, owner = request.targets[part[owner]], part[owner]
+            gamma = affine_invariant_newton(prepared.rod, goal, start, request.residual)
+            found = roots_at(prepared.rod, request.targets, owner, gamma)
+            roots = roots.joined(rows(found, found.residual <= request.residual))
     return roots
 
 
@@ -157,11 +160,8 @@ def affine_invariant_newton(rod: TipMap, targets: Array, start: Array, residual:
         left = np.linalg.norm(np.einsum("nij,nj->ni", inverse, away), axis=1)
         accepted = left <= (1.0 - 0.25 * factor) * size
         taken = active[accepted]
-        gamma[taken], slope[taken], miss[taken] = (
-            trial[accepted],
-            new_slope[accepted],
-            away[accepted],
-        )
+        gamma[taken], slope[taken] = trial[accepted], new_slope[accepted]
+        miss[taken] = away[accepted]
         damping[active] = np.where(accepted, np.minimum(1.0, 3.0 * factor), 0.3 * factor)
         near = np.linalg.norm(miss[active], axis=1) <= residual
         end = (size <= _CONVERGED) | (near & ~accepted) | (damping[active] < _LEAST_DAMPING)
@@ -173,13 +173,6 @@ def _closed_form(slope: Array) -> tuple[Array, Array]:
     smallest, condition = np.empty(len(slope)), np.empty(len(slope))
     newton.conditions(slope, smallest, condition)
     return smallest, condition
-
-
-def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
-    """Roots from starts."""
-    gamma = affine_invariant_newton(rod, request.targets[owner], start, request.residual)
-    roots = roots_at(rod, request.targets, owner, gamma)
-    return rows(roots, roots.residual <= request.residual)
 
 
 class _Valley(NamedTuple):

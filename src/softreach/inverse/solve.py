@@ -32,7 +32,7 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_number
-from softreach.support.arrays import Array, Index, Mask, as_directions, joined, rows
+from softreach.support.arrays import Array, as_directions, joined, rows
 from softreach.support.errors import Range
 
 __all__ = ["solve_inverse"]
@@ -134,36 +134,26 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
     bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
-    left = missing[_perhaps_singular(prepared, request, closest.gap, bounds)]
-    if len(left):
-        late = distinct(prepared, request, nearly_singular_roots(prepared, request, left))
+    # A target not proved to be out of reach may have roots that are nearly singular.
+    left = (closest.gap > request.residual) & (bounds == 0.0)
+    if not prepared.proves:
+        left &= closest.gap <= _NEARLY * prepared.whole.length
+    if left.any():
+        late = nearly_singular_roots(prepared, request, missing[left])
+        late = distinct(prepared, request, late)
         roots, still = roots.joined(late), np.isin(missing, late.target, invert=True)
-        missing, closest, bounds = missing[still], rows(closest, still), bounds[still]
-    solutions = _solutions(prepared, request, roots, missing, closest, bounds)
-    return replace(solutions, unstable=unstable)
-
-
-def _perhaps_singular(prepared: PreparedMap, request: Request, gap: Array, bound: Array) -> Mask:
-    """Mask of the targets that may have roots that only a search of nearly singular ones finds.
-
-    Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
-    """
-    left = (gap > request.residual) & (bound == 0.0)
-    if prepared.proves:
-        return left
-    return left & (gap <= _NEARLY * prepared.whole.length)
+        closest, bounds = rows(closest, still), bounds[still]
+    return replace(_solutions(prepared, request, roots, closest, bounds), unstable=unstable)
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     """Nearest points, or compromises between distance and direction."""
-    roots = _stable_roots(prepared, request) if prepared.dimension == 3 else None
+    roots = None
+    if prepared.dimension == 3:
+        branches = every_branch(prepared, request)
+        roots = rows(branches, branches.stable)
     closest = nearest(prepared, request, roots)
-    return _with_nearest(prepared, request, no_roots(prepared.rod), closest)
-
-
-def _stable_roots(prepared: PreparedMap, request: Request) -> Roots:
-    branches = every_branch(prepared, request)
-    return rows(branches, branches.stable)
+    return _solutions(prepared, request, no_roots(prepared.rod), closest)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
@@ -172,16 +162,7 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     roots = roots_at(prepared.rod, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
     closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
-    return _with_nearest(prepared, request, roots, closest)
-
-
-def _with_nearest(
-    prepared: PreparedMap, request: Request, roots: Roots, closest: Nearest
-) -> Solutions:
-    """The solutions, from roots and the nearest points to all targets that have none."""
-    missing = roots.missing(len(request.targets))
-    bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
-    return _solutions(prepared, request, roots, missing, closest, bounds)
+    return _solutions(prepared, request, roots, closest)
 
 
 def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
@@ -200,21 +181,14 @@ def _solutions(
     prepared: PreparedMap,
     request: Request,
     roots: Roots,
-    missing: Index,
     closest: Nearest,
-    bounds: Array,
+    bounds: Array | None = None,
 ) -> Solutions:
-    """Put together the roots and, for targets without one, the nearest points.
-
-    Args:
-        prepared: The tip map.
-        request: The request.
-        roots: The roots found, sorted by target.
-        missing: Numbers of the targets without a root.
-        closest: The nearest points to these; some may prove to be roots.
-        bounds: Lower bounds of the gaps of these.
-    """
+    """Join roots, sorted by target, and the nearest points to targets without; some are roots."""
     rod, count = prepared.rod, len(request.targets)
+    missing = roots.missing(count)
+    if bounds is None:
+        bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
     hit = closest.gap <= request.allowance
     roots = roots.joined(roots_at(rod, request.targets, missing[hit], closest.gamma[hit]))
     # Roots on a bound that miss by what the error of the tips leaves open come last.

@@ -82,16 +82,9 @@ def sqp(
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-n // parallel.thread_count()))
     rod.prepare()
+    search = partial(_searched, rod, request, penalty=penalty, limits=(settled, most))
     parallel.run(
-        partial(
-            _searched,
-            rod,
-            request,
-            owner[block],
-            Minima(*(part[block] for part in minima)),
-            penalty,
-            (settled, most),
-        )
+        partial(search, owner[block], Minima(*(part[block] for part in minima)))
         for block in parallel.blocks(n, share)
     )
     return minima._replace(residual=minima.residual * rod.length)
@@ -123,19 +116,8 @@ def _searched(
         if rod.supports_unstable:
             lost = np.isnan(tips[:n, 0])
             tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
-        n = judge(
-            running,
-            n,
-            tips,
-            ahead,
-            owner,
-            request.targets,
-            request.near,
-            bounds,
-            rod.length,
-            limits,
-            ends,
-        )
+        asked = request.targets, request.near
+        n = judge(running, n, tips, ahead, owner, *asked, bounds, rod.length, limits, ends)
         steps = (part[:n] for part in (running.center, running.slope, running.wanted))
         limited = (part[:n] for part in (running.softness, running.low, running.high))
         project(*steps, *limited, running.trial[:n], running.multiplier[:n])
@@ -143,28 +125,14 @@ def _searched(
 
 
 def _room(n: int, m: int) -> Running:
-    """Room for so many searches."""
-    numbers = [np.empty(n) for _ in range(6)]
-    places = [np.empty((n, 3)) for _ in range(3)]
-    activations = [np.empty((n, m)) for _ in range(5)]
     return Running(
         row=np.empty(n, np.int64),
         steps=np.empty(n, np.int64),
-        gamma=activations[0],
-        miss=places[0],
         slope=np.empty((n, 3, m)),
-        penalty=numbers[0],
-        proximity=numbers[1],
-        reach=numbers[5],
-        weight=numbers[4],
-        gain=numbers[2],
-        center=activations[1],
-        wanted=places[1],
-        softness=numbers[3],
-        low=activations[2],
-        high=activations[3],
-        trial=activations[4],
-        multiplier=places[2],
+        **{name: np.empty((n, 3)) for name in ("miss", "wanted", "multiplier")},
+        **{name: np.empty((n, m)) for name in ("gamma", "center", "low", "high", "trial")},
+        **{name: np.empty(n) for name in ("penalty", "proximity", "reach", "weight")},
+        **{name: np.empty(n) for name in ("gain", "softness")},
     )
 
 
