@@ -89,7 +89,8 @@ def compute_cloud(
             says what to use instead.
     """
     report = None if progress is None else as_function("progress", progress)
-    rod = _of_all_bundles(tip_map(arm, tol, frame=frame))
+    rod = tip_map(arm, tol, frame=frame)
+    rod = rod.base if isinstance(rod, View) else rod  # that of all bundles, each in its own unit
     bundles = rod.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)
@@ -103,12 +104,7 @@ def compute_cloud(
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
-def save_cloud(
-    cloud: xr.Dataset,
-    path: str | PathLike[str],
-    *,
-    overwrite: bool = False,
-) -> None:
+def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a cloud as a Zarr v3 store; it appears whole or not at all.
 
     Every file carries a checksum, so that `open_cloud` notices damage.
@@ -184,27 +180,21 @@ def _fill(
 ) -> None:
     """Draw points of the unit cube in blocks and let the threads turn them into tips meanwhile."""
 
+    def fill(gamma: Array, tips: Array, kept: NDArray[np.int8] | None) -> None:
+        rod.fill(gamma, tips, status=kept)
+        if progress:
+            progress(len(gamma))
+
     def tasks() -> Iterator[Callable[[], object]]:
         first = 0
         for cube in cubes:
             block = slice(first, first := first + len(cube))
             rod.box.from_cube(cube, out=activation[block])
             kept = status[block] if len(status) else None
-            task = partial(rod.fill, activation[block], tip[block], status=kept)
-            yield partial(_reported, task, progress, len(cube)) if progress else task
+            yield partial(fill, activation[block], tip[block], kept)
 
     rod.prepare()
     parallel.run(tasks())
-
-
-def _reported(task: Callable[[], object], progress: Progress, count: int) -> None:
-    task()
-    progress(count)
-
-
-def _of_all_bundles(rod: TipMap) -> TipMap:
-    """The map of every bundle, in its own unit, of which this one may be a restriction."""
-    return rod.base if isinstance(rod, View) else rod
 
 
 CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}

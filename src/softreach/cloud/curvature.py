@@ -116,8 +116,10 @@ def stream_statistics(
     tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
     for strains in _strains(rod, blocks, z):
         for k in range(len(z)):
-            for name, values in _at_station(strains, k).items():
-                tallies[name].add(k, values)
+            u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
+            tallies["bending"].add(k, np.hypot(u1, u2))  # theory (7), (45)
+            tallies["torsion"].add(k, u3)
+            tallies["extension"].add(k, strains.extension[:, k])
     if not tallies["bending"].count.any():
         raise InvalidInput("activations", "none", "at least one sample")
     return _dataset(rod, z, tallies, shares)
@@ -130,33 +132,21 @@ def distal_stations(arm: Manipulator | TipMap) -> Array:
 
 
 def _blocks(name: str, value: Any) -> Iterable[Array]:
-    """Arrays that come one after the other."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set | type):
         return value
     raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
 
 
 def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
-    """Strains, a few samples at a time."""
     strains = rod.strains_at(z)
     for activation in activations:
         block = rod.check_activations("activations", activation)
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
-            values = strains(block[rows])
-            yield _in_equilibrium(values) if rod.supports_unstable else values
-
-
-def _in_equilibrium(strains: Strains) -> Strains:
-    """Those of the samples that have a stable equilibrium; the others are NaN."""
-    settled = np.isfinite(strains.extension).all(axis=1)
-    return Strains(strains.curvature[settled], strains.extension[settled])
-
-
-def _at_station(strains: Strains, k: int) -> dict[str, Array]:
-    """The values of each quantity at station k, shape (n,)."""
-    u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
-    # theory (7), (45)
-    return {"bending": np.hypot(u1, u2), "torsion": u3, "extension": strains.extension[:, k]}
+            curvature, extension = strains(block[rows])
+            if rod.supports_unstable:  # samples without a stable equilibrium are NaN
+                settled = np.isfinite(extension).all(axis=1)
+                curvature, extension = curvature[settled], extension[settled]
+            yield Strains(curvature, extension)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +171,6 @@ class _Tally:
         return cls(low, width, count, extremes, np.zeros((stations, 2)))
 
     def add(self, k: int, values: Array) -> None:
-        """Count the values of a block at station k."""
         if not len(values):
             return
         bins = self.count.shape[1]

@@ -59,11 +59,7 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     status = {"status": cloud.coords["status"]} if "status" in cloud.coords else {}
     result = xr.Dataset(coords=status, attrs=cloud.attrs)
     result["manipulability"] = ("sample", measure, {"units": unit, "long_name": "√det(J Jᵀ)"})
-    result["condition"] = (
-        "sample",
-        condition,
-        {"units": "1", "long_name": "condition of J"},
-    )
+    result["condition"] = ("sample", condition, {"units": "1", "long_name": "condition of J"})
     if rod.box.bundles == 3:
         result["orientation"] = ("sample", sign, {"units": "1", "long_name": "sign of det J"})
     return result

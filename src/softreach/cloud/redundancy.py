@@ -73,7 +73,11 @@ def activation_distance(
     if (stable := is_stable(cloud)).all():
         mean, others = mean_value_distance(tip, activation, radius, chosen)
     else:
-        mean, others = _among(stable, tip, activation, radius, sample)
+        mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
+        mask, number = stable[sample], np.cumsum(stable) - 1
+        among = number[sample[mask]]
+        found = mean_value_distance(tip[stable], activation[stable], radius, among)
+        mean[mask], others[mask] = found
     counted = {"long_name": "other tips within the radius", "units": "1"}
     return xr.DataArray(
         mean,
@@ -256,17 +260,6 @@ class RedundancySummary:
         )
 
 
-def _among(
-    stable: Mask, tip: Array, activation: Array, radius: float, sample: Index
-) -> tuple[Array, Index]:
-    """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
-    mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
-    mask, number = stable[sample], np.cumsum(stable) - 1
-    measures = mean_value_distance(tip[stable], activation[stable], radius, number[sample[mask]])
-    mean[mask], others[mask] = measures
-    return mean, others
-
-
 def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
     """Indices of the samples of the cloud that were evaluated."""
     n = cloud.sizes["sample"]
@@ -277,21 +270,13 @@ def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
 
 
 def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
-    """Indices of the samples to be evaluated; None for all."""
     if queries is None:
         return None
     count = plain(queries)
-    if isinstance(count, int) and not isinstance(count, bool):
-        return _strided(count, n)
-    return as_indices("queries", queries, n, "samples of the cloud")
-
-
-def _strided(count: int, n: int) -> Index:
-    """One sample of each of `count` parts of about equal size, at a random but fixed place in it.
-
-    Every k-th one would do for independent samples, but in a Sobol sequence those share leading
-    bits, that is a corner of the activation box.
-    """
+    if isinstance(count, bool) or not isinstance(count, int):
+        return as_indices("queries", queries, n, "samples of the cloud")
+    # One of each of `count` even parts, at a random but fixed place in it: every k-th one of a
+    # Sobol sequence would share leading bits, that is a corner of the activation box.
     if not 0 <= count <= n:
         raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
     ends = np.arange(count + 1) * n // max(count, 1)

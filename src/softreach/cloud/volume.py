@@ -74,7 +74,10 @@ def concave_hull(
     bias = as_flag("bias", bias)
     positions = _positions(points)
     radius = _radius(alpha, points)
-    quarter = _quarter(len(positions)) if bias else None
+    quarter = None
+    if bias:  # a random quarter: every fourth point of a Sobol sequence lies in one part of the box
+        quarter = np.zeros(len(positions), bool)
+        quarter[np.random.default_rng(0).permutation(len(positions))[: len(positions) // 4]] = True
     hull, volume_of_quarter = _shape(positions, radius, quarter)
     _warn_if_fine(hull, positions)
     if quarter is None:
@@ -97,10 +100,7 @@ def convex_hull(points: np.ndarray | xr.DataArray) -> Hull:
     return hulls.convex_hull(_positions(points))
 
 
-def unreachability(
-    points: np.ndarray | xr.DataArray,
-    alpha: float | str | None = None,
-) -> float:
+def unreachability(points: np.ndarray | xr.DataArray, alpha: float | str | None = None) -> float:
     """The part of the convex hull that the cloud does not fill, UNR = 1 - V_conc / V_conv [-].
 
     Both volumes are smaller than those of infinitely many points,
@@ -150,10 +150,7 @@ def volume_curve(points: np.ndarray | xr.DataArray, alphas: ArrayLike) -> np.nda
 
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
-    """Points as an array (n, 3); a labeled one may have its axes in either order.
-
-    Of an arm under loads those tips that are stable equilibria.
-    """
+    """Points (n, 3), of an arm under loads the stable tips; labeled axes may be in either order."""
     array = as_floats("points", points)
     if getattr(points, "dims", None) == ("axis", "sample"):
         array = array.T
@@ -166,7 +163,11 @@ def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> flo
     """The radius asked for [m], or ``"critical"``."""
     allowed = "a radius > 0 [m], 'critical', or None"
     if alpha is None:
-        return _default_radius(points)
+        if (length := getattr(points, "attrs", {}).get("length")) is None:
+            hint = "only points with attrs['length'] [m], as cloud.tip has, have a default"
+            hint = f"{hint} of {DEFAULT_RADIUS} of it"
+            raise InvalidInput("alpha", None, "a radius [m] for these points", hint)
+        return DEFAULT_RADIUS * float(length)
     if isinstance(alpha, str):
         if alpha != "critical":
             raise InvalidInput("alpha", repr(alpha), allowed)
@@ -177,19 +178,7 @@ def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> flo
     raise InvalidInput("alpha", as_given(alpha), allowed)
 
 
-def _default_radius(points: np.ndarray | xr.DataArray) -> float:
-    """0.05 of the length of the arm whose tips these are [m]."""
-    length = getattr(points, "attrs", {}).get("length")
-    if length is None:
-        hint = (
-            "only points with attrs['length'] [m], as cloud.tip has, have a default of 0.05 of it"
-        )
-        raise InvalidInput("alpha", None, "a radius [m] for these points", hint)
-    return DEFAULT_RADIUS * float(length)
-
-
 def _alpha_complex(positions: np.ndarray) -> AlphaComplex:
-    """Triangulate and measure."""
     return AlphaComplex(triangulation=delaunay(positions))
 
 
@@ -201,16 +190,6 @@ def _shape(positions: np.ndarray, radius: float | str, part: Mask | None) -> tup
     shape, *of_part = parallel.in_order(partial(_alpha_complex, cloud) for cloud in clouds)
     hull = shape.hull(shape.critical_alpha())
     return hull, sum(each.hull(hull.alpha).volume for each in of_part)
-
-
-def _quarter(n: int) -> Mask:
-    """A fixed random quarter of a cloud of n points.
-
-    Not every fourth point: in a Sobol sequence those all lie in one quarter of the box.
-    """
-    mask = np.zeros(n, bool)
-    mask[np.random.default_rng(0).permutation(n)[: n // 4]] = True
-    return mask
 
 
 def _warn_if_fine(hull: Hull, positions: np.ndarray) -> None:
@@ -237,7 +216,6 @@ def _warn_if_fine(hull: Hull, positions: np.ndarray) -> None:
 
 
 def _in_spacings(hull: Hull, spacing: float) -> str:
-    """The radius of a hull beside the mean spacing of its points."""
     return (
         f"{hull.alpha:.4g} m is {hull.alpha / spacing:.2g} mean spacings of "
         f"{hull.n} points ({spacing:.4g} m)"
