@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -81,8 +81,6 @@ class Grown(NamedTuple):
 
 
 class _Program(NamedTuple):
-    """The solution of a linear program."""
-
     gamma: Array
     """Change of the activations [unit of each], shape (bundles,)."""
     force: float
@@ -95,7 +93,6 @@ class _Program(NamedTuple):
     """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
 
     def shortened(self, share: float) -> _Program:
-        """A share of the changes."""
         return self._replace(gamma=share * self.gamma, force=share * self.force)
 
 
@@ -149,8 +146,12 @@ class Growth:
         Args:
             begun: The tip on the way there in other steps along the arm, to begin with the last.
         """
-        fixed = self._in_these_steps(begun[-1]) if begun else self.first
-        if fixed is None:
+        if begun:  # in these steps, under the same force
+            last = begun[-1]
+            fixed = self._corrected(last.gamma, last.force, 0.0, last.response)
+        else:
+            fixed = self.first
+        if fixed is None or (begun and not self._is_stable(fixed)):
             return None
         path = [*begun[-2:-1], fixed] if begun else [fixed]
         if end := self._followed(path, _AGAIN_FIRST if begun else _FIRST):
@@ -160,11 +161,9 @@ class Growth:
         return self._end(path, self._program(path[-1], _LOCAL))
 
     def _followed(self, path: list[FixedTip], reach: float) -> Grown | None:
-        """Go on along a path until steps are too short; the end, where something else stops it.
+        """Extend a path until steps are too short; the end, where something else stops it.
 
-        Args:
-            path: The tip so far, to which its further places are added.
-            reach: Largest change of an activation in the first step, of its range.
+        No activation changes by more than `reach` of its range in the first step.
         """
         for _ in range(_MOST_STEPS):
             best = self._program(path[-1], reach)
@@ -188,13 +187,10 @@ class Growth:
         return self._end(path, self._program(path[-1], _LOCAL), Stop.UNFINISHED)
 
     def _step(self, path: list[FixedTip], best: _Program) -> tuple[float, bool]:
-        """Try a step of a path.
-
-        Returns:
-            The share of the growth foreseen, 0 if the step is not taken, and True if it is not as
-            the rod would not rest stably.
-        """
-        fixed, tried = path[-1], self._tried(path, best)
+        """Try a step: its share of the growth foreseen, 0 if not taken; was it for stability?"""
+        fixed = path[-1]
+        gamma, force = self.box.clip(fixed.gamma + best.gamma), fixed.force + best.force
+        tried = self._corrected(gamma, force, self.unit, _ahead(path, force))
         if tried is None:
             return 0.0, fixed.response.margin <= _NEAR_LOSS
         share, stable = (tried.force - fixed.force) / best.force, self._is_stable(tried)
@@ -208,11 +204,6 @@ class Growth:
         if fixed.response.margin > _NEAR_LOSS or self.pushing.is_finest:
             return False
         return self.pushing.error(*fixed) > 0.5 * self.allowed
-
-    def _in_these_steps(self, begun: FixedTip) -> FixedTip | None:
-        """The tip at its place under the same force; None if it is not there or not stable."""
-        fixed = self._corrected(begun.gamma, begun.force, 0.0, begun.response)
-        return fixed if fixed and self._is_stable(fixed) else None
 
     @property
     def _shortest(self) -> float:
@@ -231,22 +222,11 @@ class Growth:
             stop = Stop.BOUND if limits.any() else Stop.SINGULAR
         return Grown(fixed, stop, limits & (stop == Stop.BOUND), best.slope, before)
 
-    def _tried(self, path: list[FixedTip], best: _Program) -> FixedTip | None:
-        """The tip back at its place after a step, if it can be."""
-        fixed = path[-1]
-        gamma, force = self.box.clip(fixed.gamma + best.gamma), fixed.force + best.force
-        return self._corrected(gamma, force, self.unit, _ahead(path, force))
-
     def _is_stable(self, fixed: FixedTip) -> bool:
         return self.pushing.is_stable(fixed.gamma, fixed.force, fixed.response)
 
     def _program(self, fixed: FixedTip, reach: float) -> _Program:
-        """The change that lets the force grow most while no activation changes by more.
-
-        Args:
-            fixed: The tip to begin with.
-            reach: Largest change of each activation, of its range.
-        """
+        """The most growth of the force where no activation changes by over `reach` of its range."""
         from scipy import optimize
 
         linprog = cast(Any, optimize.linprog)  # without types, whose inference takes seconds
@@ -259,11 +239,10 @@ class Growth:
         ends = [*zip(np.minimum(lowest, 0.0), np.maximum(highest, 0.0), strict=True), (0.0, most)]
         goal = np.zeros(box.bundles + 1)
         goal[-1] = -1.0
-        solution = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ds")
+        solve = partial(linprog, goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends)
+        solution = solve(method="highs-ds")
         if solution.x is None:
-            solution = linprog(
-                goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ipm"
-            )
+            solution = solve(method="highs-ipm")
         if solution.x is None:
             return _Program(np.zeros(box.bundles), 0.0, 0.0, np.zeros(box.bundles), np.nan)
         change = reach * solution.x
@@ -293,13 +272,8 @@ class Growth:
     ) -> FixedTip | None:
         """The tip put to its place by Newton's method; None if it does not come there.
 
-        Bundles that begin at a bound stay there, if enough others are left.
-
-        Args:
-            gamma: Activations to begin with.
-            force: Force to begin with [N].
-            unit: Of the force, which yields too [N]; 0 to keep it.
-            near: An equilibrium near to begin with.
+        Bundles that begin at a bound stay there, if enough others are left. The force [N] yields
+        in steps of `unit` [N], or is kept where that is 0; `near` is an equilibrium near.
         """
         length = self.pushing.rod.length
         moves = self.box.is_free & ~self._at_bound(gamma)
@@ -360,9 +334,8 @@ class Growth:
             options={"ftol": 1e-10, "maxiter": 25},
         )
         gamma = box.clip(box.low + solution.x[:-1] * box.scales)
-        better = self._corrected(
-            gamma, float(solution.x[-1]) * self.unit, self.unit, fixed.response
-        )
+        force = float(solution.x[-1]) * self.unit
+        better = self._corrected(gamma, force, self.unit, fixed.response)
         if better is None or better.force < fixed.force:
             return fixed
         return better if self._is_stable(better) else fixed

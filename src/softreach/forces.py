@@ -97,8 +97,6 @@ def blocked_force(
 
 
 class _Best(NamedTuple):
-    """A growth from one start."""
-
     start: Array
     end: Grown
     tip_error: float

@@ -126,7 +126,9 @@ def configuration_dataset(
     table = _CONFIGURATION | others
     variables = _variables(table, arm, {**arrays, "activation": activation}, names)
     if "bundle_activation" in variables:
-        variables["bundle_activation"][2]["units"] = _listed_units(arm.inner.bundle_units)
+        units = arm.inner.bundle_units
+        listed = units[0] if len(set(units)) == 1 else ", ".join(units)
+        variables["bundle_activation"][2]["units"] = listed
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "axis": list(AXES),
@@ -177,35 +179,31 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
         InvalidInput: What is missing, of another type, or does not agree.
     """
     check_cloud(cloud)
-    for name, (kind, allowed) in _KINDS.items():
+    for name, kind in (("tip", np.float64), ("activation", np.float64), ("status", np.int8)):
         if name in cloud and cloud[name].dtype != kind:
+            allowed = f"of {np.dtype(kind)}"
             raise InvalidInput(f"cloud.{name}", f"of type {cloud[name].dtype}", allowed)
-    _check_storable(cloud)
+    for name, values in cloud.variables.items():
+        if values.dtype.kind not in "biufUOT":  # texts may be objects
+            raise InvalidInput(f"cloud.{name}", f"of type {values.dtype}", "of numbers or of texts")
     for name, (types, allowed) in _ATTRIBUTES.items():
         value = cloud.attrs.get(name)
         if not isinstance(value, types) or isinstance(value, bool):
             raise InvalidInput(f"cloud.attrs['{name}']", repr(value), allowed)
     if not 0 < cloud.attrs["tol"] < np.inf:
         raise InvalidInput("cloud.attrs['tol']", cloud.attrs["tol"], "a finite number > 0")
+    seed = cloud.attrs.get("seed", 0)  # a cloud of another program has none
+    if not isinstance(seed, int) or isinstance(seed, bool):
+        raise InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
     frame_of(cloud)
     arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
-    for fault in (*_disagreements(cloud, arm), *_pose_disagreements(cloud, arm)):
-        raise fault
+    for what, shown, wanted in _disagreements(cloud, arm):
+        raise InvalidInput(f"cloud.{what}", shown, f"{wanted}, as its design says")
+    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2, 3)).all():
+        raise InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
     return cloud
 
 
-def _check_storable(cloud: xr.Dataset) -> None:
-    for name, values in cloud.variables.items():
-        if values.dtype.kind not in _STORED:
-            raise InvalidInput(f"cloud.{name}", f"of type {values.dtype}", "of numbers or of texts")
-
-
-_STORED = "biufUOT"  # kinds of dtypes; texts may be objects
-_KINDS = {
-    "tip": (np.dtype(np.float64), "of float64"),
-    "activation": (np.dtype(np.float64), "of float64"),
-    "status": (np.dtype(np.int8), "of int8"),
-}
 _ATTRIBUTES = {
     "design": (str, "the text of a design file"),
     "softreach_version": (str, "a text"),
@@ -214,40 +212,23 @@ _ATTRIBUTES = {
 }
 
 
-def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
-    """Disagreements of a cloud with its design."""
-    seed = cloud.attrs.get("seed", 0)  # a cloud of another program has none
-    if not isinstance(seed, int) or isinstance(seed, bool):
-        yield InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
-    pairs = {
-        "axis": (cloud.get("axis"), AXES),
-        "bundle": (cloud.get("bundle"), arm.input_names),
-        "unit": (cloud.get("unit"), arm.input_units),
-    }
-    for name, (labels, wanted) in pairs.items():
+def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[tuple[str, Any, Any]]:
+    """What of a cloud is not as its design has it: what is there, and what should be."""
+    named = {"axis": AXES, "bundle": arm.input_names, "unit": arm.input_units}
+    for name, wanted in named.items():
+        labels = cloud.get(name)
         if labels is not None and tuple(map(str, labels.values)) != tuple(wanted):
-            shown = ", ".join(map(str, labels.values))
-            yield InvalidInput(f"cloud.{name}", shown, f"{', '.join(wanted)}, as its design says")
+            yield name, ", ".join(map(str, labels.values)), ", ".join(wanted)
     for name, size in (("axis", len(AXES)), ("bundle", arm.inputs)):
         if cloud.sizes[name] != size:
-            yield InvalidInput(
-                f"cloud.sizes['{name}']", cloud.sizes[name], f"{size}, as its design says"
-            )
+            yield f"sizes['{name}']", cloud.sizes[name], size
     length = cloud.tip.attrs.get("length")
     if not isinstance(length, int | float) or not math.isclose(length, arm.length):
-        allowed = f"{arm.length} m, as its design says"
-        yield InvalidInput("cloud.tip.attrs['length']", repr(length), allowed)
-    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2, 3)).all():
-        yield InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
-
-
-def _pose_disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
-    """A pose of the base that is not that of the design."""
+        yield "tip.attrs['length']", repr(length), f"{arm.length} m"
     for name, wanted in _pose(arm).items():
         values = as_numbers(cloud.attrs.get(name, ()))
         if values.shape != (len(wanted),) or not np.allclose(values, wanted):
-            shown = as_given(cloud.attrs.get(name))
-            yield InvalidInput(f"cloud.attrs['{name}']", shown, f"{wanted}, as its design says")
+            yield f"attrs['{name}']", as_given(cloud.attrs.get(name)), wanted
 
 
 def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, Any]:
@@ -255,11 +236,6 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
     units = _units(arm, names)
     each = {} if len(set(units)) == 1 else {"unit": ("bundle", list(units))}
     return {"bundle": list(arm.input_names if names is None else names), **each}
-
-
-def _listed_units(units: Sequence[str]) -> str:
-    """The unit that all share, or that of each."""
-    return units[0] if len(set(units)) == 1 else ", ".join(units)
 
 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
