@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.number import Number, number
+from softreach.arm.number import Number, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, Range
@@ -26,7 +26,6 @@ class BundleNumbers(Mapping[str, float]):
     """Numbers of bundles by the bundles' names; frozen."""
 
     def __init__(self, numbers: Mapping[str, float] = {}) -> None:
-        """Those of a mapping, in its order."""
         self._numbers = {str(name): float(value) for name, value in numbers.items()}
 
     def __getitem__(self, name: str) -> float:
@@ -193,7 +192,7 @@ def drive_faults(drives: Any, actuators: Sequence[str], bundles: Sequence[str]) 
         name = drive.name
         if name in taken:
             yield Fault(f"drives[{k}].name", name, "must be unlike names of other parts")
-        elif not name.isprintable() or name != name.strip() or set(name) & set(".[]"):
+        elif not is_path_name(name):
             allowed = "must be one line without dots and brackets, and without spaces around it"
             yield Fault(f"drives[{k}].name", name, allowed)
         taken.append(name)

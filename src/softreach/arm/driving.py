@@ -22,7 +22,7 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["Driving", "InnerActivations", "body_of", "inner_arm", "pilot"]
+__all__ = ["Driving", "InnerActivations", "body_of", "cube_corners", "inner_arm", "pilot"]
 
 Array = NDArray[np.float64]
 
@@ -210,15 +210,19 @@ def body_of(arm: Manipulator) -> Manipulator:
     return known
 
 
+def cube_corners(count: int, rng: np.random.Generator) -> Array:
+    """Corners of the unit cube, shape (n, count): all, or 1,024 at random with both extremes."""
+    if 2**count <= _MOST_CORNERS:
+        return np.indices((2,) * count).reshape(count, 2**count).T.astype(float)
+    corners = rng.integers(0, 2, (_MOST_CORNERS, count)).astype(float)
+    corners[:2] = [[0.0], [1.0]]
+    return corners
+
+
 def pilot(count: int) -> Array:
     """Corners of the unit cube, no more than 1,024 of them, and points inside."""
     rng = np.random.default_rng(0)
-    if 2**count <= _MOST_CORNERS:
-        corners = np.indices((2,) * count).reshape(count, 2**count).T.astype(float)
-    else:
-        corners = rng.integers(0, 2, (_MOST_CORNERS, count)).astype(float)
-        corners[:2] = [[0.0], [1.0]]
-    return np.concatenate([corners, rng.random((_INSIDE, count))])
+    return np.concatenate([cube_corners(count, rng), rng.random((_INSIDE, count))])
 
 
 def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:

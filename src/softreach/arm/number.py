@@ -30,6 +30,7 @@ __all__ = [
     "Station",
     "as_numbers",
     "fields_of",
+    "is_path_name",
     "number",
     "own_fields",
     "series_faults",
@@ -284,6 +285,11 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
             Fault(field, values[field], f"must be {count} finite numbers, one for each {where}")
         ]
     return []
+
+
+def is_path_name(text: str) -> bool:
+    """True for one line without dots and brackets, and without spaces around it."""
+    return text.isprintable() and text == text.strip() and not set(text) & set(".[]")
 
 
 def as_numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:

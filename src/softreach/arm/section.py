@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.along import values_along
 from softreach.arm.material import Material, as_material, material_faults
 from softreach.arm.measured import Measured
-from softreach.arm.number import number
+from softreach.arm.number import is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
@@ -327,7 +327,7 @@ def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
 
 def _allowed_name(name: str, path: str) -> str:
     """Requirement that the name of an actuator or a ring breaks; "" for a good one."""
-    if not name.isprintable() or name != name.strip() or set(name) & set(".[]"):
+    if not is_path_name(name):
         return "must be one line without dots and brackets, and without spaces around it"
     if path == "actuators" and name in _RESERVED:
         return f"must not be one of {', '.join(_RESERVED)}, by which paths name parts of the arm"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from softreach.arm.number import Number, Station, fields_of, number
+from softreach.arm.number import Number, Station, fields_of, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
@@ -33,7 +33,6 @@ class Stations(Mapping[str, float]):
     """
 
     def __init__(self, places: Any = ()) -> None:
-        """Those of a mapping from names to Z [m]."""
         try:
             pairs = {name: plain(z) for name, z in dict(places).items()}
         except (TypeError, ValueError):
@@ -67,14 +66,10 @@ class Stations(Mapping[str, float]):
 def _wrong(pairs: Mapping[Any, Any]) -> Iterator[tuple[Any, Any, Range | str]]:
     """Names that paths cannot hold, and places that are none, with what is allowed."""
     for name, z in pairs.items():
-        if not isinstance(name, str) or not name or set(name) & set(".[]") or not _is_line(name):
+        if not isinstance(name, str) or not name or not is_path_name(name):
             yield name, z, "must be named by one line without dots and brackets"
         elif not PLACE.allowed.admits(z):
             yield name, z, PLACE.allowed
-
-
-def _is_line(name: str) -> bool:
-    return name.isprintable() and name == name.strip()
 
 
 class Located(Part):

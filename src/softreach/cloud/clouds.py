@@ -178,8 +178,6 @@ def _fill(
     cubes: Iterator[Array],
     progress: Progress | None,
 ) -> None:
-    """Draw points of the unit cube in blocks and let the threads turn them into tips meanwhile."""
-
     def fill(gamma: Array, tips: Array, kept: NDArray[np.int8] | None) -> None:
         rod.fill(gamma, tips, status=kept)
         if progress:

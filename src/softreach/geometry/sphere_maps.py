@@ -211,7 +211,6 @@ def _unit(vectors: Array) -> Array:
 
 
 def _first_of_equals(points: Array, good: Mask) -> Index:
-    """The first of each group of equal points."""
     kept: list[int] = []
     left = np.flatnonzero(good)
     while len(left):

@@ -123,7 +123,6 @@ class _Families:
 
 
 def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = None) -> Reached:
-    """`_least_change` of a few thousand targets at a time."""
     count = len(request.targets)
     gamma, residual = np.empty((count, prepared.rod.box.bundles)), np.empty(count)
     for first in range(0, count, _BLOCK):

@@ -130,7 +130,6 @@ _EFFORTS = (
 def _searched(
     prepared: PreparedMap, request: Request, effort: _Effort, anywhere: Array
 ) -> tuple[Index, Descent]:
-    """Searches from seeds all over the box, from those on its faces, and from anywhere."""
     count = len(request.targets)
     owners, starts = [np.repeat(np.arange(count), len(anywhere))], [np.tile(anywhere, (count, 1))]
     for marks in (prepared.seeds, prepared.face_seeds):

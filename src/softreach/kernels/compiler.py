@@ -113,7 +113,6 @@ class _Cache(FunctionCache):
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled code, or None if there is none that can be read."""
         try:
             overload = _loaded(self, sig, target_context)
             if overload is not None and overload.signature.args != getattr(sig, "args", sig):
@@ -125,7 +124,6 @@ class _Cache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the compiled code for later processes, if that can be done."""
         self._attempt(super().save_overload, sig, data)
 
     def _attempt(self, write: Callable[..., None], *arguments: Any) -> None:

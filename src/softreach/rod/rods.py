@@ -47,7 +47,6 @@ def tip_map(
 
 
 def _from_base(rod: TipMap) -> TipMap:
-    """The same map in the frame of the base."""
     if isinstance(rod, View | DrivenRod):
         return replace(rod, base=_from_base(rod.base))
     return rod.base if isinstance(rod, PlacedRod) else rod

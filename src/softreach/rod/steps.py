@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.driving import cube_corners
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.profile import Profile
 from softreach.arm.tables import both_sides, jumps, tables
@@ -34,7 +35,6 @@ _FRAME_TURN = 1.0
 _SHAPES = 512  # whole shapes held at once
 # The error of the steps grows with a high power of the bending, so that it is largest where many
 # bundles bend the arm the same way: at few corners of the box, which random samples miss.
-_MOST_CORNERS = 1024
 _INSIDE = 256
 _HEADINGS = 16
 _PROBED_STATIONS = 9
@@ -296,16 +296,12 @@ def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
         Activations, shape (n, bundles).
     """
     m, rng = box.bundles, np.random.default_rng(0)
-    if 2**m <= _MOST_CORNERS:
-        corners = np.indices((2,) * m).reshape(m, 2**m).T.astype(float)
-    else:
-        corners = rng.integers(0, 2, (_MOST_CORNERS, m)).astype(float)
-        corners[:2] = [[0.0], [1.0]]
+    corners = cube_corners(m, rng)
     inside, faces = rng.random((2, _INSIDE, m))
     if m:
         faces[np.arange(_INSIDE), rng.integers(0, m, _INSIDE)] = rng.integers(0, 2, _INSIDE)
     cube = np.concatenate([corners, faces, inside])
-    if 2**m > _MOST_CORNERS:
+    if 2**m > len(corners):
         cube = np.concatenate([cube, _bending_corners(arm)])
     return np.ascontiguousarray(box.from_cube(cube))
 

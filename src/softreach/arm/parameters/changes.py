@@ -146,7 +146,6 @@ def _renamed(parameter: Parameter, name: str) -> Parameter:
 
 
 def _shortened(names: Iterable[str]) -> list[str]:
-    """The names, of a series its first and its last number."""
     places: dict[str, list[str]] = {}
     for name in names:
         element = _ELEMENT.match(name)

@@ -71,7 +71,6 @@ def _zeroed(x, free):
 
 @inline
 def _admit(free):
-    """Let those enter again that were barred."""
     for j in range(free.size):
         if free[j] == _BARRED:
             free[j] = 0

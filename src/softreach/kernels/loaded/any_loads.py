@@ -127,7 +127,6 @@ def _aim(w, work, axes):
 
 @inline
 def _set_out(w, work, guesses, first, count, increment, widest):
-    """Begin from the unloaded arm, or where a guess is given, there."""
     copy(w, TRIAL, w, TARGET, 6 * LANES)
     start(w, increment, widest)
     if guesses.shape[0] > 0:

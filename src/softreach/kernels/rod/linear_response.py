@@ -148,7 +148,6 @@ def _solve(system, rates):
 
 @inline
 def _lift(p, system, rates):
-    """Take a solved row out of those above it."""
     for q in range(p):
         factor = system[q, p]
         if factor != 0.0:

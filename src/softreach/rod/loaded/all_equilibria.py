@@ -333,7 +333,6 @@ def _tips(solver: Solver, gamma: Array, roots: _Roots) -> Array:
 def _judged(
     rod: TipMap, solver: Solver, gamma: Array, roots: _Roots, known: Array
 ) -> AllEquilibria:
-    """In order, with tips and status."""
     axis, many = solver.tables.axes[0], np.repeat(gamma, len(roots.directions), axis=0)
     shapes, margin = solver.shapes_facing(many, roots.directions, np.array([rod.length]))
     margin = np.where(roots.is_ring & (margin > -_NEUTRAL), 0.0, margin)

@@ -126,7 +126,6 @@ class LoadedRod(ArmRod):
 
     @lazy
     def _shape_solver(self) -> Solver:
-        """Solver with the steps that `tol` needs all along the arm."""
         return self._solver_of(checked(self._shape_steps, self.tol))
 
     def in_steps(self, steps: int) -> Self:

@@ -91,7 +91,6 @@ class Solver:
 
     @lazy
     def _fine_along_one(self) -> OneDirection:
-        """Fine tables for the kernel of loads along one direction."""
         return self._fine.for_one_direction
 
     @lazy
