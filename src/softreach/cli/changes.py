@@ -110,7 +110,6 @@ class Changes:
         return arm
 
     def _posed(self, arm: Manipulator) -> Manipulator:
-        """The arm with its base as asked; its place and its turn stay."""
         from softreach.arm.base import POINTS
 
         if self.base is None:
@@ -132,7 +131,6 @@ class Changes:
         return {name: from_written(x, "rad") for name, x in angles.items() if x is not None}
 
     def _pairs(self) -> Iterator[tuple[str, str]]:
-        """Name and value of every setting; the name of an actuator may hold another =."""
         names: set[str] = set()
         for text in self.settings or ():
             name, sign, value = (part.strip() for part in text.rpartition("="))
@@ -297,7 +295,6 @@ def _given_twice(name: str) -> InvalidInput:
 
 
 def _value(parameter: DesignParameter, name: str, text: str, *, unit_in_name: bool) -> float:
-    """A value whose unit stands in it or in the name."""
     from softreach.arm.parameters.shown import from_written, written_name
     from softreach.support.quantity import read_quantity, unit_names
 

@@ -100,7 +100,6 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
 
 
 def _measured_rows(arm: Manipulator) -> Rows:
-    """Measured stiffnesses and mass, in place of what follows from the materials."""
     from softreach.arm.number import fields_of
 
     if (measured := arm.section.measured) is None:
@@ -111,7 +110,6 @@ def _measured_rows(arm: Manipulator) -> Rows:
 
 
 def _rows_of_matter(facts: DesignSummary) -> Rows:
-    """Stiffnesses at base and tip, mass and load number, as far as they are known."""
     rows: Rows = {}
     if facts.stiffness is not None:
         units = {"K0": "N", "K1": "N m²", "K3": "N m²"}
@@ -247,5 +245,4 @@ def _stability(rest: Rest | None) -> str:
 
 
 def _sag(how: str, rest: Rest | None) -> Rows:
-    """The distance that the tip sinks."""
     return {f"sag at rest{how}": (None if rest is None else rest.sag, "m")}

@@ -48,8 +48,6 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
 
 
 class _Names:
-    """Parameters of an arm by all their names."""
-
     def __init__(self, arm: Manipulator) -> None:
         from softreach.arm.parameters.changes import parameters_by_every_name
         from softreach.arm.parameters.shown import written_parameters
@@ -58,7 +56,6 @@ class _Names:
         self.written = written_parameters(arm)
 
     def tied(self, name: str) -> str:
-        """The name, or names tied by =, without units."""
         return " = ".join(self._one(part.strip()) for part in name.split("="))
 
     def _one(self, name: str) -> str:
@@ -68,7 +65,6 @@ class _Names:
         return name in self.written and name not in self.plain
 
     def value(self, name: str, text: str) -> float:
-        """A value of a number in its unit."""
         from softreach.arm.parameters.shown import from_written
         from softreach.support.quantity import read_quantity, unit_names
 
