@@ -33,8 +33,6 @@ _REGIONS = {
 
 
 class _Check(Protocol):
-    """Result of `check`."""
-
     @property
     def arm(self) -> Manipulator: ...
     @property
@@ -131,7 +129,6 @@ def _draw_places(panel: Panel, check: _Check) -> None:
 
 
 def _worst_payload(check: _Check) -> int:
-    """Index of the payload under which most places are missed."""
     return int((~check.reached).sum(axis=1).argmax())
 
 
@@ -142,6 +139,5 @@ def _draw_lines(panel: Panel, lines: list[Array], style: dict[str, Any]) -> None
 
 
 def _seen(panel: Panel, points: Array) -> tuple[Array, Array]:
-    """Coordinates of points [m] in the axes."""
     x, y, _ = project(panel.unit.of(points), panel.view).T
     return (-x if is_mirrored(panel.view) else x), y

@@ -134,7 +134,6 @@ def _axis(values: xr.DataArray) -> SheetAxis:
 
 
 def _name(values: xr.DataArray) -> str:
-    """The symbol of a parameter and the part that it belongs to."""
     if "symbol" not in values.attrs:
         return plain(str(values.name))
     symbol = _in_math(values.attrs["symbol"])
@@ -142,13 +141,11 @@ def _name(values: xr.DataArray) -> str:
 
 
 def _in_math(symbol: str) -> str:
-    """R1/R2 with its indices set low."""
     text = _INDEXED.sub(r"\1_\2", symbol)
     return symbol if text == symbol else f"${text}$"
 
 
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
-    """Filled contours with lines, or cells where there are none; what a color bar explains."""
     known = values.compressed()
     if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
         return ax.pcolormesh(_edges(across), _edges(up), values, cmap=COLORMAP)
@@ -169,7 +166,6 @@ def _edges(axis: SheetAxis) -> Array:
 def _draw_contours(
     ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array
 ) -> None:
-    """Every second level as a line, white on dark and dark on bright, with its value."""
     ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(0, len(levels), 2)]
     lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
     low = np.array([across.values[0], up.values[0]])

@@ -172,7 +172,6 @@ def _draw_material(
 
 
 def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
-    """The bore, and gaps between rings."""
     reached = section.bore_ratio
     voids = [(0.0, reached)] if reached > 0 else []
     reached = max(reached, section.inner_ratio)
@@ -202,7 +201,6 @@ def _sector(bundle: PlacedBundle, outer: float, **style: Any) -> Wedge:
 
 
 def _draw_stripes(ax: Axes, part: PlacedBundle, outer: float) -> None:
-    """The part of a sector that another covers, as stripes over that."""
     stripes = _sector(part, outer, facecolor="none", edgecolor=part.color, linewidth=0.0)
     stripes.set_hatch("//////")
     stripes.set_hatch_linewidth(1.2)
@@ -234,7 +232,6 @@ def _draw_strokes(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
 
 
 def _contrast(color: Color) -> str:
-    """A color that stands out on another."""
     return "white" if np.dot(color, _LIGHTNESS) < 0.55 else "0.3"
 
 
@@ -247,7 +244,6 @@ def _draw_lumen(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
 
 
 def _draw_disks(ax: Axes, lines: Collection[PlacedBundle], outer: float) -> None:
-    """A dotted circle for each distance at which tendons run outside of the arm."""
     from matplotlib.patches import Circle
 
     for ratio in sorted(
@@ -259,6 +255,5 @@ def _draw_disks(ax: Axes, lines: Collection[PlacedBundle], outer: float) -> None
 
 
 def _middle(bundle: PlacedBundle, outer: float) -> tuple[list[float], list[float]]:
-    """Place of a tendon, or of the center of a lumen."""
     radius = 0.5 * outer * (bundle.inner_ratio + bundle.outer_ratio)
     return [radius * np.cos(bundle.center)], [radius * np.sin(bundle.center)]

@@ -211,7 +211,6 @@ def _filled_sheet(
 def _sheet(
     across: SheetAxis, up: SheetAxis, box: Array, view: View, width: float
 ) -> tuple[Figure, Grid]:
-    """A figure and its panels, the first row at the bottom, each as wide as the box."""
     extent = panel_extent(box, view)
     aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
     columns, rows = len(across.values), len(up.values)
@@ -273,7 +272,6 @@ def _cloud_image(cloud: xr.Dataset, columns: int, box: Array, view: View) -> ZBu
 
 
 def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
-    """A bar of half a length and the directions of x, y and z, in the margin of the sheet."""
     width, height = figure.get_size_inches()
     ax = figure.add_axes((0.04 / width, 0.02 / height, _LEFT / width, (_BOTTOM - 0.1) / height))
     left, right = panel.get_xlim()

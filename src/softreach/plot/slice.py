@@ -122,7 +122,6 @@ def _layer(grid: xr.Dataset, axis: str, at: float) -> xr.Dataset:
 
 
 def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
-    """The layer, in that view; returns the largest number that is shown."""
     plane = plane_of(view)
     assert plane is not None  # the view is along an axis
     across, up = plane
