@@ -168,7 +168,6 @@ def axes_box(
 
 
 def _ticks(low: float, high: float, step: float) -> Array:
-    """Multiples of the step, 0 without a sign."""
     return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step + 0.0
 
 
@@ -186,12 +185,10 @@ def round_box(*points: Array) -> tuple[Array, Array]:
 
 
 def _round_step(span: float) -> float:
-    """A round number of which few fit into the span."""
     return _round_up(max(span, 1e-9) / _MOST)
 
 
 def _round_up(value: float) -> float:
-    """The next round number; 0 stays 0."""
     if value == 0.0:
         return 0.0
     power = 10.0 ** np.floor(np.log10(value))

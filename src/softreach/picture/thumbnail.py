@@ -122,7 +122,6 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def _square_around(seen: list[Array]) -> Extent | None:
-    """A square of the projection plane with a margin around all finite points."""
     flat = np.concatenate([points[:, :2] for points in seen]) if seen else np.empty((0, 2))
     flat = flat[np.isfinite(flat).all(axis=1)]
     if not len(flat):

@@ -172,7 +172,6 @@ def _extent_of_content(keys: Keys, by: int) -> tuple[slice, slice]:
 
 
 def _range_of(some: NDArray[np.bool_], by: int) -> slice:
-    """The blocks from the first to the last that are true somewhere."""
     indices = np.flatnonzero(some)
     return slice(indices[0] // by, indices[-1] // by + 1) if len(indices) else slice(0, 0)
 
