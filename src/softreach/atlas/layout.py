@@ -91,7 +91,6 @@ def _parameters(command: Command) -> Iterator[Plan]:
 
 
 def _parameter_attrs(parameter: Parameter) -> dict[str, Any]:
-    """Unit and meaning, and the symbol and the part that figures show."""
     return {
         "units": parameter.unit,
         "long_name": parameter.meaning,
@@ -134,7 +133,6 @@ def _described(command: Command) -> dict[str, Any]:
 
 
 def _meanings(metrics: Sequence[Metric]) -> str:
-    """Meaning of each number, for readers without softreach."""
     return "; ".join(f"{metric.name} [{metric.unit}]: {metric.meaning}" for metric in metrics)
 
 
@@ -146,7 +144,6 @@ def _per_design(
     sizes: dict[str, int] | None = None,
     attrs: dict[str, Any] | None = None,
 ) -> Plan:
-    """An array whose chunks are designs."""
     space, inner = command.space, sizes or {}
     return Plan(
         name=name,
@@ -160,7 +157,6 @@ def _per_design(
 
 
 def _shared(name: str, data: np.ndarray, dims: tuple[str, ...], attrs: dict[str, Any]) -> Plan:
-    """An array that all designs share, written when the store is created."""
     chunks = (min(data.shape[0], 1 << 20), *data.shape[1:])
     fill = 0 if data.dtype.kind in "iu" else np.nan
     return Plan(

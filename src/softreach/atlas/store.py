@@ -326,7 +326,6 @@ def _complete(store: AtlasStore) -> None:
 
 
 def _described(group: Group, plan: Plan, command: Command) -> None:
-    """Create an array without values."""
     group.create_array(
         plan.name,
         shape=plan.shape,
