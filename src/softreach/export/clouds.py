@@ -207,7 +207,6 @@ def _metadata(cloud: xr.Dataset, unit: LengthUnit) -> dict[str, str | int | floa
 
 
 def _length(cloud: xr.Dataset) -> float | None:
-    """L [m], if the cloud knows it."""
     length = cloud["tip"].attrs.get("length") if "tip" in cloud else None
     return None if length is None else float(length)
 
