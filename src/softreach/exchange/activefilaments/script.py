@@ -75,7 +75,6 @@ def _body(filament: Filament) -> Iterator[str]:
 
 
 def _activation(rings: Sequence[FilamentRing]) -> Iterator[str]:
-    """All sectors fully contracted, and the bounds of each."""
     yield "activation = ["
     for ring in rings:
         lows = _vector(low for low, _ in ring.bounds)
@@ -98,7 +97,6 @@ def _ring(ring: FilamentRing, length: float) -> str:
 
 
 def _comment(ring: FilamentRing) -> str:
-    """The name of what is in a ring, and how its activations count."""
     name = "".join(character if character.isprintable() else " " for character in ring.name)
     scale = f"γ is {ring.scale:g} times that of softreach" if ring.scale != 1 else ""
     told = "; ".join(part for part in (name.strip(), scale) if part)
