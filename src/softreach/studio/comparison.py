@@ -104,7 +104,6 @@ def _cell(comparison: Comparison, row: int, column: int) -> list[Part]:
 
 
 def _change(difference: float, error: Value, first: Value, usual: str) -> str:
-    """Difference from the first design; of what has an error in percent too."""
     if difference == 0:
         return "="
     text = _digits(difference, error, "+", usual)
@@ -157,7 +156,6 @@ def _by_name(shown: Iterable[ShownParameter]) -> dict[str, ShownParameter]:
 
 
 def _differing(designs: Sequence[dict[str, ShownParameter]]) -> list[tuple[str, _Column]]:
-    """Name and column of what is not the same in all."""
     columns = []
     for name in dict.fromkeys(name for design in designs for name in design):
         title = next(design[name].label for design in designs if name in design)

@@ -85,7 +85,6 @@ def figure_file(reach: Reach, state: StudioState) -> bytes:
 
 
 def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.DataArray]:
-    """The samples within the slice, and what they are colored by, with its name."""
     known = [name for name in ("tip", "activation", "status") if name in reach.cloud]
     cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))
     color = sample_values(reach, look.level, look.color)

@@ -64,7 +64,6 @@ def _allowed(path: str) -> str:
 
 
 def _files_in(text: str) -> list[str]:
-    """Keys that name other files."""
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError):

@@ -61,7 +61,6 @@ def static_page(state: StudioState, reach: Reach) -> str:
 
 
 def _look(server: ViserServer, scene: Scene, state: StudioState) -> None:
-    """Begin at the camera of a state, and let it see the arm."""
     assert state.camera is not None
     first = server.initial_camera
     first.position, first.look_at = state.camera.position, state.camera.look_at
@@ -135,7 +134,6 @@ def picture_file(
 def _draw_bar(
     figure: Figure, bar: ScaleBar, at: tuple[float, float], size: tuple[float, float], ink: str
 ) -> None:
-    """A bar whose left end is at a place of the figure, 0 to 1, and its length above it."""
     from matplotlib.lines import Line2D
 
     (left, low), (width, height) = at, size
@@ -171,7 +169,6 @@ def _wrapped(paragraphs: list[str], width: int) -> list[str]:
 def _draw_key(
     figure: Figure, key: BundleKey | ScalarKey, place: tuple[float, float], ink: str
 ) -> None:
-    """A legend, or a color bar over half of the width, below the scene."""
     from matplotlib.patches import Patch
 
     from softreach.plot.coloring import BundleKey, color_map

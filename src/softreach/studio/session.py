@@ -103,7 +103,6 @@ class AskedJob(Job):
         self.session.follow(type(self))
 
     def run(self, check: StaleCheck) -> None:
-        """Do the work once for each time that it was ordered."""
         wanted, self.wanted = self.wanted, False
         if wanted:
             self.do(check)

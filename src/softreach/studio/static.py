@@ -133,8 +133,6 @@ def write_static(
 
 
 class _Entry(NamedTuple):
-    """A design of the grid."""
-
     content: dict[str, Any]
     """Its numbers and its box, or the reason for the gap."""
     file: Path | None
@@ -142,7 +140,6 @@ class _Entry(NamedTuple):
 
 
 def _design(space: DesignSpace, number: int, unit: str, folder: Path) -> _Entry:
-    """A design from its file, or computed and written there."""
     try:
         arm = space.design(number)
     except InvalidDesign as error:
@@ -169,7 +166,6 @@ def _brief(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _key(arm: Manipulator, unit: str) -> str:
-    """A name for what is in the file of a design."""
     made_of = [arm.to_toml(), unit, list(_DETAIL), versions()["softreach_version"]]
     return _digest(json.dumps(made_of))
 
@@ -190,7 +186,6 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 
 
 def _remove_older(folder: Path, kept: set[Path]) -> None:
-    """Remove designs that the page no longer shows."""
     for path in folder.glob("*.js"):
         with suppress(OSError, UnicodeDecodeError):
             if path not in kept and path.read_text("utf-8").startswith(_MARK):
@@ -198,7 +193,6 @@ def _remove_older(folder: Path, kept: set[Path]) -> None:
 
 
 def _content(arm: Manipulator, unit: LengthUnit) -> dict[str, Any]:
-    """Everything that the page shows of a design."""
     try:
         reached = reachable_set(arm)
         numbers = _numbers(reached, unit)
@@ -231,7 +225,6 @@ def _numbers(reached: ReachableSet, unit: LengthUnit) -> dict[str, Any]:
 
 
 def _errors(reached: ReachableSet, scene: Scene, box: np.ndarray) -> Iterator[str]:
-    """Sentences on how far what is drawn is from what was computed."""
     unit, step = scene.unit, float(np.ptp(box, axis=0).max()) / 65535
     if isinstance(reached, ReachableSolid | ReachableSurface):
         computed = reached.sheets() if isinstance(reached, ReachableSolid) else reached.surface()
@@ -307,7 +300,6 @@ def _distances(space: DesignSpace) -> np.ndarray:
 def _slider(
     base: Manipulator, parameter: Parameter, values: tuple[float, ...], lengths: LengthUnit
 ) -> Mapping[str, Any]:
-    """A slider of the page, whose values are as a person reads them."""
     symbol, scale = readable_unit(parameter.unit, max(map(abs, values)), lengths)
     if parameter.unit == "m" and lengths.relative:  # of which arm, if it is the length that varies?
         symbol, scale = "m", 1.0

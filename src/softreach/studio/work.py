@@ -348,12 +348,10 @@ class CompilationWatch(event.Listener):
         event.unregister(_KIND, self)
 
     def on_start(self, event: Any) -> None:
-        """Something is being compiled."""
         del event
         self._count(1)
 
     def on_end(self, event: Any) -> None:
-        """It is compiled; or that failed."""
         del event
         self._count(-1)
 

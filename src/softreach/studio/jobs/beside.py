@@ -22,7 +22,6 @@ class DrawFree(Job):
     only_with = "design.loads"
 
     def run(self, check: StaleCheck) -> None:
-        """Compute what is not known of it, and draw it."""
         session, state = self.session, self.session.state
         free, known = state.unloaded, session.reach
         if state.design.loads is None:
@@ -60,7 +59,6 @@ class DrawReference(Job):
     only_with = "reference"
 
     def run(self, check: StaleCheck) -> None:
-        """Compute what is not known of it, and draw it."""
         session, state = self.session, self.session.state
         reference = state.reference
         if reference is None:
@@ -78,7 +76,6 @@ class DrawReference(Job):
         session.show()
 
     def _reach_of(self, reference: Manipulator, check: StaleCheck) -> Reach:
-        """Reach that is known already, if it is fine."""
         known = self.session.reach
         if known is not None and known.fine and known.arm == reference:
             return known
@@ -93,7 +90,6 @@ class DrawReferenceArm(Job):
     only_with = "side_by_side"
 
     def run(self, check: StaleCheck) -> None:
-        """Draw it, or take it away."""
         check()
         session, state = self.session, self.session.state
         reference = session.reference

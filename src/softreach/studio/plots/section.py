@@ -211,13 +211,11 @@ class SectionPlot(Plot):
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:
-        """Cut and draw it, once the exact set is complete."""
         look, reach = session.state.appearance, complete_reach(session)
         if reach is not None:
             with session.working("cutting the reachable set"):
                 yield section_picture(reach, look.slice, check, dark=look.dark)
 
     def show(self, result: Picture) -> str:
-        """Show the picture."""
         self._frame.show(result.image)
         return result.text

@@ -58,7 +58,6 @@ def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
 
 
 def _half_sine(aspect: float) -> float:
-    """Sine of half of the smaller angle of a picture."""
     return float(np.sin(np.arctan(np.tan(FOV / 2) * min(1.0, aspect))))
 
 

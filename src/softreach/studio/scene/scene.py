@@ -245,7 +245,6 @@ class Scene:
         return self._draw_boundary(reach, look)
 
     def _draw_boundary(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
-        """The exact boundary in the colors of what is asked, with its edges and folds."""
         coloring, sheets = surface_colors(reach, look.color), reach.sheets
         vertices = sheets.vertices / reach.arm.length
         colors = shaded(coloring.rgb, vertex_normals(vertices, sheets.faces))
@@ -413,7 +412,6 @@ class Scene:
             self._mesh(path, skin.vertices, skin.faces, color, opacity)
 
     def _slab(self, cut: Slice, points: Array) -> None:
-        """The middle plane of the slice, as wide as the cloud."""
         self.remove("/slice")
         if cut.axis == "none" or not len(points):
             return
@@ -462,7 +460,6 @@ def _arm_meshes(
 
 
 def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
-    """Of the body and of every bundle."""
     hidden = any(inside(arm)) or arm.markers
     return [_CLEAR if hidden else None, *[None] * (meshes - 1)]
 

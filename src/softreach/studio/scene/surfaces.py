@@ -116,7 +116,6 @@ class _Gltf:
         self._primitives: list[dict[str, Any]] = []
 
     def add(self, mode: int, places: Array, colors: Array, indices: NDArray[Any]) -> None:
-        """Triangles or lines between places in colors, RGBA from 0 to 255."""
         linear = colors / 255
         linear[:, :3] **= 2.2
         limits = {"min": places.min(axis=0).tolist(), "max": places.max(axis=0).tolist()}
@@ -140,7 +139,6 @@ class _Gltf:
         return number
 
     def binary(self) -> bytes:
-        """The file."""
         material = {
             "alphaMode": "BLEND",
             "doubleSided": self._both_sides,

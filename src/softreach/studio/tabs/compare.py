@@ -83,7 +83,6 @@ class ComparePanel:
         return *kept, Snapshot(name=REFERENCE, state=state, taken=0.0, numbers=numbers)
 
     def _measure(self, session: Session) -> None:
-        """Note the numbers of snapshots whose design has only now been measured."""
         for each in session.snapshots.all:
             if each.numbers is None and (numbers := numbers_of(session.reach, each.state)):
                 session.snapshots.measure(each.name, numbers)
@@ -93,7 +92,6 @@ class ComparePanel:
             self._choice.options = names or (_NONE,)
 
     def _follow_drawn(self, state: StudioState) -> None:
-        """Show how the chosen snapshot is drawn."""
         chosen, drawn = self._named(), _UNDRAWN
         if chosen is not None and chosen.state.design == state.reference:
             drawn = _BESIDE if state.side_by_side else _AROUND
@@ -105,7 +103,6 @@ class ComparePanel:
             attempt(self._session, lambda: self._become_drawn(self._drawn.value))
 
     def _become_drawn(self, how: str) -> None:
-        """Draw the chosen snapshot so, instead of any other."""
         design, beside_now = self._chosen().state.design, how == _BESIDE
         reference = None if how == _UNDRAWN else design
         if beside_now != self._session.state.side_by_side:
@@ -115,7 +112,6 @@ class ComparePanel:
         )
 
     def _step(self, back: bool) -> None:
-        """Move the camera so that two clouds side by side fit; or to where it was."""
         session = self._session
         if session.reach is not None:
             shift = beside(session.reach)

@@ -74,7 +74,6 @@ class DesignPanel:
             self._show_slopes(session)
 
     def _show_slopes(self, session: Session) -> None:
-        """Bars of the same scale under the sliders; until they are known, room for them."""
         slopes, design = session.slopes, session.state.design
         if slopes is None:
             bars = dict.fromkeys(self._bars, NO_BAR) if rod_of(design).box.dimension > 2 else {}
@@ -107,7 +106,6 @@ class DesignPanel:
             ]
 
     def _follow_body(self, arm: Manipulator) -> None:
-        """Show the numbers of the body; others have other fields."""
         numbers = body_numbers(arm)
         if [number.name for number in numbers] == self._typed:
             self._numbers.show(self._session)
@@ -156,7 +154,6 @@ def _designs() -> dict[str, Manipulator]:
 
 
 def _name(state: StudioState) -> str:
-    """Name of a design; "" for one that has none."""
     return next((name for name, arm in _designs().items() if arm == state.design), "")
 
 

@@ -69,7 +69,6 @@ class ExportPanel:
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
 
     def _data_writers(self) -> dict[str, Callable[[], None]]:
-        """Files of the design, its cloud and its surface -> what writes them."""
         clouds = {_CLOUD.format(each): partial(self._save_cloud, each) for each in CLOUD_FORMATS}
         surfaces = {
             _SURFACE.format(each): partial(self._save_surface, each) for each in SURFACE_FORMATS
@@ -129,5 +128,4 @@ class ExportPanel:
 
 
 def _size(count: int) -> str:
-    """Bytes in words."""
     return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

@@ -119,7 +119,6 @@ class NeedsPanel:
         return self._session.state.design.length_unit
 
     def _explain(self) -> None:
-        """Say what the field holds."""
         self._expected.say(_EMPTY[self._kind.value].format(unit=self._unit.name))
 
     def _offer_parts(self, needs: Requirements) -> None:

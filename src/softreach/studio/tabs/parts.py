@@ -121,7 +121,6 @@ class PartsPanel:
         return menu
 
     def _add_words(self, arm: Manipulator, part: Part) -> None:
-        """Add fields for its name, its material, and the ring that it is in."""
         if part.ring is not None or part.actuator:
             at = Attribute(
                 lambda _: part.name, lambda state, name: self._renamed(state, part, name)
@@ -190,7 +189,6 @@ class PartsPanel:
         self._edit(added, lambda arm: arm.actuators[-1].name)
 
     def _lacks_material(self, kind: str) -> bool:
-        """True if the design has no Young's modulus, and the actuator needs one."""
         try:
             edits.with_actuator(self._session.state.design, kind)
         except InvalidDesign as error:
@@ -208,7 +206,6 @@ class PartsPanel:
             self._edit(lambda arm: edits.without_actuator(arm, part.actuator))
 
     def _renamed(self, state: StudioState, part: Part, name: str) -> StudioState:
-        """The design in which a part has another name; it stays the one that is chosen."""
         if name == part.name:
             return state
         ring = part.ring
@@ -223,8 +220,6 @@ class PartsPanel:
         return new
 
     def _edit(self, change: Change, chosen: Callable[[Manipulator], str] | None = None) -> None:
-        """Change the parts of the design, and choose one of the new ones."""
-
         def edited(state: StudioState) -> StudioState:
             new = state.replace(design=change(state.design))
             if chosen is not None:

@@ -100,7 +100,6 @@ class PathPanel:
         return True
 
     def _list(self, track: xr.Dataset) -> None:
-        """Show the result of following."""
         count = int((track.status == PathStatus.FOLLOWED).sum())
         arm = self._session.state.design
         self._text.say(end_text(track, arm))
@@ -120,7 +119,6 @@ class PathPanel:
         self._session.update(lambda state: state.replace(path=path))
 
     def _extend(self, point: np.ndarray) -> None:
-        """On to one more point, straight; what there is of a path begins at the tip."""
         state, path = self._session.state, self._session.state.path
         before = np.array(path.points) if path is not None else _tip(state)[None]
         start = state.activation if path is None else path.start

@@ -55,7 +55,6 @@ class StatusPanel:
         self._offer(session)
 
     def _tell(self, session: Session) -> None:
-        """Show a note over the scene, until the next one or the next change."""
         if session.note == self._note:
             return
         self._note = session.note
@@ -68,7 +67,6 @@ class StatusPanel:
         )
 
     def _offer(self, session: Session) -> None:
-        """Offer to cancel while something is computed, and to go on where something is missing."""
         busy, lacking = session.busy, is_behind(session) and not session.refusal
         label = _GO_ON if lacking and not busy else _CANCEL
         if self._cancel.label != label:
@@ -77,7 +75,6 @@ class StatusPanel:
 
 
 def _marks(session: Session) -> list[list[Part]]:
-    """The legend, why there is no exact volume, and what is coarser than wanted."""
     reach = session.reach
     if reach is None:
         return []
@@ -107,7 +104,6 @@ def _numbers_text(session: Session) -> list[Part]:
 
 
 def _work(session: Session) -> str:
-    """Work in progress; that there is none, where something is missing."""
     if session.compiling:
         done = f", {session.compiled} kernels so far" if session.compiled else ""
         return f"compiling, once on this machine{done} ..."
