@@ -48,7 +48,9 @@ def design(
         changes.refuse("left out with --schema")
         given = {"design": design, "out": out, "overwrite": overwrite, "unit": unit}
         refuse("left out with --schema", **given)
-        _print_schema()
+        from softreach.arm.design_file.schema import json_schema
+
+        console.json(json_schema(), indent=2)
         return
     if design is None:
         raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
@@ -67,12 +69,6 @@ def design(
             console.line(f"  {note}")
         for warning in facts.warnings:
             console.note(f"warning: {warning}")
-
-
-def _print_schema() -> None:
-    from softreach.arm.design_file.schema import json_schema
-
-    console.json(json_schema(), indent=2)
 
 
 def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
