@@ -154,7 +154,8 @@ def bounding_box(*points: ArrayLike) -> Array:
 
 def view_extent(box: Array, view: View) -> Extent:
     """The part of the projection plane that a box fills."""
-    seen = project(_box_corners(box), view)
+    corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    seen = project(corners, view)
     low, high = seen.min(axis=0), seen.max(axis=0)
     return Extent(low[0], high[0], low[1], high[1])
 
@@ -229,11 +230,6 @@ def _text(ax: Axes, place: Array, text: str, outward: Array, gap: float, size: f
         fontsize=size,
         color="0.25",
     )
-
-
-def _box_corners(box: Array) -> Array:
-    """The eight corners, shape (8, 3)."""
-    return np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _framed_axes(box: Array, view: View) -> Axes:

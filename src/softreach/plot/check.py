@@ -106,7 +106,7 @@ def plot_check(
 
 def _draw_places(panel: Panel, check: _Check) -> None:
     met = check.reached.all(axis=0)
-    load = _worst_payload(check)
+    load = (~check.reached).sum(axis=1).argmax()  # under which most are missed
     gaps = [
         np.stack(ends) for ends in zip(check.places[~met], check.nearest[load, ~met], strict=True)
     ]
@@ -126,10 +126,6 @@ def _draw_places(panel: Panel, check: _Check) -> None:
                 zorder=_ABOVE + 1,
                 label=label,
             )
-
-
-def _worst_payload(check: _Check) -> int:
-    return int((~check.reached).sum(axis=1).argmax())
 
 
 def _draw_lines(panel: Panel, lines: list[Array], style: dict[str, Any]) -> None:

@@ -153,7 +153,8 @@ def plot_compliance(
     with figure_style(ax):
         if box is None:
             surfaces = [arm_points(arm, shape, counted) for shape in shapes]
-            box = counted.size * bounding_box(*surfaces, *_ends(tips, axes))
+            half = np.linalg.norm(axes, axis=2)  # of the boxes around the ellipsoids
+            box = counted.size * bounding_box(*surfaces, tips - half, tips + half)
         ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box, unit=counted)
         for outline in _outlines(tips, axes, view):
             ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
@@ -269,11 +270,6 @@ def _add_legend(ax: Axes, *, own_figure: bool) -> None:
     width, height = figure.get_size_inches()
     figure.set_size_inches(max(width, _LEAST_WIDTH), height + _ENTRY * len(kinds))
     figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
-
-
-def _ends(tips: Array, axes: Array) -> list[Array]:
-    half = np.linalg.norm(axes, axis=2)
-    return [tips - half, tips + half]
 
 
 def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:

@@ -136,13 +136,10 @@ def _axis(values: xr.DataArray) -> SheetAxis:
 def _name(values: xr.DataArray) -> str:
     if "symbol" not in values.attrs:
         return plain(str(values.name))
-    symbol = _in_math(values.attrs["symbol"])
+    symbol = values.attrs["symbol"]
+    if _INDEXED.search(symbol):
+        symbol = "$" + _INDEXED.sub(r"\1_\2", symbol) + "$"
     return f"{symbol} of {plain(part)}" if (part := values.attrs.get("part")) else symbol
-
-
-def _in_math(symbol: str) -> str:
-    text = _INDEXED.sub(r"\1_\2", symbol)
-    return symbol if text == symbol else f"${text}$"
 
 
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
@@ -185,7 +182,8 @@ def _label_place(path: Array) -> list[Array]:
 
 
 def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smallest: bool) -> None:
-    row, column = _best(values, smallest)
+    best = np.nanargmin(values) if smallest else np.nanargmax(values)
+    row, column = np.unravel_index(best, values.shape)
     place = across.values[column], up.values[row]
     dot = {"ms": 5, "mfc": "w", "mec": "k", "mew": 0.8, "clip_on": False, "zorder": 5}
     ax.plot(*place, "o", **dot)
@@ -202,9 +200,3 @@ def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smalle
         fontsize=7,
         bbox={"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8},
     )
-
-
-def _best(values: Array, smallest: bool) -> tuple[int, int]:
-    flat = np.nanargmin(values) if smallest else np.nanargmax(values)
-    row, column = np.unravel_index(flat, values.shape)
-    return int(row), int(column)

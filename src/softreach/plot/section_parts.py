@@ -228,11 +228,8 @@ def _draw_strokes(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
         )
     ]
     strokes = np.stack(ends, axis=1)
-    ax.add_collection(LineCollection(list(strokes), colors=_contrast(bundle.color), linewidths=0.7))
-
-
-def _contrast(color: Color) -> str:
-    return "white" if np.dot(color, _LIGHTNESS) < 0.55 else "0.3"
+    ink = "white" if np.dot(bundle.color, _LIGHTNESS) < 0.55 else "0.3"
+    ax.add_collection(LineCollection(list(strokes), colors=ink, linewidths=0.7))
 
 
 def _draw_lumen(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
