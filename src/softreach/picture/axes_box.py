@@ -161,7 +161,8 @@ def axes_box(
         for value in _ticks(low[axis], high[axis], side.steps[axis]):
             at = np.where(np.arange(3) == axis, value, corner)
             lines.append(np.stack([at, at + away]))
-            labels.append((_number(value), at + _NUMBERS_AT * away))
+            number = f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
+            labels.append((number, at + _NUMBERS_AT * away))
         middle = np.where(np.arange(3) == axis, (low[axis] + high[axis]) / 2, corner)
         labels.append((label("xyz"[axis]), middle + side.names[axis] * away))
     return AxesBox(np.array(lines), labels)
@@ -169,10 +170,6 @@ def axes_box(
 
 def _ticks(low: float, high: float, step: float) -> Array:
     return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step + 0.0
-
-
-def _number(value: float) -> str:
-    return f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
 
 
 def round_box(*points: Array) -> tuple[Array, Array]:

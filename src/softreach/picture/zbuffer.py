@@ -76,7 +76,7 @@ class ZBuffer:
             block = slice(start, start + _BLOCK)
             seen = points[block] if view is None else project(points[block], view)
             self._splat(layer, seen, colors[block])
-        self._keep_larger(_grown(layer, size * self.oversample))
+        np.maximum(self._keys, _grown(layer, size * self.oversample), out=self._keys)
 
     def draw_triangles(self, corners: ArrayLike, colors: ArrayLike) -> None:
         """Draw filled triangles whose colors blend from corner to corner.
@@ -119,9 +119,6 @@ class ZBuffer:
         rows, columns = self._keys.shape
         column, row = pixels[..., 0], pixels[..., 1]
         return (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-
-    def _keep_larger(self, layer: Keys) -> None:
-        np.maximum(self._keys, layer, out=self._keys)
 
 
 def _keys(depth: Array, colors: NDArray[np.uint8]) -> Keys:
