@@ -114,7 +114,8 @@ def picture_file(
     from matplotlib.figure import Figure
 
     height, width = (size / FINER for size in scene.shape[:2])
-    lines = _wrapped(_caption(state, reach), int(width))
+    room = max(20, int((int(width) - 2 * _EDGE) / _CHARACTER))
+    lines = [line for text in _caption(state, reach) for line in textwrap.wrap(text, room)]
     below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
     total, dpi = height + below, _DPI * FINER
     paper, ink = _INK[state.appearance.dark]
@@ -159,11 +160,6 @@ def _caption(state: StudioState, reach: Reach) -> list[str]:
     numbers = "".join(part for part in reach_text(reach) if isinstance(part, str))
     marks = "".join(part for part in legend_text(reach, free=False) if isinstance(part, str))
     return [numbers, *([marks.strip()] if marks else []), design_text(state)]
-
-
-def _wrapped(paragraphs: list[str], width: int) -> list[str]:
-    room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
-    return [line for text in paragraphs for line in textwrap.wrap(text, room)]
 
 
 def _draw_key(

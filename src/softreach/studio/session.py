@@ -228,7 +228,8 @@ class Session:
         """
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
-            self._remember(old, goes_on=goes_on or by_widget)
+            self.history = self.history.after(old, self.state, goes_on=goes_on or by_widget)
+            self.is_touched = self.is_touched or old != self.state
             self.revision += not by_widget
             self.canceled = False
             self._follow_change(old)
@@ -326,10 +327,6 @@ class Session:
         """Make the next change a step of its own for who undoes it."""
         with self._changing:
             self.history = self.history.at_rest()
-
-    def _remember(self, old: StudioState, *, goes_on: bool) -> None:
-        self.history = self.history.after(old, self.state, goes_on=goes_on)
-        self.is_touched = self.is_touched or old != self.state
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""

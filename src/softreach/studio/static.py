@@ -144,7 +144,8 @@ def _design(space: DesignSpace, number: int, unit: str, folder: Path) -> _Entry:
         arm = space.design(number)
     except InvalidDesign as error:
         return _Entry(_gap(in_file_terms(error, "")), None, False)
-    key = _key(arm, unit)
+    made_of = [arm.to_toml(), unit, list(_DETAIL), versions()["softreach_version"]]
+    key = _digest(json.dumps(made_of))
     path = folder / f"{key}.js"
     if (content := _read(path, key)) is not None:
         return _Entry(_brief(content), path, False)
@@ -163,11 +164,6 @@ def _gap(error: SoftreachError) -> dict[str, Any]:
 def _brief(content: dict[str, Any]) -> dict[str, Any]:
     """Numbers and words of every design on the page, without what it draws."""
     return {name: content[name] for name in ("gap", "numbers", "box") if name in content}
-
-
-def _key(arm: Manipulator, unit: str) -> str:
-    made_of = [arm.to_toml(), unit, list(_DETAIL), versions()["softreach_version"]]
-    return _digest(json.dumps(made_of))
 
 
 def _digest(text: str) -> str:

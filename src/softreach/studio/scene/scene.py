@@ -121,13 +121,10 @@ class Scene:
         colors = lit(coloring.rgb, points)
         size = point_size(len(points))
         self._points("/cloud", points[stable], colors[stable], size)
-        self._draw_unstable(points[kept & unstable], size)
+        marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
+        self._points("/unstable", marks, color, _UNSTABLE_SIZE * size, shape="diamond")
         self._slab(look.slice, points)
         return coloring.key
-
-    def _draw_unstable(self, points: Array, size: float) -> None:
-        color = np.array(UNSTABLE, np.uint8)
-        self._points("/unstable", points, color, _UNSTABLE_SIZE * size, shape="diamond")
 
     def draw_free(self, reach: Reach | None, cut: Slice) -> None:
         """The reach of the arm without its loads, a faint surface; None takes it away.
@@ -176,7 +173,8 @@ class Scene:
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)
-        self._spines[path] = _spine(arm, shape)
+        centers, radii = shape["position"].values, shape["radius"].values
+        self._spines[path] = centers / arm.length, radii / arm.length  # balls that fill the arm
         if path == "/arm":
             self.pointing = shape["directors"].values[-1, 2]
         self.draw_dots(f"{path}/markers", marker_points(arm, shape) / length, _MARKER)
@@ -434,11 +432,6 @@ def _lines_of(reach: Reach, look: Appearance) -> Array:
 def shows_cloud(reach: Reach, look: Appearance) -> bool:
     """True if points are shown: also in place of a surface that there is not, or not yet."""
     return look.cloud or (look.surface and not reach.has_surface)
-
-
-def _spine(arm: Manipulator, shape: Any) -> Spine:
-    """Balls that fill the arm [L]."""
-    return shape["position"].values / arm.length, shape["radius"].values / arm.length
 
 
 def _without_tip(centers: Array, radii: Array) -> Spine:

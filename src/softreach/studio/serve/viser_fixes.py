@@ -168,13 +168,10 @@ class _Inputs:
 
 def close_sockets(server: ViserServer) -> None:
     """Close the sockets of all tabs; without a way to do so the server's end closes them."""
-    close = getattr(_sockets(server), "disconnect_all_clients", None)
+    sockets = getattr(server, "_websock_server", None)
+    close = getattr(sockets, "disconnect_all_clients", None)
     if close is not None:
         close()
-
-
-def _sockets(server: ViserServer) -> Any:
-    return getattr(server, "_websock_server", None)
 
 
 def without_tunnel(server: ViserServer) -> None:

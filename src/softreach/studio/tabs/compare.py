@@ -63,7 +63,9 @@ class ComparePanel:
             if self._known == (kept, design, numbers):
                 return
             self._known = (kept, design, numbers)
-            self._follow_menu(tuple(each.name for each in kept))
+            names = tuple(each.name for each in kept) or (_NONE,)
+            if tuple(self._choice.options) != names:
+                self._choice.options = names
             self._of_chosen.visible = bool(kept)
             if not kept:
                 self._table.say(_HINT)
@@ -86,10 +88,6 @@ class ComparePanel:
         for each in session.snapshots.all:
             if each.numbers is None and (numbers := numbers_of(session.reach, each.state)):
                 session.snapshots.measure(each.name, numbers)
-
-    def _follow_menu(self, names: tuple[str, ...]) -> None:
-        if tuple(self._choice.options) != (names or (_NONE,)):
-            self._choice.options = names or (_NONE,)
 
     def _follow_drawn(self, state: StudioState) -> None:
         chosen, drawn = self._named(), _UNDRAWN

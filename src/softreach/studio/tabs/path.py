@@ -144,10 +144,10 @@ class PathPanel:
         if event.client_id is None or self._shown is None:
             return
         activations, session = self._shown.activation.values, self._session
-        attempt(session, lambda: session.update(self._walked(activations)))
-
-    def _walked(self, activations: np.ndarray) -> Any:
-        return lambda state: at_point(state, activations, int(self._at.value))
+        attempt(
+            session,
+            lambda: session.update(lambda state: at_point(state, activations, int(self._at.value))),
+        )
 
     def _played(self) -> None:
         if self._play.value == "Play":

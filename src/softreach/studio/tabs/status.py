@@ -35,7 +35,9 @@ class StatusPanel:
         self._known = Line(gui, "computing ...")
         self._note, self._toast = "", None
         self._cancel = gui.add_button(_CANCEL, visible=False, hint=_ABOUT_CANCEL)
-        bind_button(self._cancel, session, lambda: _stop_or_go_on(session))
+        bind_button(
+            self._cancel, session, lambda: (session.cancel if session.busy else session.resume)()
+        )
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
@@ -114,10 +116,6 @@ def _work(session: Session) -> str:
     if session.busy:
         return "computing ..."
     return "canceled" if session.canceled else "not computed"
-
-
-def _stop_or_go_on(session: Session) -> None:
-    (session.cancel if session.busy else session.resume)()
 
 
 def add_history(gui: GuiApi, session: Session) -> None:
