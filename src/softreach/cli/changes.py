@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from softreach.arm.parameters.parameter import Parameter as DesignParameter
 
 
-_GRAVITY = {
-    "down": (0.0, 0.0, -9.81),
-    "up": (0.0, 0.0, 9.81),
-    "sideways": (9.81, 0.0, 0.0),
-    "none": (0.0, 0.0, 0.0),
-}
-"""In the world, whose z points up."""
-
 _POSTURES = {"upright": "up", "hanging": "down"}
 """Words for the way that a base points."""
 
@@ -143,16 +135,15 @@ class Changes:
 
     def _loaded(self, arm: Manipulator, others: bool) -> Manipulator:
         """The arm with the loads it has and those given; none where all are zero and stay so."""
-        from softreach.arm.loads import Loads
+        from softreach.arm.loads import GRAVITIES, Loads
 
         loads = (arm.loads or Loads()).replace(**self._loads(arm))
-        if not others and loads == Loads(gravity=_GRAVITY["none"]):
+        if not others and loads == Loads(gravity=GRAVITIES["none"]):
             return arm.replace(loads=None)
         self._check_matter(loads, arm)
         return arm.replace(loads=loads)
 
     def _check_matter(self, loads: Loads, arm: Manipulator) -> None:
-        """Ask in one line for the moduli and densities that loads need."""
         examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
         faults = loads.section_faults(arm.section, arm.length)
         lacking = {fault.path: examples.get(fault.path.rpartition(".")[2]) for fault in faults}
@@ -184,13 +175,16 @@ def _gravity(text: str, arm: Manipulator) -> tuple[float, ...]:
     Words for how the arm stands are for one whose frame is the world's: it hangs where things fall
     up there.
     """
+    from softreach.arm.loads import GRAVITIES
+
+    allowed = f"{', '.join(GRAVITIES)}, or "
     if text in _POSTURES:
         if not arm.base.is_identity:
-            allowed = f"{', '.join(_GRAVITY)}, or three finite numbers x,y,z in m/s², in the world"
+            allowed += "three finite numbers x,y,z in m/s², in the world"
             hint = f"how the arm stands is said by its base, which {arm.base}"
             raise InvalidInput("gravity", text, allowed, hint)
         text = {"upright": "down", "hanging": "up"}[text]
-    return _GRAVITY.get(text) or _vector("gravity", text, "m/s²", f"{', '.join(_GRAVITY)}, or ")
+    return GRAVITIES.get(text) or _vector("gravity", text, "m/s²", allowed)
 
 
 UNCHANGED = Changes()

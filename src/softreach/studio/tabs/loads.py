@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.arm.base import POINTS
 from softreach.arm.design_file import in_file_terms
-from softreach.arm.loads import GRAVITY, Loads
+from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import Attribute, Fields
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
     from viser import GuiApi
 
     from softreach.studio.session import Session
-
-GRAVITIES: Mapping[str, Vector] = {
-    "none": (0.0, 0.0, 0.0),
-    "down": (0.0, 0.0, -GRAVITY),
-    "up": (0.0, 0.0, GRAVITY),
-    "sideways": (GRAVITY, 0.0, 0.0),
-}
-"""Gravity in the world, whose z points up [m/s²]."""
 
 _WAYS: Mapping[str, str] = {name: name for name in POINTS} | {
     "up": "up (upright)",
