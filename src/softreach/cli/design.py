@@ -119,7 +119,6 @@ def _rows_of_matter(facts: DesignSummary) -> Rows:
 
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
-    """The effect of each activation alone, in words."""
     rows: Rows = {}
     for k, name in enumerate(arm.bundle_names):
         unit = "" if arm.bundle_units[k] == "1" else f" {arm.bundle_units[k]}"
