@@ -135,7 +135,12 @@ def draw_bundles(ax: Axes, placed: Collection[PlacedBundle], outer: float) -> No
     for k, bundle in enumerate(sectors):
         for above in sectors[k + 1 :]:
             for part in bundle.overlaps(above):
-                _draw_stripes(ax, part, outer)
+                stripes = _sector(
+                    part, outer, facecolor="none", edgecolor=part.color, linewidth=0.0
+                )
+                stripes.set_hatch("//////")
+                stripes.set_hatch_linewidth(1.2)
+                ax.add_patch(stripes)
     for bundle in sectors:
         _draw_strokes(ax, bundle, outer)
     for bundle in (bundle for bundle in placed if bundle.shape == "lumen"):
@@ -198,13 +203,6 @@ def _sector(bundle: PlacedBundle, outer: float, **style: Any) -> Wedge:
     ends = center - extent / 2, center + extent / 2
     radius, width = outer * bundle.outer_ratio, outer * (bundle.outer_ratio - bundle.inner_ratio)
     return Wedge((0, 0), radius, *ends, width=width, **style)
-
-
-def _draw_stripes(ax: Axes, part: PlacedBundle, outer: float) -> None:
-    stripes = _sector(part, outer, facecolor="none", edgecolor=part.color, linewidth=0.0)
-    stripes.set_hatch("//////")
-    stripes.set_hatch_linewidth(1.2)
-    ax.add_patch(stripes)
 
 
 def _draw_strokes(ax: Axes, bundle: PlacedBundle, outer: float) -> None:

@@ -225,7 +225,10 @@ def _sheet(
         left, bottom = _LEFT + column * size[0], _BOTTOM + row * size[1]
         place = (left / width, bottom / height, size[0] / width, size[1] / height)
         panels[row, column] = _blank(figure, place, extent)
-    _label_edges(panels, across, up)
+    for ax, value in zip(panels[0], across.values, strict=True):
+        ax.set_xlabel(f"{value:.4g}", labelpad=3)
+    for ax, value in zip(panels[:, 0], up.values, strict=True):
+        ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
     middle = (_LEFT + columns * size[0] / 2) / width
     figure.text(middle, 0.12 / height, across.label, ha="center", fontsize=9)
     figure.text(
@@ -246,13 +249,6 @@ def _blank(figure: Figure, place: tuple[float, float, float, float], extent: Ext
     for spine in ax.spines.values():
         spine.set(color="0.88", linewidth=0.4)
     return ax
-
-
-def _label_edges(panels: Grid, across: SheetAxis, up: SheetAxis) -> None:
-    for ax, value in zip(panels[0], across.values, strict=True):
-        ax.set_xlabel(f"{value:.4g}", labelpad=3)
-    for ax, value in zip(panels[:, 0], up.values, strict=True):
-        ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
 
 
 def _cloud_image(cloud: xr.Dataset, columns: int, box: Array, view: View) -> ZBuffer:
