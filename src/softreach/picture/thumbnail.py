@@ -108,7 +108,8 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     )
     for part, points in zip(parts, seen, strict=True):
         if isinstance(part, Dots):
-            _draw_dots(buffer, points, part.colors)
+            size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
+            buffer.draw_points(points, part.colors, size)
             continue
         _draw_skin(buffer, part, view)
         if clear and not part.clear:
@@ -141,8 +142,3 @@ def _thinned(dots: Dots) -> Dots:
 def _draw_skin(buffer: ZBuffer, skin: Skin, view: View) -> None:
     if np.size(skin.faces):
         draw_mesh(buffer, skin.vertices, skin.faces, skin.color, view)
-
-
-def _draw_dots(buffer: ZBuffer, points: Array, colors: ArrayLike) -> None:
-    size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
-    buffer.draw_points(points, colors, size)

@@ -110,15 +110,13 @@ class ZBuffer:
 
     def _splat(self, layer: Keys, points: Array, colors: NDArray[np.uint8]) -> None:
         pixels = self._to_pixels(points)
-        inside = self._inside(pixels) & np.isfinite(points[:, 2])
+        rows, columns = self._keys.shape
+        across, down = pixels.T
+        inside = (across >= 0) & (across < columns) & (down >= 0) & (down < rows)
+        inside &= np.isfinite(points[:, 2])
         column, row = pixels[inside].astype(np.int64).T
         keys = _keys(points[inside, 2], colors[inside])
         np.maximum.at(layer.reshape(-1), row * layer.shape[1] + column, keys)
-
-    def _inside(self, pixels: Array) -> NDArray[np.bool_]:
-        rows, columns = self._keys.shape
-        column, row = pixels[..., 0], pixels[..., 1]
-        return (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
 
 
 def _keys(depth: Array, colors: NDArray[np.uint8]) -> Keys:
