@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from softreach.arm.parameters import Parameter
 from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
@@ -68,7 +67,12 @@ def array_plans(command: Command) -> Iterator[Plan]:
     if command.keep_clouds:
         yield _tips(command)
     sizes = {"metric": len(command.numbers)}
-    yield _per_design(command, "metrics", np.float64, np.nan, sizes, _described(command))
+    described = {
+        "long_name": "metrics of the designs",
+        "metrics": _meanings(command.numbers),
+        "alpha_over_length": command.alpha_over_length,
+    }
+    yield _per_design(command, "metrics", np.float64, np.nan, sizes, described)
 
 
 _CUBE = {
@@ -87,16 +91,13 @@ def _parameters(command: Command) -> Iterator[Plan]:
     varied = space.varied()
     for name, values in space.parameters:
         dims = (name,) if space.layout == "grid" else ("design",)
-        yield _shared(name, np.array(values), dims, _parameter_attrs(varied[name]))
-
-
-def _parameter_attrs(parameter: Parameter) -> dict[str, Any]:
-    return {
-        "units": parameter.unit,
-        "long_name": parameter.meaning,
-        "symbol": parameter.symbol,
-        "part": parameter.owner,
-    }
+        attrs = {
+            "units": varied[name].unit,
+            "long_name": varied[name].meaning,
+            "symbol": varied[name].symbol,
+            "part": varied[name].owner,
+        }
+        yield _shared(name, np.array(values), dims, attrs)
 
 
 def _profiles(command: Command) -> Iterator[Plan]:
@@ -122,14 +123,6 @@ def _tips(command: Command) -> Plan:
     }
     sizes = {"axis": len(AXES), "sample": command.n}
     return _per_design(command, "tip", np.int32, MISSING, sizes, attrs)
-
-
-def _described(command: Command) -> dict[str, Any]:
-    return {
-        "long_name": "metrics of the designs",
-        "metrics": _meanings(command.numbers),
-        "alpha_over_length": command.alpha_over_length,
-    }
 
 
 def _meanings(metrics: Sequence[Metric]) -> str:

@@ -14,16 +14,7 @@ from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
-from softreach.atlas.store import (
-    DAMAGED,
-    DONE,
-    FAILED,
-    GAP,
-    KNOWN,
-    TODO,
-    UNSTABLE,
-    AtlasStore,
-)
+from softreach.atlas.store import DAMAGED, DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE, AtlasStore
 from softreach.rod.rods import tip_map
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (

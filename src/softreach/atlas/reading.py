@@ -174,7 +174,6 @@ class _Reader:
 
 
 def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    """Chunks that must be there, by the status of their designs."""
     known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
 
     def required(chunk: Chunk) -> bool:
