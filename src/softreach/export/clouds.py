@@ -293,10 +293,6 @@ def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
     write_vtu(_point_mesh(table), file, **options)
 
 
-def _write_vtk(table: CloudTable, file: BufferedWriter) -> None:
-    write_vtk(_point_mesh(table), file)
-
-
 def _point_mesh(table: CloudTable) -> Any:
     meshio = load_library("meshio")
     columns = table.columns()
@@ -312,6 +308,6 @@ CLOUD_FILES: Formats = {
     ".npz": format_file(_write_npz),
     ".mat": format_file(_write_mat),
     ".vtu": format_file(_write_vtu, "meshio"),
-    ".vtk": format_file(_write_vtk, "meshio"),
+    ".vtk": format_file(lambda table, file: write_vtk(_point_mesh(table), file), "meshio"),
 }
 """Formats of clouds."""

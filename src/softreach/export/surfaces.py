@@ -209,14 +209,6 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     file.write(meshes.export(file_type="glb"))
 
 
-def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
-    write_vtu(_mesh(scene.parts), file)
-
-
-def _write_vtk(scene: Scene, file: BufferedWriter) -> None:
-    write_vtk(_mesh(scene.parts), file)
-
-
 def _mesh(parts: Sequence[Part]) -> Any:
     meshio = load_library("meshio")
     vertices, faces = _joined(parts)
@@ -272,7 +264,7 @@ SURFACE_FILES: Formats = {
     ".stl": format_file(_write_stl, "trimesh"),
     ".obj": format_file(_write_obj, "trimesh"),
     ".glb": format_file(_write_glb, "trimesh"),
-    ".vtu": format_file(_write_vtu, "meshio"),
-    ".vtk": format_file(_write_vtk, "meshio"),
+    ".vtu": format_file(lambda scene, file: write_vtu(_mesh(scene.parts), file), "meshio"),
+    ".vtk": format_file(lambda scene, file: write_vtk(_mesh(scene.parts), file), "meshio"),
 }
 """Formats of surfaces and arms."""
