@@ -255,13 +255,6 @@ def _density(arm: Manipulator) -> float | None:
     return float(arm.section.mass_per_length(1.0)) / math.pi
 
 
-def _check_upright(arm: Manipulator) -> None:
-    if not arm.base.is_identity:
-        allowed = "upright at the origin in ActiveFilaments.jl"
-        hint = "give arm.replace(base=Base()), whose places are those in the frame of the base"
-        raise InvalidInput("base", str(arm.base), allowed, hint)
-
-
 def _check_section(section: Section, there: str) -> None:
     if section.measured is not None:
         raise InvalidInput("section.measured", section.measured, f"None {there}")
@@ -270,8 +263,10 @@ def _check_section(section: Section, there: str) -> None:
 
 
 def _check_expressible(arm: Manipulator) -> None:
-    _check_upright(arm)
     there = "in ActiveFilaments.jl"
+    if not arm.base.is_identity:
+        hint = "give arm.replace(base=Base()), whose places are those in the frame of the base"
+        raise InvalidInput("base", str(arm.base), f"upright at the origin {there}", hint)
     if not isinstance(arm.profile, LinearTaper):
         raise InvalidInput("profile", type(arm.profile).__name__, f"a LinearTaper {there}")
     if arm.rigid_pieces:

@@ -8,12 +8,7 @@ from os import PathLike
 
 from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.exchange.activefilaments.filament import (
-    Angle,
-    Filament,
-    FilamentRing,
-    filament_of,
-)
+from softreach.exchange.activefilaments.filament import Angle, Filament, FilamentRing, filament_of
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats
