@@ -10,11 +10,7 @@ from typing import NamedTuple
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
 from softreach.studio.markup import Part, Strong, paragraph, table
-from softreach.studio.shown_parameters import (
-    ShownParameter,
-    named_parameters,
-    slider_parameters,
-)
+from softreach.studio.shown_parameters import ShownParameter, named_parameters, slider_parameters
 from softreach.studio.snapshots import Numbers
 from softreach.support.errors import SoftreachError
 

@@ -64,7 +64,6 @@ class Job(ABC):
     """Plot without which there is nothing to do either."""
 
     def __init__(self, session: Session) -> None:
-        """Work for a session, which it reads, and where it leaves its results."""
         self.session = session
 
     @classmethod

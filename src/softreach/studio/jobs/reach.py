@@ -44,7 +44,12 @@ class ComputeReach(Job):
             return
         session.refusal = ""
         try:
-            self._compute(state, check)
+            level = state.appearance.level
+            for reach in stages(state.design, level, session.quality, check, session.report):
+                check()
+                session.reach = reach
+                _count_shown(session, check)
+                _draw_cloud(session)
             session.follow(DifferentiateVolume)
         except InvalidInput as error:
             _withdraw(session, str(error))
@@ -52,14 +57,6 @@ class ComputeReach(Job):
             _withdraw(session, f"Not computed: the cloud needs {error}.")
         except MemoryError:
             _withdraw(session, "Not computed: there is not enough free memory.")
-
-    def _compute(self, state: StudioState, check: StaleCheck) -> None:
-        session, level = self.session, state.appearance.level
-        for reach in stages(state.design, level, session.quality, check, session.report):
-            check()
-            session.reach = reach
-            _count_shown(session, check)
-            _draw_cloud(session)
 
 
 class DifferentiateVolume(Job):

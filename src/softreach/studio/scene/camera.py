@@ -65,7 +65,6 @@ class TabCamera:
     """Camera of one tab, which the user and the studio both move."""
 
     def __init__(self, client: ClientHandle) -> None:
-        """Follow the camera of a client."""
         self._client = client
         self._aspect: float | None = None
         self._latest: float | None = None

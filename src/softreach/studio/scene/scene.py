@@ -13,12 +13,7 @@ from softreach.arm.rest_shape import STRAIGHT
 from softreach.arm.skin import inside
 from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
-from softreach.rod.arm_shape import (
-    arm_surface,
-    bundle_skins,
-    marker_points,
-    rest_configuration,
-)
+from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.axes import NumberedBox, add_label
@@ -82,7 +77,6 @@ class Scene:
     """One scene and what has been drawn into it."""
 
     def __init__(self, api: SceneApi) -> None:
-        """Draw into the scene of a client, or of a server for a page that is saved."""
         self._api = api
         self.clouds = Clouds(api)
         self.axes = NumberedBox(api)

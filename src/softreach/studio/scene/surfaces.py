@@ -106,8 +106,6 @@ def glb(
 
 
 class _Gltf:
-    """A file of glTF under way: accessors to parts of one buffer, and what is drawn of them."""
-
     def __init__(self, both_sides: bool) -> None:
         self._both_sides = both_sides
         self._data = b""

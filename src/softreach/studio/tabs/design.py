@@ -21,7 +21,7 @@ from softreach.studio.slopes import NO_BAR, slope_bars
 from softreach.studio.state import StudioState, rod_of
 from softreach.studio.tabs.parts import typed_number
 from softreach.studio.widgets import Line, SliderField
-from softreach.support.errors import InvalidDesign, SoftreachError
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -142,8 +142,6 @@ class DesignPanel:
         return new
 
     def _words(self, error: SoftreachError) -> str:
-        if not isinstance(error, InvalidDesign):
-            return str(error)
         rows = [parameter for parameter, _ in self._rows]
         return refusal(error, rows, self._session.state.design)
 

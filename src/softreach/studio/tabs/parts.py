@@ -13,13 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
 from softreach.arm.parameters import Parameter, changed, parameters
 from softreach.studio.fields import Attribute, Fields
-from softreach.studio.shown_parameters import (
-    Part,
-    ShownParameter,
-    part_parameters,
-    parts,
-    refusal,
-)
+from softreach.studio.shown_parameters import Part, ShownParameter, part_parameters, parts, refusal
 from softreach.studio.state import StudioState
 from softreach.studio.widgets import Line, TextKind, TypedField
 from softreach.support.errors import InvalidDesign, SoftreachError
@@ -229,8 +223,6 @@ class PartsPanel:
         self._fields.apply(edited)
 
     def _words(self, error: SoftreachError) -> str:
-        if not isinstance(error, InvalidDesign):
-            return str(error)
         return refusal(error, self._numbers, self._session.state.design)
 
 
@@ -265,6 +257,5 @@ def _known(arm: Manipulator) -> dict[str, Parameter]:
 
 
 def _ring_of(arm: Manipulator, actuator: str) -> int:
-    """The ring that an actuator is in, counted from 0."""
     home = next(part.home for part in parts(arm).values() if part.actuator == actuator)
     return arm.section.rings.index(arm.section.ring(home or 0))
