@@ -170,11 +170,7 @@ class Changes:
 
 
 def _gravity(text: str, arm: Manipulator) -> tuple[float, ...]:
-    """Gravity in the world [m/s²] from a word or numbers.
-
-    Words for how the arm stands are for one whose frame is the world's: it hangs where things fall
-    up there.
-    """
+    """Gravity in the world [m/s²]; words for how the arm stands are for an upright base only."""
     from softreach.arm.loads import GRAVITIES
 
     allowed = f"{', '.join(GRAVITIES)}, or "

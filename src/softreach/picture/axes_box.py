@@ -117,10 +117,7 @@ def _picture(toward: Array) -> Array:
 def _outer_edge(
     axis: int, visible: tuple[int, int, int], toward: Array, picture: Array
 ) -> Edge | None:
-    """Of the edges in the outline the lowest one, and of upright ones the leftmost.
-
-    An edge is in the outline if the camera sees one of its two faces.
-    """
+    """The lowest edge in the outline, the leftmost of upright ones: one of its faces is seen."""
     if abs(toward[axis]) > _END_ON:
         return None
     b, c = (k for k in range(3) if k != axis)

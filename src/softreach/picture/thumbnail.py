@@ -42,7 +42,11 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
     lines = np.pad(image.astype(np.uint8).reshape(rows, -1), ((0, 0), (1, 0)))
     content = zlib.compress(lines.tobytes(), 9)
     parts = ((b"IHDR", header), (b"IDAT", content), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
+    file = b"\x89PNG\r\n\x1a\n"
+    for kind, data in parts:
+        checksum = struct.pack(">I", zlib.crc32(kind + data))
+        file += struct.pack(">I", len(data)) + kind + data + checksum
+    return file
 
 
 class Skin(NamedTuple):
@@ -116,10 +120,6 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
             faces = faces_to_eye(part.vertices, part.faces, view)
             _draw_skin(within, part._replace(faces=faces), view)
     return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def _square_around(seen: list[Array]) -> Extent | None:

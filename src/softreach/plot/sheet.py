@@ -189,10 +189,7 @@ def _filled_sheet(
     view: View,
     width: float,
 ) -> Figure:
-    """A sheet with an image of what belongs to each panel, as many columns wide as it has pixels.
-
-    The threads find and draw the contents, the caller places them.
-    """
+    """A sheet of images; the threads find and draw the contents, the caller places them."""
     with figure_style():
         figure, panels = _sheet(across, up, box, view, width)
         inches = panels[0, 0].get_position().width * figure.get_size_inches()[0]

@@ -133,11 +133,7 @@ def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
 
 
 def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bool]:
-    """The sliders that differ; where these do not explain everything, other parameters too.
-
-    Returns:
-        Columns, and whether equal columns mean equal designs.
-    """
+    """Columns of sliders that differ, then of other parameters; and whether they tell all."""
     shown = _differing([_by_name(slider_parameters(design)) for design in designs])
     if _explained(designs, [name for name, _ in shown]):
         return [column for _, column in shown], True

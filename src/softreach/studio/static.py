@@ -241,6 +241,9 @@ def _errors(reached: ReachableSet, scene: Scene, box: np.ndarray) -> Iterator[st
 
 def _page(space: DesignSpace, entries: list[_Entry], unit: str, title: str) -> str:
     """The page, with the design in it that is nearest to the base."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
     known = [k for k, entry in enumerate(entries) if "gap" not in entry.content]
     if not known:
         allowed = "some that can exist and reach something"
@@ -267,7 +270,7 @@ def _page(space: DesignSpace, entries: list[_Entry], unit: str, title: str) -> s
         "first": first,
         "keys": content["keys"],
         "note": content["note"],
-        "colors": _colors(),
+        "colors": [to_hex(color) for color in colormaps[COLORMAP](np.linspace(0.0, 1.0, 33))],
         "name": title,
     }
     more = files("softreach.studio").joinpath("static.html").read_text(encoding="utf-8")
@@ -306,11 +309,3 @@ def _slider(
         "hint": f"{parameter.symbol}: {parameter.meaning}",
         "values": [float(f"{value / scale:.10g}") for value in values],
     }
-
-
-def _colors() -> list[str]:
-    """The map from low to high, as CSS has it."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return [to_hex(color) for color in colormaps[COLORMAP](np.linspace(0.0, 1.0, 33))]

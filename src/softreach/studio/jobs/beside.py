@@ -30,16 +30,13 @@ class DrawFree(Job):
             if known is not None and known.fine and known.arm == free:
                 session.free = known  # the loads have just been put on
             else:
-                self._compute(free, check)
+                quality = session.quality
+                small = replace(quality, fine_level=quality.coarse_level)
+                for reach in stages(free, min(_LEVEL, quality.coarse_level), small, check):
+                    check()
+                    session.free = reach
+                    self._draw()
         self._draw()
-
-    def _compute(self, free: Manipulator, check: StaleCheck) -> None:
-        quality = self.session.quality
-        small = replace(quality, fine_level=quality.coarse_level)
-        for reach in stages(free, min(_LEVEL, quality.coarse_level), small, check):
-            check()
-            self.session.free = reach
-            self._draw()
 
     def _draw(self) -> None:
         session = self.session

@@ -66,11 +66,7 @@ _QUANTITIES = {
         "g: acceleration of gravity as x, y, z in the world, whose z points up",
     ),
     "payload": _Quantity(
-        "payload",
-        "payload",
-        "g",
-        1e-3,
-        "m: mass at the tip; it weighs what gravity makes of it",
+        "payload", "payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"
     ),
     "payload_arm": _Quantity(
         "lever arm",
@@ -80,11 +76,7 @@ _QUANTITIES = {
         "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
     ),
     "tip_force": _Quantity(
-        "tip force",
-        "tip force",
-        "N",
-        1.0,
-        "F: force on the tip as x, y, z in the world",
+        "tip force", "tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"
     ),
 }
 

@@ -108,7 +108,8 @@ class NeedsPanel:
             return False
         spot = self._session.picked_place(origin, direction)
         if spot is not None:
-            attempt(self._session, lambda: self._keep_place(spot.tolist()))
+            needs = requirements_of(self._session.state.needs)
+            attempt(self._session, lambda: self._keep(with_place(needs, spot.tolist())))
         return spot is not None
 
     @property
@@ -147,9 +148,6 @@ class NeedsPanel:
         }[self._kind.value]
         self._keep(add(requirements_of(self._session.state.needs), str(self._field.value)))
         self._field.value = ""
-
-    def _keep_place(self, place: list[float]) -> None:
-        self._keep(with_place(requirements_of(self._session.state.needs), place))
 
     def _place(self, needs: Requirements, text: str) -> Requirements:
         session = self._session
@@ -198,11 +196,7 @@ class NeedsPanel:
 
 
 def _numbers(text: str, count: int) -> list[float]:
-    """Numbers that a text lists.
-
-    Raises:
-        InvalidInput: Others, or another number of them.
-    """
+    """So many numbers that a text lists; anything else is refused."""
     parts = text.replace(";", ",").replace(",", " ").split()
     numbers = [number for part in parts if (number := number_of(part)) is not None]
     if not len(parts) == len(numbers) == count:

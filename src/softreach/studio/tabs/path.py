@@ -177,11 +177,7 @@ def end_text(track: xr.Dataset, arm: Manipulator) -> str:
 
 
 def _tip(state: StudioState) -> np.ndarray:
-    """Place of the tip [m].
-
-    Raises:
-        InvalidInput: The arm has no equilibrium.
-    """
+    """Place of the tip [m]; an arm without equilibrium is refused."""
     tip = solvable_rod(state.design).tips(np.array([state.activation]))[0]
     if not np.isfinite(tip).all():
         raise InvalidInput("activation", state.activation, "one with an equilibrium")
