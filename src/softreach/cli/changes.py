@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.values import NUMBER
+from softreach.cli.values import NUMBER, pairs_in
 from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Changes:
         """
         from softreach.arm.parameters import changed
 
-        pairs = dict(self._pairs())
+        pairs = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg") or {}
         of_loads = {name: text for name, text in pairs.items() if name.startswith("loads.")}
         others = {name: text for name, text in pairs.items() if name not in of_loads}
         arm = self._posed(arm)
@@ -121,17 +121,6 @@ class Changes:
 
         angles = {"revolution": self.revolution_deg, "taper": self.taper_deg}
         return {name: from_written(x, "rad") for name, x in angles.items() if x is not None}
-
-    def _pairs(self) -> Iterator[tuple[str, str]]:
-        names: set[str] = set()
-        for text in self.settings or ():
-            name, sign, value = (part.strip() for part in text.rpartition("="))
-            if not sign or not name or not value:
-                raise InvalidInput("set", text, "PATH=VALUE, such as taper=2deg")
-            if name in names:
-                raise _given_twice(name)
-            names.add(name)
-            yield name, value
 
     def _loaded(self, arm: Manipulator, others: bool) -> Manipulator:
         """The arm with the loads it has and those given; none where all are zero and stay so."""
@@ -275,13 +264,9 @@ def _values(
     for name, text in texts.items():
         parameter = plain.get(name) or written.get(name) or find_parameter(arm, name)
         if parameter.name in values:
-            raise _given_twice(name)
+            raise InvalidInput("set", name, "given once, under one of its names")
         values[parameter.name] = _value(parameter, name, text, unit_in_name=name not in plain)
     return values
-
-
-def _given_twice(name: str) -> InvalidInput:
-    return InvalidInput("set", name, "given once, under one of its names")
 
 
 def _value(parameter: DesignParameter, name: str, text: str, *, unit_in_name: bool) -> float:

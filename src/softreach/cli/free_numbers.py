@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.values import pairs_in
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -37,13 +38,9 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
         InvalidInput: Text that is anything else, or no such number.
     """
     names, result = _Names(arm), {}
-    for text in texts:
-        name, sign, value = (part.strip() for part in text.rpartition("="))
-        if not sign or not name or not value:
-            allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
-            raise InvalidInput("prior", text, allowed)
-        plain = names.tied(name)
-        result[plain] = tuple(names.value(name, part) for part in value.split(":"))
+    allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
+    for name, value in (pairs_in("prior", texts, allowed) or {}).items():
+        result[names.tied(name)] = tuple(names.value(name, part) for part in value.split(":"))
     return result
 
 
