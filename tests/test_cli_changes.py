@@ -232,7 +232,7 @@ class TestRestInTheSummary:
         (["--set", "taper=3kg"], "taper = 3kg"),
         (["--set", "taper=nan deg"], "taper = nan deg"),
         (["--set", "bore_ratio=0.1m"], "bore_ratio = 0.1m: must be a finite number without a unit"),
-        (["--set", "taper=1deg", "--set", "taper=2deg"], "set = taper: must be given once"),
+        (["--set", "taper=1deg", "--set", "taper=2deg"], "must be given once for taper"),
         (["--set", "taper=1deg", "--set", "taper_deg=2"], "set = taper_deg: must be given once"),
         (["--set", "taper=1deg", "--taper-deg", "2"], "set = taper: must be given once"),
         (["--set", "tapr=1deg"], 'did you mean "taper"?'),

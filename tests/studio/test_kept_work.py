@@ -12,6 +12,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.cli.studio import _start, _work
+from softreach.studio.files import LARGEST
 from softreach.studio.reach import Size
 from softreach.studio.snapshots import Numbers, Snapshot, Snapshots
 from softreach.studio.start import KeptWork, work_on
@@ -75,7 +76,7 @@ def test_what_is_no_snapshot_is_refused_in_one_line(text, tmp_path):
 
 
 def test_a_file_that_is_too_large_is_not_read(tmp_path):
-    (tmp_path / "latest.json").write_text(STATE.to_json() + " " * (1 << 20))
+    (tmp_path / "latest.json").write_text(STATE.to_json() + " " * LARGEST)
     assert "at most" in KeptWork(tmp_path).complaint
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
@@ -15,12 +16,20 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["GRAVITY", "Loads", "PointLoad"]
+__all__ = ["GRAVITIES", "GRAVITY", "Loads", "PointLoad"]
 
 Triple = tuple[float, float, float]
 
 GRAVITY = 9.81
 """g, standard acceleration of what falls [m/s²]."""
+
+GRAVITIES: Mapping[str, Triple] = {
+    "down": (0.0, 0.0, -GRAVITY),
+    "up": (0.0, 0.0, GRAVITY),
+    "sideways": (GRAVITY, 0.0, 0.0),
+    "none": (0.0, 0.0, 0.0),
+}
+"""Gravity by name in the world, whose z points up [m/s²]."""
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
 

@@ -146,7 +146,6 @@ def _run(
     executor: ExecutorLike,
     progress: Progress | None,
 ) -> None:
-    """Compute designs of an atlas."""
     failures: dict[int, str] = {}
     lock = Lock()
 
@@ -176,7 +175,6 @@ def _warn_of_gaps(space: DesignSpace) -> None:
 
 
 def _warn_of_unstable(atlas: xr.Dataset) -> None:
-    """Warn of designs that have no metrics because nothing of them is stable."""
     unstable = np.flatnonzero(atlas["status"].values == UNSTABLE)
     if len(unstable):
         first, number = unstable[0], atlas["number"].values.ravel()
@@ -188,7 +186,6 @@ def _warn_of_unstable(atlas: xr.Dataset) -> None:
 
 
 def _warn_of_sparse(atlas: xr.Dataset) -> None:
-    """Warn of designs whose alpha shapes have holes between points."""
     if "spacing" not in atlas:
         return
     radius = atlas.volume.attrs["alpha_over_length"]

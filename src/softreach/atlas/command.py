@@ -170,7 +170,6 @@ def _recorded(values: Mapping[str, Any]) -> Metric:
 
 
 def _flat(command: Command) -> dict[str, Any]:
-    """Every setting by its name; the base design line by line."""
     values = {f.name: getattr(command, f.name) for f in fields(command)}
     del values["space"], values["metrics"]
     space = command.space

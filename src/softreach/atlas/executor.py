@@ -93,7 +93,6 @@ def _reporting(task: Callable[[], Outcome], on_outcome: OnOutcome) -> Callable[[
 
 
 def _check_travels(store: AtlasStore) -> None:
-    """Refuse metrics whose functions a pool of processes cannot get."""
     for metric in store.command.metrics:
         try:
             pickle.dumps(metric.compute)

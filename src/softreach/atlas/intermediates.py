@@ -131,10 +131,6 @@ def _stable(of: Intermediates, values: Array) -> Array:
     return values if of.stable.all() else values[of.stable]
 
 
-def _alpha_complex(of: Intermediates) -> AlphaComplex:
-    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
-
-
 def _convex_volume(of: Intermediates) -> float:
     """From the triangulation, if one is needed anyway."""
     if Need.ALPHA_COMPLEX in of.needs:
@@ -167,7 +163,7 @@ _COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
     Need.BASE_TIPS: lambda of: of.arm.base.to_base(of[Need.TIPS]),
     Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
     Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
-    Need.ALPHA_COMPLEX: _alpha_complex,
+    Need.ALPHA_COMPLEX: lambda of: AlphaComplex(triangulation=delaunay(of[Need.TIPS])),
     Need.CONVEX_VOLUME: _convex_volume,
     Need.REACHABLE_SET: _reachable_set,
     Need.STRAIN_STATISTICS: _strain_statistics,

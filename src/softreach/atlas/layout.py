@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from softreach.arm.parameters import Parameter
 from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
@@ -68,7 +67,12 @@ def array_plans(command: Command) -> Iterator[Plan]:
     if command.keep_clouds:
         yield _tips(command)
     sizes = {"metric": len(command.numbers)}
-    yield _per_design(command, "metrics", np.float64, np.nan, sizes, _described(command))
+    described = {
+        "long_name": "metrics of the designs",
+        "metrics": _meanings(command.numbers),
+        "alpha_over_length": command.alpha_over_length,
+    }
+    yield _per_design(command, "metrics", np.float64, np.nan, sizes, described)
 
 
 _CUBE = {
@@ -87,17 +91,13 @@ def _parameters(command: Command) -> Iterator[Plan]:
     varied = space.varied()
     for name, values in space.parameters:
         dims = (name,) if space.layout == "grid" else ("design",)
-        yield _shared(name, np.array(values), dims, _parameter_attrs(varied[name]))
-
-
-def _parameter_attrs(parameter: Parameter) -> dict[str, Any]:
-    """Unit and meaning, and the symbol and the part that figures show."""
-    return {
-        "units": parameter.unit,
-        "long_name": parameter.meaning,
-        "symbol": parameter.symbol,
-        "part": parameter.owner,
-    }
+        attrs = {
+            "units": varied[name].unit,
+            "long_name": varied[name].meaning,
+            "symbol": varied[name].symbol,
+            "part": varied[name].owner,
+        }
+        yield _shared(name, np.array(values), dims, attrs)
 
 
 def _profiles(command: Command) -> Iterator[Plan]:
@@ -125,16 +125,7 @@ def _tips(command: Command) -> Plan:
     return _per_design(command, "tip", np.int32, MISSING, sizes, attrs)
 
 
-def _described(command: Command) -> dict[str, Any]:
-    return {
-        "long_name": "metrics of the designs",
-        "metrics": _meanings(command.numbers),
-        "alpha_over_length": command.alpha_over_length,
-    }
-
-
 def _meanings(metrics: Sequence[Metric]) -> str:
-    """Meaning of each number, for readers without softreach."""
     return "; ".join(f"{metric.name} [{metric.unit}]: {metric.meaning}" for metric in metrics)
 
 
@@ -146,7 +137,6 @@ def _per_design(
     sizes: dict[str, int] | None = None,
     attrs: dict[str, Any] | None = None,
 ) -> Plan:
-    """An array whose chunks are designs."""
     space, inner = command.space, sizes or {}
     return Plan(
         name=name,
@@ -160,7 +150,6 @@ def _per_design(
 
 
 def _shared(name: str, data: np.ndarray, dims: tuple[str, ...], attrs: dict[str, Any]) -> Plan:
-    """An array that all designs share, written when the store is created."""
     chunks = (min(data.shape[0], 1 << 20), *data.shape[1:])
     fill = 0 if data.dtype.kind in "iu" else np.nan
     return Plan(

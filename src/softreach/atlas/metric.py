@@ -126,8 +126,6 @@ class Metric:
 
 @dataclass(frozen=True)
 class _Elsewhere:
-    """A function of which only the place is known."""
-
     place: str
 
     def __call__(self, *_: Any) -> float:

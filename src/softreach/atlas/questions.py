@@ -14,16 +14,7 @@ from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
-from softreach.atlas.store import (
-    DAMAGED,
-    DONE,
-    FAILED,
-    GAP,
-    KNOWN,
-    TODO,
-    UNSTABLE,
-    AtlasStore,
-)
+from softreach.atlas.store import DAMAGED, DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE, AtlasStore
 from softreach.rod.rods import tip_map
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
@@ -196,7 +187,6 @@ def best_designs(
 def _limits(
     where: Mapping[str, Interval] | Iterable[str] | None, atlas: xr.Dataset
 ) -> list[tuple[str, tuple[float, float]]]:
-    """Every constraint: the name of a metric or parameter, and between which numbers it is."""
     if where is None:
         return []
     if isinstance(where, Mapping):
@@ -252,7 +242,6 @@ def _messages(atlas: xr.Dataset, told: np.ndarray) -> dict[int, str]:
 
 
 def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
-    """One design of an atlas or of a part of it."""
     dims = [str(dim) for dim in atlas["number"].dims]
     if set(at) != set(dims):
         raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
@@ -264,7 +253,6 @@ def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
 
 
 def _parameters(atlas: xr.Dataset) -> list[str]:
-    """Coordinates that only the designs' own dimensions have."""
     dims = set(atlas["status"].dims)
     return [str(n) for n, c in atlas.variables.items() if len(c.dims) == 1 and set(c.dims) <= dims]
 

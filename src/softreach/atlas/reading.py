@@ -154,15 +154,12 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
 
 
 class _Reader:
-    """Reads arrays of an atlas, and notes which designs are damaged."""
-
     def __init__(self, store: AtlasStore) -> None:
         self._store = store
         self.damaged: dict[int, str] = {}
         """Damage of each: number -> message."""
 
     def read(self, name: str, place: Any = ...) -> NDArray[Any]:
-        """Values of an array; fill values where it is damaged."""
         array = self._store.array(name)
         with self._store.watch.noting() as noted:
             values = np.array(array[place])
@@ -171,14 +168,12 @@ class _Reader:
         return values
 
     def table(self, name: str, status: NDArray[np.uint8]) -> Array:
-        """All metrics of an array; nothing is read where there are none yet."""
         if np.isin(status, KNOWN).any():
             return self.read(name)
         return np.full(self._store.array(name).shape, np.nan)
 
 
 def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    """Chunks that must be there, by the status of their designs."""
     known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
 
     def required(chunk: Chunk) -> bool:
@@ -211,7 +206,6 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
 
 
 def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
-    """Status and message of every design."""
     space = store.command.space
     texts = np.full(space.size, "", dtype=np.dtypes.StringDType())
     for index, message in content.messages.items():
@@ -246,7 +240,6 @@ def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
 
 
 def _coordinates(store: AtlasStore, raw: xr.Dataset) -> dict[str, Any]:
-    """Parameters, length and number of every design."""
     space = store.command.space
     numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
     coordinates: dict[str, Any] = {

@@ -28,8 +28,6 @@ _MOST = 1_000_000  # designs, each of which is looked at and has files of its ow
 
 
 class _Extent(NamedTuple):
-    """Largest number of bundles and range of lengths of the designs of a space."""
-
     bundles: int
     """The largest number of bundles; 0 if there is no design."""
     shortest: float
@@ -241,7 +239,6 @@ def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...
 
 
 def _ends(name: str, ends: ArrayLike) -> np.ndarray:
-    """The lower and the upper end of a parameter."""
     allowed = "two numbers, the lower one first"
     floats = check_finite(name, as_floats(name, ends, allowed))
     if floats.shape != (2,) or not floats[0] < floats[1]:

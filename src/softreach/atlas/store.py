@@ -232,11 +232,7 @@ def _is_shared(chunk: Chunk) -> bool:
 
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
-    """Write the root of a store, whole: of several who begin at once, the first succeeds.
-
-    Raises:
-        InvalidInput: The place holds something else.
-    """
+    """Write the root, whole: of several who begin at once, the first succeeds."""
     import zarr
     from zarr.storage import LocalStore, WrapperStore
 
@@ -299,11 +295,7 @@ def _attributes(command: Command) -> dict[str, Any]:
 
 
 def _complete(store: AtlasStore) -> None:
-    """Write what all designs share, and the gaps, as far as they lack or err.
-
-    Raises:
-        StoreFailed: This machine draws other activations than the one that began the store.
-    """
+    """Write what all designs share, and the gaps, where they lack or err."""
     from zarr.errors import ContainsArrayError
 
     for plan in array_plans(store.command):
@@ -326,7 +318,6 @@ def _complete(store: AtlasStore) -> None:
 
 
 def _described(group: Group, plan: Plan, command: Command) -> None:
-    """Create an array without values."""
     group.create_array(
         plan.name,
         shape=plan.shape,

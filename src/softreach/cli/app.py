@@ -102,7 +102,6 @@ def _start(
         ),
     ] = None,
 ) -> int | None:
-    """Say how much is printed, import what is the user's own, then run the command."""
     if quiet and verbose:
         raise InvalidInput("quiet", quiet, "left out with --verbose")
     console.set(quiet=quiet, verbose=verbose)

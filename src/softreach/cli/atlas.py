@@ -244,7 +244,6 @@ def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
 
 
 def _key_and_values(text: str) -> tuple[str, str]:
-    """`taper_deg=0:3:16` in two; the name of an actuator may hold another =."""
     key, sign, values = text.rpartition("=")
     return (key, values) if sign else (text, "")
 

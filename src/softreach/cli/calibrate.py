@@ -20,10 +20,9 @@ from softreach.cli.options import (
     Unit,
     check_output,
     out_option,
-    pairs_in,
     refuse,
 )
-from softreach.cli.values import NUMBER, WHOLE, as_read
+from softreach.cli.values import NUMBER, WHOLE, as_read, pairs_in
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:

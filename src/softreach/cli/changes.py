@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.values import NUMBER
+from softreach.cli.values import NUMBER, pairs_in
 from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean
 
 if TYPE_CHECKING:
@@ -18,14 +18,6 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.parameters.parameter import Parameter as DesignParameter
 
-
-_GRAVITY = {
-    "down": (0.0, 0.0, -9.81),
-    "up": (0.0, 0.0, 9.81),
-    "sideways": (9.81, 0.0, 0.0),
-    "none": (0.0, 0.0, 0.0),
-}
-"""In the world, whose z points up."""
 
 _POSTURES = {"upright": "up", "hanging": "down"}
 """Words for the way that a base points."""
@@ -99,7 +91,7 @@ class Changes:
         """
         from softreach.arm.parameters import changed
 
-        pairs = dict(self._pairs())
+        pairs = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg") or {}
         of_loads = {name: text for name, text in pairs.items() if name.startswith("loads.")}
         others = {name: text for name, text in pairs.items() if name not in of_loads}
         arm = self._posed(arm)
@@ -110,7 +102,6 @@ class Changes:
         return arm
 
     def _posed(self, arm: Manipulator) -> Manipulator:
-        """The arm with its base as asked; its place and its turn stay."""
         from softreach.arm.base import POINTS
 
         if self.base is None:
@@ -131,30 +122,17 @@ class Changes:
         angles = {"revolution": self.revolution_deg, "taper": self.taper_deg}
         return {name: from_written(x, "rad") for name, x in angles.items() if x is not None}
 
-    def _pairs(self) -> Iterator[tuple[str, str]]:
-        """Name and value of every setting; the name of an actuator may hold another =."""
-        names: set[str] = set()
-        for text in self.settings or ():
-            name, sign, value = (part.strip() for part in text.rpartition("="))
-            if not sign or not name or not value:
-                raise InvalidInput("set", text, "PATH=VALUE, such as taper=2deg")
-            if name in names:
-                raise _given_twice(name)
-            names.add(name)
-            yield name, value
-
     def _loaded(self, arm: Manipulator, others: bool) -> Manipulator:
         """The arm with the loads it has and those given; none where all are zero and stay so."""
-        from softreach.arm.loads import Loads
+        from softreach.arm.loads import GRAVITIES, Loads
 
         loads = (arm.loads or Loads()).replace(**self._loads(arm))
-        if not others and loads == Loads(gravity=_GRAVITY["none"]):
+        if not others and loads == Loads(gravity=GRAVITIES["none"]):
             return arm.replace(loads=None)
         self._check_matter(loads, arm)
         return arm.replace(loads=loads)
 
     def _check_matter(self, loads: Loads, arm: Manipulator) -> None:
-        """Ask in one line for the moduli and densities that loads need."""
         examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
         faults = loads.section_faults(arm.section, arm.length)
         lacking = {fault.path: examples.get(fault.path.rpartition(".")[2]) for fault in faults}
@@ -181,18 +159,17 @@ class Changes:
 
 
 def _gravity(text: str, arm: Manipulator) -> tuple[float, ...]:
-    """Gravity in the world [m/s²] from a word or numbers.
+    """Gravity in the world [m/s²]; words for how the arm stands are for an upright base only."""
+    from softreach.arm.loads import GRAVITIES
 
-    Words for how the arm stands are for one whose frame is the world's: it hangs where things fall
-    up there.
-    """
+    allowed = f"{', '.join(GRAVITIES)}, or "
     if text in _POSTURES:
         if not arm.base.is_identity:
-            allowed = f"{', '.join(_GRAVITY)}, or three finite numbers x,y,z in m/s², in the world"
+            allowed += "three finite numbers x,y,z in m/s², in the world"
             hint = f"how the arm stands is said by its base, which {arm.base}"
             raise InvalidInput("gravity", text, allowed, hint)
         text = {"upright": "down", "hanging": "up"}[text]
-    return _GRAVITY.get(text) or _vector("gravity", text, "m/s²", f"{', '.join(_GRAVITY)}, or ")
+    return GRAVITIES.get(text) or _vector("gravity", text, "m/s²", allowed)
 
 
 UNCHANGED = Changes()
@@ -287,17 +264,12 @@ def _values(
     for name, text in texts.items():
         parameter = plain.get(name) or written.get(name) or find_parameter(arm, name)
         if parameter.name in values:
-            raise _given_twice(name)
+            raise InvalidInput("set", name, "given once, under one of its names")
         values[parameter.name] = _value(parameter, name, text, unit_in_name=name not in plain)
     return values
 
 
-def _given_twice(name: str) -> InvalidInput:
-    return InvalidInput("set", name, "given once, under one of its names")
-
-
 def _value(parameter: DesignParameter, name: str, text: str, *, unit_in_name: bool) -> float:
-    """A value whose unit stands in it or in the name."""
     from softreach.arm.parameters.shown import from_written, written_name
     from softreach.support.quantity import read_quantity, unit_names
 

@@ -76,7 +76,6 @@ def cloud(
 
 
 def _status_rows(cloud: xr.Dataset) -> Rows:
-    """Numbers of samples of a loaded arm with each status."""
     if "status" not in cloud:
         return {}
     from softreach.rod.tip_map import TipStatus

@@ -70,7 +70,6 @@ def demo(
 
 
 def _check(folder: Path, overwrite: bool) -> None:
-    """Look at every place before anything is written to one of them."""
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.cloud.clouds import CLOUD_STORE
     from softreach.export.clouds import CLOUD_FILES

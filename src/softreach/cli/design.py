@@ -48,7 +48,9 @@ def design(
         changes.refuse("left out with --schema")
         given = {"design": design, "out": out, "overwrite": overwrite, "unit": unit}
         refuse("left out with --schema", **given)
-        _print_schema()
+        from softreach.arm.design_file.schema import json_schema
+
+        console.json(json_schema(), indent=2)
         return
     if design is None:
         raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
@@ -67,12 +69,6 @@ def design(
             console.line(f"  {note}")
         for warning in facts.warnings:
             console.note(f"warning: {warning}")
-
-
-def _print_schema() -> None:
-    from softreach.arm.design_file.schema import json_schema
-
-    console.json(json_schema(), indent=2)
 
 
 def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
@@ -100,7 +96,6 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
 
 
 def _measured_rows(arm: Manipulator) -> Rows:
-    """Measured stiffnesses and mass, in place of what follows from the materials."""
     from softreach.arm.number import fields_of
 
     if (measured := arm.section.measured) is None:
@@ -111,7 +106,6 @@ def _measured_rows(arm: Manipulator) -> Rows:
 
 
 def _rows_of_matter(facts: DesignSummary) -> Rows:
-    """Stiffnesses at base and tip, mass and load number, as far as they are known."""
     rows: Rows = {}
     if facts.stiffness is not None:
         units = {"K0": "N", "K1": "N m²", "K3": "N m²"}
@@ -125,7 +119,6 @@ def _rows_of_matter(facts: DesignSummary) -> Rows:
 
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
-    """The effect of each activation alone, in words."""
     rows: Rows = {}
     for k, name in enumerate(arm.bundle_names):
         unit = "" if arm.bundle_units[k] == "1" else f" {arm.bundle_units[k]}"
@@ -247,5 +240,4 @@ def _stability(rest: Rest | None) -> str:
 
 
 def _sag(how: str, rest: Rest | None) -> Rows:
-    """The distance that the tip sinks."""
     return {f"sag at rest{how}": (None if rest is None else rest.sag, "m")}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.values import pairs_in
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -37,19 +38,13 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
         InvalidInput: Text that is anything else, or no such number.
     """
     names, result = _Names(arm), {}
-    for text in texts:
-        name, sign, value = (part.strip() for part in text.rpartition("="))
-        if not sign or not name or not value:
-            allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
-            raise InvalidInput("prior", text, allowed)
-        plain = names.tied(name)
-        result[plain] = tuple(names.value(name, part) for part in value.split(":"))
+    allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
+    for name, value in (pairs_in("prior", texts, allowed) or {}).items():
+        result[names.tied(name)] = tuple(names.value(name, part) for part in value.split(":"))
     return result
 
 
 class _Names:
-    """Parameters of an arm by all their names."""
-
     def __init__(self, arm: Manipulator) -> None:
         from softreach.arm.parameters.changes import parameters_by_every_name
         from softreach.arm.parameters.shown import written_parameters
@@ -58,7 +53,6 @@ class _Names:
         self.written = written_parameters(arm)
 
     def tied(self, name: str) -> str:
-        """The name, or names tied by =, without units."""
         return " = ".join(self._one(part.strip()) for part in name.split("="))
 
     def _one(self, name: str) -> str:
@@ -68,7 +62,6 @@ class _Names:
         return name in self.written and name not in self.plain
 
     def value(self, name: str, text: str) -> float:
-        """A value of a number in its unit."""
         from softreach.arm.parameters.shown import from_written
         from softreach.support.quantity import read_quantity, unit_names
 

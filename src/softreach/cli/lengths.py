@@ -89,7 +89,6 @@ class Lengths:
 
 
 def _over(value: Any, scale: float) -> Any:
-    """Numbers, however nested, over a scale; None stays."""
     if value is None:
         return None
     if isinstance(value, list | tuple):

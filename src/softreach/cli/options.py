@@ -170,25 +170,6 @@ def points_in(name: str, file: Path, arm: Manipulator) -> list[list[float]]:
     return positions_in(read_text(name, file, _MOST_TARGETS), str(file), arm.length)
 
 
-def pairs_in(name: str, texts: list[str] | None, allowed: str) -> dict[str, str] | None:
-    """Names and values of NAME=VALUE; a name may hold another =.
-
-    Raises:
-        InvalidInput: Text of another form, or a name that is given twice.
-    """
-    if texts is None:
-        return None
-    pairs: dict[str, str] = {}
-    for text in texts:
-        key, sign, value = (part.strip() for part in text.rpartition("="))
-        if not sign or not key or not value:
-            raise InvalidInput(name, text, allowed)
-        if key in pairs:
-            raise InvalidInput(name, text, f"given once for {key}")
-        pairs[key] = value
-    return pairs
-
-
 def radius_of(text: str, length: float) -> float | str:
     """An alpha radius in m from `0.05L`, `5cm`, `0.05` (m) or `critical`."""
     if text == "critical":

@@ -12,8 +12,8 @@ from cyclopts import Group, Parameter
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import AsJson, Overwrite, Unit, out_option, pairs_in
-from softreach.cli.values import NUMBER, WHOLE, as_read
+from softreach.cli.options import AsJson, Overwrite, Unit, out_option
+from softreach.cli.values import NUMBER, WHOLE, as_read, pairs_in
 
 if TYPE_CHECKING:
     from softreach.optimization import Candidate, Search

@@ -104,7 +104,6 @@ def studio(
 def _write_static(
     source: str, folder: Path, vary: list[str] | None, unit: str | None, *, overwrite: bool
 ) -> None:
-    """Write the page, and say how large it is and what is missing in it."""
     from softreach.studio.static import write_static
     from softreach.support import progress
     from softreach.support.errors import counted
@@ -125,7 +124,6 @@ def _write_static(
 
 
 def _warning(*, with_token: bool) -> str:
-    """A reminder of what everybody can do who reaches a studio that other machines see."""
     who = "who has an address with its token" if with_token else "in the network, without a token,"
     return (
         f"warning: everyone {who} can use this studio and this machine's processor; "

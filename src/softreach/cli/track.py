@@ -64,7 +64,6 @@ def track(
 
 
 def _end(tracked: xr.Dataset, lengths: Lengths) -> str:
-    """The place where the branch ends, and the reason."""
     end = tracked.attrs["end"]
     at = f"{lengths.text(float(tracked.end_length), '.7g')} of path"
     if end == "unstable":

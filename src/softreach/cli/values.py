@@ -36,6 +36,25 @@ NUMBER = _read_by(read_number, "a finite number such as 0.5 or 1e-3")
 """Of every option that is a `float`."""
 
 
+def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, str] | None:
+    """Names and values of NAME=VALUE; a name may hold another =.
+
+    Raises:
+        InvalidInput: Text of another form, or a name that is given twice.
+    """
+    if texts is None:
+        return None
+    pairs: dict[str, str] = {}
+    for text in texts:
+        key, sign, value = (part.strip() for part in text.rpartition("="))
+        if not sign or not key or not value:
+            raise InvalidInput(name, text, allowed)
+        if key in pairs:
+            raise InvalidInput(name, text, f"given once for {key}")
+        pairs[key] = value
+    return pairs
+
+
 def to_degrees(angles: Any) -> Any:
     """Angles [rad] in degrees, without the digits that come of the conversion."""
     import numpy as np

@@ -39,7 +39,6 @@ def warmup(
 
 
 def _free() -> list[Callable[[], object]]:
-    """Small jobs that together call every kernel but those of loads."""
     from softreach import workspace
     from softreach.arm import designs
     from softreach.arm.base import Base
@@ -70,7 +69,6 @@ def _free() -> list[Callable[[], object]]:
 
 
 def _set() -> None:
-    """Places asked of a small reachable set."""
     from softreach.arm import designs
     from softreach.workspace import ReachableSolid, reachable_set
 
@@ -81,7 +79,6 @@ def _set() -> None:
 
 
 def _calibration() -> None:
-    """Small fit of an arm whose tendons are driven by length."""
     import numpy as np
 
     from softreach.arm.actuators import LengthTendon
@@ -100,7 +97,6 @@ def _calibration() -> None:
 
 
 def _hulls() -> None:
-    """Hulls and distances of a small cloud."""
     import numpy as np
 
     from softreach.arm import designs
@@ -122,7 +118,6 @@ def _hulls() -> None:
 
 
 def _triangle() -> None:
-    """One triangle of a picture."""
     import numpy as np
 
     from softreach.picture.zbuffer import Extent, ZBuffer
@@ -131,7 +126,6 @@ def _triangle() -> None:
 
 
 def _loaded() -> list[Callable[[], object]]:
-    """Small jobs that together call the kernels of loads."""
     from softreach.arm import designs
     from softreach.arm.loads import Loads
     from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions

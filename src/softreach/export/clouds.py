@@ -207,7 +207,6 @@ def _metadata(cloud: xr.Dataset, unit: LengthUnit) -> dict[str, str | int | floa
 
 
 def _length(cloud: xr.Dataset) -> float | None:
-    """L [m], if the cloud knows it."""
     length = cloud["tip"].attrs.get("length") if "tip" in cloud else None
     return None if length is None else float(length)
 
@@ -294,10 +293,6 @@ def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
     write_vtu(_point_mesh(table), file, **options)
 
 
-def _write_vtk(table: CloudTable, file: BufferedWriter) -> None:
-    write_vtk(_point_mesh(table), file)
-
-
 def _point_mesh(table: CloudTable) -> Any:
     meshio = load_library("meshio")
     columns = table.columns()
@@ -313,6 +308,6 @@ CLOUD_FILES: Formats = {
     ".npz": format_file(_write_npz),
     ".mat": format_file(_write_mat),
     ".vtu": format_file(_write_vtu, "meshio"),
-    ".vtk": format_file(_write_vtk, "meshio"),
+    ".vtk": format_file(lambda table, file: write_vtk(_point_mesh(table), file), "meshio"),
 }
 """Formats of clouds."""

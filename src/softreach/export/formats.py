@@ -149,7 +149,6 @@ def _ply_rows(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:
 def _ply_header(
     count: int, fields: np.dtype[np.void], description: Mapping[str, object], further: str = ""
 ) -> bytes:
-    """Header before the rows; further elements follow the vertices."""
     lines = ["ply", "format binary_little_endian 1.0"]
     for key, value in description.items():
         lines += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]

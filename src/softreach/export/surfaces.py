@@ -61,7 +61,6 @@ class Scene(NamedTuple):
 
 
 def _a_mesh(name: str, value: Any) -> tuple[Array, Faces]:
-    """Vertices and faces of a surface, or the pair of them."""
     allowed = "an object with vertices [m] and faces, or the pair of them"
     pair = value if isinstance(value, tuple) else _parts_of(value)
     if pair is None or len(pair) != 2:
@@ -167,7 +166,6 @@ def export_arm(
 
 
 def _parts_of(value: Any) -> tuple[Any, Any] | None:
-    """Vertices and faces of an object that has them."""
     if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
         return None
     return value.vertices, value.faces
@@ -211,14 +209,6 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     file.write(meshes.export(file_type="glb"))
 
 
-def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
-    write_vtu(_mesh(scene.parts), file)
-
-
-def _write_vtk(scene: Scene, file: BufferedWriter) -> None:
-    write_vtk(_mesh(scene.parts), file)
-
-
 def _mesh(parts: Sequence[Part]) -> Any:
     meshio = load_library("meshio")
     vertices, faces = _joined(parts)
@@ -227,7 +217,6 @@ def _mesh(parts: Sequence[Part]) -> Any:
 
 
 def _joined(parts: Sequence[Part]) -> tuple[Array, Faces]:
-    """Vertices and faces of all parts as one mesh."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
     return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
@@ -266,7 +255,6 @@ def _shiny(part: Part) -> Any:
 
 
 def _part_name(names: tuple[str, ...], index: int) -> str:
-    """The bundle's name, with its number where another part has that name."""
     taken = ("body", *names[:index])
     return names[index] if names[index] not in taken else f"{names[index]} ({index + 1})"
 
@@ -276,7 +264,7 @@ SURFACE_FILES: Formats = {
     ".stl": format_file(_write_stl, "trimesh"),
     ".obj": format_file(_write_obj, "trimesh"),
     ".glb": format_file(_write_glb, "trimesh"),
-    ".vtu": format_file(_write_vtu, "meshio"),
-    ".vtk": format_file(_write_vtk, "meshio"),
+    ".vtu": format_file(lambda scene, file: write_vtu(_mesh(scene.parts), file), "meshio"),
+    ".vtk": format_file(lambda scene, file: write_vtk(_mesh(scene.parts), file), "meshio"),
 }
 """Formats of surfaces and arms."""

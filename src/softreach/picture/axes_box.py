@@ -117,10 +117,7 @@ def _picture(toward: Array) -> Array:
 def _outer_edge(
     axis: int, visible: tuple[int, int, int], toward: Array, picture: Array
 ) -> Edge | None:
-    """Of the edges in the outline the lowest one, and of upright ones the leftmost.
-
-    An edge is in the outline if the camera sees one of its two faces.
-    """
+    """The lowest edge in the outline, the leftmost of upright ones: one of its faces is seen."""
     if abs(toward[axis]) > _END_ON:
         return None
     b, c = (k for k in range(3) if k != axis)
@@ -161,19 +158,15 @@ def axes_box(
         for value in _ticks(low[axis], high[axis], side.steps[axis]):
             at = np.where(np.arange(3) == axis, value, corner)
             lines.append(np.stack([at, at + away]))
-            labels.append((_number(value), at + _NUMBERS_AT * away))
+            number = f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
+            labels.append((number, at + _NUMBERS_AT * away))
         middle = np.where(np.arange(3) == axis, (low[axis] + high[axis]) / 2, corner)
         labels.append((label("xyz"[axis]), middle + side.names[axis] * away))
     return AxesBox(np.array(lines), labels)
 
 
 def _ticks(low: float, high: float, step: float) -> Array:
-    """Multiples of the step, 0 without a sign."""
     return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step + 0.0
-
-
-def _number(value: float) -> str:
-    return f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
 
 
 def round_box(*points: Array) -> tuple[Array, Array]:
@@ -186,12 +179,10 @@ def round_box(*points: Array) -> tuple[Array, Array]:
 
 
 def _round_step(span: float) -> float:
-    """A round number of which few fit into the span."""
     return _round_up(max(span, 1e-9) / _MOST)
 
 
 def _round_up(value: float) -> float:
-    """The next round number; 0 stays 0."""
     if value == 0.0:
         return 0.0
     power = 10.0 ** np.floor(np.log10(value))

@@ -89,7 +89,6 @@ class Figure3D:
     """Points and triangles that it shows, and of how many; empty for arms alone."""
 
     def _repr_html_(self) -> str:
-        """The page in a frame, for notebooks."""
         page = html.escape(self.html, quote=True)
         style = f"width:100%;height:{_HEIGHT}px;border:1px solid #ddd"
         return f'<iframe srcdoc="{page}" style="{style}" title="softreach"></iframe>'

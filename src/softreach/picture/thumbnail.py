@@ -42,7 +42,11 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
     lines = np.pad(image.astype(np.uint8).reshape(rows, -1), ((0, 0), (1, 0)))
     content = zlib.compress(lines.tobytes(), 9)
     parts = ((b"IHDR", header), (b"IDAT", content), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
+    file = b"\x89PNG\r\n\x1a\n"
+    for kind, data in parts:
+        checksum = struct.pack(">I", zlib.crc32(kind + data))
+        file += struct.pack(">I", len(data)) + kind + data + checksum
+    return file
 
 
 class Skin(NamedTuple):
@@ -108,7 +112,8 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     )
     for part, points in zip(parts, seen, strict=True):
         if isinstance(part, Dots):
-            _draw_dots(buffer, points, part.colors)
+            size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
+            buffer.draw_points(points, part.colors, size)
             continue
         _draw_skin(buffer, part, view)
         if clear and not part.clear:
@@ -117,12 +122,7 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
 
 
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
 def _square_around(seen: list[Array]) -> Extent | None:
-    """A square of the projection plane with a margin around all finite points."""
     flat = np.concatenate([points[:, :2] for points in seen]) if seen else np.empty((0, 2))
     flat = flat[np.isfinite(flat).all(axis=1)]
     if not len(flat):
@@ -142,8 +142,3 @@ def _thinned(dots: Dots) -> Dots:
 def _draw_skin(buffer: ZBuffer, skin: Skin, view: View) -> None:
     if np.size(skin.faces):
         draw_mesh(buffer, skin.vertices, skin.faces, skin.color, view)
-
-
-def _draw_dots(buffer: ZBuffer, points: Array, colors: ArrayLike) -> None:
-    size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
-    buffer.draw_points(points, colors, size)

@@ -76,7 +76,7 @@ class ZBuffer:
             block = slice(start, start + _BLOCK)
             seen = points[block] if view is None else project(points[block], view)
             self._splat(layer, seen, colors[block])
-        self._keep_larger(_grown(layer, size * self.oversample))
+        np.maximum(self._keys, _grown(layer, size * self.oversample), out=self._keys)
 
     def draw_triangles(self, corners: ArrayLike, colors: ArrayLike) -> None:
         """Draw filled triangles whose colors blend from corner to corner.
@@ -110,18 +110,13 @@ class ZBuffer:
 
     def _splat(self, layer: Keys, points: Array, colors: NDArray[np.uint8]) -> None:
         pixels = self._to_pixels(points)
-        inside = self._inside(pixels) & np.isfinite(points[:, 2])
+        rows, columns = self._keys.shape
+        across, down = pixels.T
+        inside = (across >= 0) & (across < columns) & (down >= 0) & (down < rows)
+        inside &= np.isfinite(points[:, 2])
         column, row = pixels[inside].astype(np.int64).T
         keys = _keys(points[inside, 2], colors[inside])
         np.maximum.at(layer.reshape(-1), row * layer.shape[1] + column, keys)
-
-    def _inside(self, pixels: Array) -> NDArray[np.bool_]:
-        rows, columns = self._keys.shape
-        column, row = pixels[..., 0], pixels[..., 1]
-        return (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-
-    def _keep_larger(self, layer: Keys) -> None:
-        np.maximum(self._keys, layer, out=self._keys)
 
 
 def _keys(depth: Array, colors: NDArray[np.uint8]) -> Keys:
@@ -172,7 +167,6 @@ def _extent_of_content(keys: Keys, by: int) -> tuple[slice, slice]:
 
 
 def _range_of(some: NDArray[np.bool_], by: int) -> slice:
-    """The blocks from the first to the last that are true somewhere."""
     indices = np.flatnonzero(some)
     return slice(indices[0] // by, indices[-1] // by + 1) if len(indices) else slice(0, 0)
 

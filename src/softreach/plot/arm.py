@@ -16,13 +16,7 @@ from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import (
-    WIDTH,
-    figure_style,
-    panel_arguments,
-    pyplot,
-    some_bundles,
-)
+from softreach.plot.style import WIDTH, figure_style, panel_arguments, pyplot, some_bundles
 from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_instance, as_number
@@ -141,7 +135,10 @@ def arm_images(
     hidden = inside(arm)
     clear = any(hidden[index] for index in bundles)
     for shape in shapes:
-        _draw_body(buffer, arm, shape, panel, fade)
+        body = arm_surface(arm, shape, _SIDES)
+        caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
+        for part in (body.faces[:-caps], body.faces[-caps:]):
+            draw_mesh(buffer, panel.unit.of(body.vertices), part, BODY, panel.view, fade)
         skins = bundle_skins(arm, shape, lift=0.008)
         for index in bundles:
             color, points, faces = bundle_color(index), skins[index].vertices, skins[index].faces
@@ -218,12 +215,3 @@ def plot_designs(
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])
     return figure
-
-
-def _draw_body(
-    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, panel: Panel, fade: float
-) -> None:
-    body = arm_surface(arm, shape, _SIDES)
-    caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
-    for part in (body.faces[:-caps], body.faces[-caps:]):
-        draw_mesh(buffer, panel.unit.of(body.vertices), part, BODY, panel.view, fade)

@@ -154,7 +154,8 @@ def bounding_box(*points: ArrayLike) -> Array:
 
 def view_extent(box: Array, view: View) -> Extent:
     """The part of the projection plane that a box fills."""
-    seen = project(_box_corners(box), view)
+    corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    seen = project(corners, view)
     low, high = seen.min(axis=0), seen.max(axis=0)
     return Extent(low[0], high[0], low[1], high[1])
 
@@ -174,7 +175,6 @@ def _ticks(box: Array, edges: list[Array]) -> list[Array]:
 
 
 def _wall_lines(box: Array, ticks: list[Array], far: Array) -> Iterator[Array]:
-    """Grid lines and edges: for each pair of axes, lines along one at the ticks of the other."""
     for along in range(3):
         for across in {0, 1, 2} - {along}:
             for value in (*ticks[across], *box[:, across]):
@@ -219,7 +219,6 @@ def _outward(ends: Array, center: Array) -> Array:
 
 
 def _text(ax: Axes, place: Array, text: str, outward: Array, gap: float, size: float) -> None:
-    """Write beside an edge, on the side away from the box."""
     sideways, upward = (np.sign(outward) * (np.abs(outward) > 0.4)).astype(int)
     ax.annotate(
         text,
@@ -233,13 +232,7 @@ def _text(ax: Axes, place: Array, text: str, outward: Array, gap: float, size: f
     )
 
 
-def _box_corners(box: Array) -> Array:
-    """The eight corners, shape (8, 3)."""
-    return np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
-
-
 def _framed_axes(box: Array, view: View) -> Axes:
-    """Axes in a new figure of the shape of what they show, about a journal's column wide."""
     span = _span(view_extent(box, view))
     inches = span * (_ROOM / span).min() + _AROUND
     return pyplot().subplots(figsize=tuple(inches), layout="constrained")[1]
@@ -258,7 +251,6 @@ def _span(extent: Extent) -> Array:
 
 
 def _inches(ax: Axes, extent: Extent) -> Array:
-    """Width and height of an extent on paper, as it fits into the axes."""
     figure = ax.get_figure(root=True)
     assert figure is not None
     room = np.array(ax.get_position().size) * figure.get_size_inches()

@@ -31,8 +31,6 @@ _MEASURED = "0.45"
 
 
 class _HasDataset(Protocol):
-    """A calibration."""
-
     def to_dataset(self) -> xr.Dataset: ...
 
 
@@ -87,8 +85,6 @@ def plot_calibration(
 
 
 class _Shown:
-    """A calibration in the unit of a figure."""
-
     def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
         self.data, self.unit = data, unit
         self.measured = unit.of(data["measured"].values)
@@ -112,18 +108,15 @@ class _Shown:
 
     @property
     def moving_inputs(self) -> list[int]:
-        """Inputs that are not the same in all samples."""
         return np.flatnonzero(np.ptp(self.data["input_value"].values, axis=0) > 0).tolist()
 
     def scatter(self, ax: Axes, x: Array, marker: int) -> None:
-        """Distances of a marker against something, those of samples held out hollow."""
         size = {"s": 9 if len(x) < 300 else 4, "linewidths": 0.6, "zorder": 3}
         for rows, face in ((~self.held, self.colors[marker]), (self.held, "none")):
             color: Any = self.colors[marker]
             ax.scatter(x[rows], self.distance[rows, marker], color=face, edgecolors=color, **size)
 
     def frame(self, ax: Axes, rows: NDArray[np.bool_] | None = None) -> None:
-        """Limits of the distances, and how many are beyond."""
         ax.set_ylim(0.0, self.top)
         far = int((self.distance > self.top).sum())
         if far:
@@ -156,7 +149,6 @@ def _draw_places(ax: Axes, shown: _Shown, view: View) -> None:
 
 
 def _draw_markers(ax: Axes, shown: _Shown) -> None:
-    """Distances of each marker side by side, with their rms."""
     rng = np.random.default_rng(0)
     for k in range(len(shown.markers)):
         shown.scatter(ax, k + 0.25 * (2.0 * rng.random(len(shown.distance)) - 1.0), k)
@@ -177,7 +169,6 @@ def _draw_markers(ax: Axes, shown: _Shown) -> None:
 
 
 def _draw_order(ax: Axes, shown: _Shown) -> None:
-    """Distances in the order in which samples were taken, with the ends of runs."""
     rank = shown.data["rank"].values
     for k in range(len(shown.markers)):
         shown.scatter(ax, rank, k)

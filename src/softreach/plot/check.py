@@ -33,8 +33,6 @@ _REGIONS = {
 
 
 class _Check(Protocol):
-    """Result of `check`."""
-
     @property
     def arm(self) -> Manipulator: ...
     @property
@@ -108,7 +106,7 @@ def plot_check(
 
 def _draw_places(panel: Panel, check: _Check) -> None:
     met = check.reached.all(axis=0)
-    load = _worst_payload(check)
+    load = (~check.reached).sum(axis=1).argmax()  # under which most are missed
     gaps = [
         np.stack(ends) for ends in zip(check.places[~met], check.nearest[load, ~met], strict=True)
     ]
@@ -130,11 +128,6 @@ def _draw_places(panel: Panel, check: _Check) -> None:
             )
 
 
-def _worst_payload(check: _Check) -> int:
-    """Index of the payload under which most places are missed."""
-    return int((~check.reached).sum(axis=1).argmax())
-
-
 def _draw_lines(panel: Panel, lines: list[Array], style: dict[str, Any]) -> None:
     for line in lines:
         panel.ax.plot(*_seen(panel, line), zorder=_ABOVE, **style)
@@ -142,6 +135,5 @@ def _draw_lines(panel: Panel, lines: list[Array], style: dict[str, Any]) -> None
 
 
 def _seen(panel: Panel, points: Array) -> tuple[Array, Array]:
-    """Coordinates of points [m] in the axes."""
     x, y, _ = project(panel.unit.of(points), panel.view).T
     return (-x if is_mirrored(panel.view) else x), y

@@ -258,14 +258,12 @@ def _not_too_slim(box: Array) -> Array:
 
 
 def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
-    """Half the thickness in the units of the axes."""
     if thickness is not None:
         return float(unit.of(thickness)) / 2
     return _THICKNESS / 2 * (1.0 if unit.relative else float(np.nanmax(np.ptp(tips, axis=0))))
 
 
 def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
-    """Name of a slab, such as |x| ≤ 0.01 L."""
     distance = f"{axis} - {middle:.3g} {unit.name}" if middle else axis
     return f"|{distance}| ≤ {half:.3g} {unit.name}"
 

@@ -145,7 +145,6 @@ def _comparable(activation: Array, units: Sequence[str]) -> Array:
 
 
 def _strongest(magnitude: Array, names: tuple[str, ...], units: Sequence[str]) -> Coloring:
-    """Each sample in the color of its strongest bundle; gray where none acts."""
     shares = _comparable(magnitude, units)
     known = np.isfinite(shares).all(axis=1) & np.any(shares > 0.0, axis=1)
     colors = np.array([bundle_color(k) for k in range(len(names))])
@@ -221,7 +220,6 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
 
 
 def _columns(key: BundleKey, room: int, otherwise: int) -> int:
-    """Columns of a legend: one for each entry if they fit into so many characters."""
     fits = len(key.title) + sum(len(name) + 6 for name in key.names) <= room
     return len(key.names) + 2 if fits else otherwise
 
@@ -266,7 +264,6 @@ def _clipped(coloring: Coloring) -> Coloring:
 
 
 def _described(color: ArrayLike) -> str:
-    """Label of an array: its long name and unit."""
     attrs = getattr(color, "attrs", {})
     name, unit = attrs.get("long_name", ""), attrs.get("units")
     return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
@@ -281,7 +278,6 @@ def _spans_decades(values: Array, color: ArrayLike) -> bool:
 
 
 def _logarithmic(values: Array, label: str) -> Coloring:
-    """Colors in even steps of the logarithm of positive values."""
     rgb, key = _scalar(np.log(values), label)
     assert isinstance(key, ScalarKey)
     low, high = math.exp(key.low), math.exp(key.high)
@@ -325,7 +321,6 @@ def _patches(key: BundleKey) -> list[Any]:
 
 
 def _marks(key: BundleKey | ScalarKey) -> list[Any]:
-    """Mark of unstable samples, if there are any."""
     from matplotlib.patches import Patch
 
     color = tuple(np.array(UNSTABLE) / 255)

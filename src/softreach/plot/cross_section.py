@@ -19,14 +19,7 @@ from softreach.plot.section_parts import (
     section_materials,
     tendon_style,
 )
-from softreach.plot.style import (
-    LENGTH,
-    PLACE,
-    as_axes,
-    figure_style,
-    small_axes,
-    some_bundles,
-)
+from softreach.plot.style import LENGTH, PLACE, as_axes, figure_style, small_axes, some_bundles
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
 

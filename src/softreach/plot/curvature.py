@@ -75,7 +75,6 @@ def _statistics(name: str, value: object) -> xr.Dataset:
 
 
 def _common_places(statistics: Mapping[str, xr.Dataset], units: list[LengthUnit]) -> Array:
-    """The stations on the axis, which all designs share."""
     both = zip(units, statistics.values(), strict=True)
     places = [unit.of(data["Z"].values) for unit, data in both]
     for other in places[1:]:

@@ -22,12 +22,7 @@ from softreach.plot.clouds import drawn_tips, point_size
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey, color_map, color_samples
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import a_surface
-from softreach.rod.arm_shape import (
-    arm_surface,
-    bundle_skins,
-    marker_points,
-    rest_configuration,
-)
+from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_cloud, a_configuration
 from softreach.support.arguments import as_given, as_text

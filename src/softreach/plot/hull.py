@@ -33,7 +33,6 @@ _VOLUMES = Range(0.0, unit="m³")
 
 
 def _rgb(name: str, value: object) -> tuple[float, float, float]:
-    """Three shares of red, green and blue."""
     rgb = as_floats(name, value)
     if rgb.shape != (3,) or not ((rgb >= 0) & (rgb <= 1)).all():
         raise InvalidInput(name, rgb, "three numbers from 0 to 1: red, green, blue")

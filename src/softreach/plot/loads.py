@@ -153,7 +153,8 @@ def plot_compliance(
     with figure_style(ax):
         if box is None:
             surfaces = [arm_points(arm, shape, counted) for shape in shapes]
-            box = counted.size * bounding_box(*surfaces, *_ends(tips, axes))
+            half = np.linalg.norm(axes, axis=2)  # of the boxes around the ellipsoids
+            box = counted.size * bounding_box(*surfaces, tips - half, tips + half)
         ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box, unit=counted)
         for outline in _outlines(tips, axes, view):
             ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
@@ -203,7 +204,6 @@ def plot_payload_curve(
 
 
 def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
-    """Line style of the centerline of an equilibrium."""
     stable = equilibria.status[k] == TipStatus.STABLE
     follows = k == equilibria.followed
     kind = ("stable" if stable else "unstable") + (" ring" if equilibria.is_ring[k] else "")
@@ -216,14 +216,12 @@ def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
 
 
 def _line(panel: Panel, points: Array, **style: Any) -> None:
-    """A curve in space, over the images."""
     right, up, _ = project(points, panel.view).T
     mirror = -1 if is_mirrored(panel.view) else 1
     panel.ax.plot(mirror * right, up, zorder=_ABOVE, solid_capstyle="round", **style)
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:
-    """Circle of tips of a ring of equilibria [m]."""
     assert equilibria.solver is not None
     pose = equilibria.rod.pose
     axis, tip = equilibria.solver.tables.axes[0], pose.to_base(equilibria.tips[k])
@@ -234,13 +232,11 @@ def _circle(equilibria: AllEquilibria, k: int) -> Array:
 
 
 def _rim(radius: float) -> Array:
-    """Of the disk that an arm of this radius is clamped to."""
     angle = np.linspace(0.0, 2.0 * np.pi, 65)
     return _BASE * radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
 
 
 def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
-    """Arrow of gravity, or along the line of the forces that there are."""
     if equilibria.solver is None:
         return
     tables = equilibria.solver.tables
@@ -274,12 +270,6 @@ def _add_legend(ax: Axes, *, own_figure: bool) -> None:
     width, height = figure.get_size_inches()
     figure.set_size_inches(max(width, _LEAST_WIDTH), height + _ENTRY * len(kinds))
     figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
-
-
-def _ends(tips: Array, axes: Array) -> list[Array]:
-    """The corners of the boxes around the ellipsoids."""
-    half = np.linalg.norm(axes, axis=2)
-    return [tips - half, tips + half]
 
 
 def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:

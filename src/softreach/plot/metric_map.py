@@ -134,21 +134,15 @@ def _axis(values: xr.DataArray) -> SheetAxis:
 
 
 def _name(values: xr.DataArray) -> str:
-    """The symbol of a parameter and the part that it belongs to."""
     if "symbol" not in values.attrs:
         return plain(str(values.name))
-    symbol = _in_math(values.attrs["symbol"])
+    symbol = values.attrs["symbol"]
+    if _INDEXED.search(symbol):
+        symbol = "$" + _INDEXED.sub(r"\1_\2", symbol) + "$"
     return f"{symbol} of {plain(part)}" if (part := values.attrs.get("part")) else symbol
 
 
-def _in_math(symbol: str) -> str:
-    """R1/R2 with its indices set low."""
-    text = _INDEXED.sub(r"\1_\2", symbol)
-    return symbol if text == symbol else f"${text}$"
-
-
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
-    """Filled contours with lines, or cells where there are none; what a color bar explains."""
     known = values.compressed()
     if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
         return ax.pcolormesh(_edges(across), _edges(up), values, cmap=COLORMAP)
@@ -169,7 +163,6 @@ def _edges(axis: SheetAxis) -> Array:
 def _draw_contours(
     ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array
 ) -> None:
-    """Every second level as a line, white on dark and dark on bright, with its value."""
     ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(0, len(levels), 2)]
     lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
     low = np.array([across.values[0], up.values[0]])
@@ -189,7 +182,8 @@ def _label_place(path: Array) -> list[Array]:
 
 
 def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smallest: bool) -> None:
-    row, column = _best(values, smallest)
+    best = np.nanargmin(values) if smallest else np.nanargmax(values)
+    row, column = np.unravel_index(best, values.shape)
     place = across.values[column], up.values[row]
     dot = {"ms": 5, "mfc": "w", "mec": "k", "mew": 0.8, "clip_on": False, "zorder": 5}
     ax.plot(*place, "o", **dot)
@@ -206,9 +200,3 @@ def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smalle
         fontsize=7,
         bbox={"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8},
     )
-
-
-def _best(values: Array, smallest: bool) -> tuple[int, int]:
-    flat = np.nanargmin(values) if smallest else np.nanargmax(values)
-    row, column = np.unravel_index(flat, values.shape)
-    return int(row), int(column)

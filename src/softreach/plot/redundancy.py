@@ -230,7 +230,6 @@ def _colors(values: Array, high: float) -> NDArray[np.uint8]:
 
 
 def _rows(titles: list[str], box: Array, width: float) -> tuple[Figure, dict[str, dict[str, Axes]]]:
-    """Axes at one scale: four columns, a row for each title."""
     x, y, z = np.ptp(box, axis=0)
     spans = {"cloud": x, "front": x, "side": y, "distance": x}
     m = _MARGINS
@@ -251,7 +250,6 @@ def _rows(titles: list[str], box: Array, width: float) -> tuple[Figure, dict[str
 def _label_row(
     row: dict[str, Axes], title: str, magnitude: BundleKey | ScalarKey | None, distance: ScalarKey
 ) -> None:
-    """Bars above the first and the last picture; heights only at the left."""
     for name, key in (("cloud", magnitude), ("distance", distance)):
         if isinstance(key, ScalarKey):
             _bar_above(row[name], key)

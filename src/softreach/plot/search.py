@@ -28,8 +28,6 @@ _MOST_LINES = 200
 
 
 class _HasDataset(Protocol):
-    """A search."""
-
     def to_dataset(self) -> xr.Dataset: ...
 
 
@@ -76,8 +74,6 @@ def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
 
 
 class _Shown:
-    """A search in the units of a figure."""
-
     def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
         self.data, self.unit = data, unit
         self.feasible: Mask = data["feasible"].values
@@ -104,7 +100,6 @@ class _Shown:
 
 
 def _draw_progress(ax: Axes, shown: _Shown) -> None:
-    """Objective of each design in their order, with the best so far."""
     value, at = shown.values[:, 0], shown.looked_at
     way, final = shown.feasible & ~shown.final, shown.feasible & shown.final
     ax.scatter(at[way], value[way], edgecolors=_MET, label="on the way", zorder=3, **_COARSE)
@@ -132,7 +127,6 @@ def _mark_missed(ax: Axes, shown: _Shown) -> None:
 
 
 def _draw_fidelities(ax: Axes, shown: _Shown) -> None:
-    """Values on coarse sets against those of full accuracy, of the same designs."""
     rows = np.flatnonzero(shown.final & shown.feasible)
     before = shown.data["coarse_design"].values[rows]
     rows, before = rows[before >= 0], before[before >= 0]
@@ -158,7 +152,6 @@ def _draw_fidelities(ax: Axes, shown: _Shown) -> None:
 
 
 def _draw_front(ax: Axes, shown: _Shown) -> None:
-    """Designs by their two objectives, and the front as a line of steps."""
     way = shown.feasible & ~shown.final
     ax.scatter(*shown.values[way].T, edgecolors=_MET, label="on the way", zorder=3, **_COARSE)
     rows = np.flatnonzero(shown.front & shown.feasible)
@@ -223,7 +216,6 @@ def _draw_objectives(ax: Axes, shown: _Shown) -> None:
 
 
 def _draw_ranges(ax: Axes, shown: _Shown) -> None:
-    """Free parameters of all designs in their ranges, from one end to the other."""
     data = shown.data
     low, high = data["low"].values, data["high"].values
     shares = (data["value"].values - low) / np.where(high > low, high - low, 1.0)
@@ -249,7 +241,6 @@ def _draw_ranges(ax: Axes, shown: _Shown) -> None:
 
 
 def _end_text(shown: _Shown, k: int, end: float) -> str:
-    """An end of a range, or the choice there."""
     choices = str(shown.data["choices"].values[k])
     if choices:
         return choices.split(", ")[round(end)]

@@ -135,7 +135,12 @@ def draw_bundles(ax: Axes, placed: Collection[PlacedBundle], outer: float) -> No
     for k, bundle in enumerate(sectors):
         for above in sectors[k + 1 :]:
             for part in bundle.overlaps(above):
-                _draw_stripes(ax, part, outer)
+                stripes = _sector(
+                    part, outer, facecolor="none", edgecolor=part.color, linewidth=0.0
+                )
+                stripes.set_hatch("//////")
+                stripes.set_hatch_linewidth(1.2)
+                ax.add_patch(stripes)
     for bundle in sectors:
         _draw_strokes(ax, bundle, outer)
     for bundle in (bundle for bundle in placed if bundle.shape == "lumen"):
@@ -172,7 +177,6 @@ def _draw_material(
 
 
 def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
-    """The bore, and gaps between rings."""
     reached = section.bore_ratio
     voids = [(0.0, reached)] if reached > 0 else []
     reached = max(reached, section.inner_ratio)
@@ -201,14 +205,6 @@ def _sector(bundle: PlacedBundle, outer: float, **style: Any) -> Wedge:
     return Wedge((0, 0), radius, *ends, width=width, **style)
 
 
-def _draw_stripes(ax: Axes, part: PlacedBundle, outer: float) -> None:
-    """The part of a sector that another covers, as stripes over that."""
-    stripes = _sector(part, outer, facecolor="none", edgecolor=part.color, linewidth=0.0)
-    stripes.set_hatch("//////")
-    stripes.set_hatch_linewidth(1.2)
-    ax.add_patch(stripes)
-
-
 def _draw_strokes(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
     """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
     from matplotlib.collections import LineCollection
@@ -230,12 +226,8 @@ def _draw_strokes(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
         )
     ]
     strokes = np.stack(ends, axis=1)
-    ax.add_collection(LineCollection(list(strokes), colors=_contrast(bundle.color), linewidths=0.7))
-
-
-def _contrast(color: Color) -> str:
-    """A color that stands out on another."""
-    return "white" if np.dot(color, _LIGHTNESS) < 0.55 else "0.3"
+    ink = "white" if np.dot(bundle.color, _LIGHTNESS) < 0.55 else "0.3"
+    ax.add_collection(LineCollection(list(strokes), colors=ink, linewidths=0.7))
 
 
 def _draw_lumen(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
@@ -247,7 +239,6 @@ def _draw_lumen(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
 
 
 def _draw_disks(ax: Axes, lines: Collection[PlacedBundle], outer: float) -> None:
-    """A dotted circle for each distance at which tendons run outside of the arm."""
     from matplotlib.patches import Circle
 
     for ratio in sorted(
@@ -259,6 +250,5 @@ def _draw_disks(ax: Axes, lines: Collection[PlacedBundle], outer: float) -> None
 
 
 def _middle(bundle: PlacedBundle, outer: float) -> tuple[list[float], list[float]]:
-    """Place of a tendon, or of the center of a lumen."""
     radius = 0.5 * outer * (bundle.inner_ratio + bundle.outer_ratio)
     return [radius * np.cos(bundle.center)], [radius * np.sin(bundle.center)]

@@ -161,7 +161,9 @@ def plot_opposite_sides(
         raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
     azimuth, elevation = view_angles(view)
     sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
-    shown = np.asarray(_around(clouds) if around is None else around, float)
+    if around is None:
+        tips = (drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values())
+        around = bounding_box(*tips)
     with figure_style():
         column = width / len(clouds)
         figure = pyplot().figure(figsize=(width, 2 * column + 0.5))
@@ -169,7 +171,7 @@ def plot_opposite_sides(
         figure.subplots_adjust(0.085, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
         for k, (title, cloud) in enumerate(clouds.items()):
             arm = design_of(cloud)
-            box = shown * arm.length
+            box = np.asarray(around) * arm.length
             panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
             for ax, side in zip(panels[:, k], sides, strict=True):
                 plot_cloud(cloud, ax=ax, view=side, color="rgb", key=False, box=box, unit=unit)
@@ -187,13 +189,11 @@ def _filled_sheet(
     view: View,
     width: float,
 ) -> Figure:
-    """A sheet with an image of what belongs to each panel, as many columns wide as it has pixels.
-
-    The threads find and draw the contents, the caller places them.
-    """
+    """A sheet of images; the threads find and draw the contents, the caller places them."""
     with figure_style():
         figure, panels = _sheet(across, up, box, view, width)
-        columns, extent = _columns(panels[0, 0]), panel_extent(box, view)
+        inches = panels[0, 0].get_position().width * figure.get_size_inches()[0]
+        columns, extent = max(16, round(inches * DPI)), panel_extent(box, view)
 
         def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
             content = content_at(column, row)
@@ -211,7 +211,6 @@ def _filled_sheet(
 def _sheet(
     across: SheetAxis, up: SheetAxis, box: Array, view: View, width: float
 ) -> tuple[Figure, Grid]:
-    """A figure and its panels, the first row at the bottom, each as wide as the box."""
     extent = panel_extent(box, view)
     aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
     columns, rows = len(across.values), len(up.values)
@@ -223,7 +222,10 @@ def _sheet(
         left, bottom = _LEFT + column * size[0], _BOTTOM + row * size[1]
         place = (left / width, bottom / height, size[0] / width, size[1] / height)
         panels[row, column] = _blank(figure, place, extent)
-    _label_edges(panels, across, up)
+    for ax, value in zip(panels[0], across.values, strict=True):
+        ax.set_xlabel(f"{value:.4g}", labelpad=3)
+    for ax, value in zip(panels[:, 0], up.values, strict=True):
+        ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
     middle = (_LEFT + columns * size[0] / 2) / width
     figure.text(middle, 0.12 / height, across.label, ha="center", fontsize=9)
     figure.text(
@@ -246,19 +248,6 @@ def _blank(figure: Figure, place: tuple[float, float, float, float], extent: Ext
     return ax
 
 
-def _label_edges(panels: Grid, across: SheetAxis, up: SheetAxis) -> None:
-    for ax, value in zip(panels[0], across.values, strict=True):
-        ax.set_xlabel(f"{value:.4g}", labelpad=3)
-    for ax, value in zip(panels[:, 0], up.values, strict=True):
-        ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
-
-
-def _columns(ax: Axes) -> int:
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    return max(16, round(ax.get_position().width * figure.get_size_inches()[0] * DPI))
-
-
 def _cloud_image(cloud: xr.Dataset, columns: int, box: Array, view: View) -> ZBuffer:
     extent = panel_extent(box, view)
     unit = unit_of(cloud["tip"])
@@ -273,7 +262,6 @@ def _cloud_image(cloud: xr.Dataset, columns: int, box: Array, view: View) -> ZBu
 
 
 def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
-    """A bar of half a length and the directions of x, y and z, in the margin of the sheet."""
     width, height = figure.get_size_inches()
     ax = figure.add_axes((0.04 / width, 0.02 / height, _LEFT / width, (_BOTTOM - 0.1) / height))
     left, right = panel.get_xlim()
@@ -291,7 +279,3 @@ def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
         ax.annotate("", (x, y), tuple(center), arrowprops=arrow | {"color": "0.2", "shrinkB": 0})
         x, y = center + 0.22 * inch * direction
         ax.text(x, y, name, fontsize=7, ha="center", va="center")
-
-
-def _around(clouds: Mapping[str, xr.Dataset]) -> ArrayLike:
-    return bounding_box(*(drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values()))

@@ -122,7 +122,6 @@ def _layer(grid: xr.Dataset, axis: str, at: float) -> xr.Dataset:
 
 
 def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
-    """The layer, in that view; returns the largest number that is shown."""
     plane = plane_of(view)
     assert plane is not None  # the view is along an axis
     across, up = plane
@@ -132,7 +131,8 @@ def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
     _draw_cells(ax, shown, *centers, half=float(unit.of(layer.attrs["cell"])) / 2)
     if "degree" in layer:
         folded = (layer["count"] > abs(layer["degree"])).transpose(up, across).values
-        _draw_folds(ax, folded, *centers)
+        if folded.any():
+            ax.contour(*centers, folded.astype(float), levels=[0.5], colors="black", linewidths=0.6)
     ax.set(xlabel=unit.label(across), ylabel=unit.label(up), aspect="equal")
     if is_mirrored(view) and not ax.xaxis_inverted():
         ax.invert_xaxis()
@@ -153,12 +153,6 @@ def _draw_cells(
         vmax=len(_COLORS) - 0.5,
         interpolation="nearest",
     )
-
-
-def _draw_folds(ax: Axes, folded: np.ndarray, across: np.ndarray, up: np.ndarray) -> None:
-    if folded.any():
-        line = {"levels": [0.5], "colors": "black", "linewidths": 0.6}
-        ax.contour(across, up, folded.astype(float), **line)
 
 
 def _draw_key(owner: Axes | Figure, highest: int, counted: bool, **place: Any) -> None:

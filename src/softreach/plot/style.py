@@ -114,7 +114,11 @@ def save_figure(
     with pyplot().rc_context(_SAVING), writing(path, overwrite=overwrite) as file:
         root = figure.get_figure(root=True)
         if root is not None:
-            root.savefig(file, dpi=DPI, format=suffix[1:], **_encoding(suffix))
+            # at this level a PNG takes less than half the time of the default for 5 % more bytes
+            options: dict[str, Any] = (
+                {"pil_kwargs": {"compress_level": 4}} if suffix == ".png" else {}
+            )
+            root.savefig(file, dpi=DPI, format=suffix[1:], **options)
 
 
 def write_note(ax: Axes, text: str, right: float, up: float) -> None:
@@ -138,11 +142,6 @@ def some_bundles(name: str, value: Any, arm: Manipulator) -> list[int]:
     if isinstance(value, set | frozenset | range):
         value = sorted(value)
     return as_indices(name, value, arm.bundles, "bundles of the arm").tolist()
-
-
-def _encoding(suffix: str) -> dict[str, Any]:
-    """PNG at a level that takes less than half the time of the default for 5 % more bytes."""
-    return {"pil_kwargs": {"compress_level": 4}} if suffix == ".png" else {}
 
 
 def as_axes(ax: Any) -> Any:

@@ -197,7 +197,6 @@ class Studio:
             self._disconnected(client)
 
     def _compile_ahead(self, session: Session, check: StaleCheck) -> None:
-        """Compile what may be needed once the first picture of a tab is complete."""
         while self._compiler is not None and not session.settle(_PATIENCE):
             check()
         if self._compiler is not None:
@@ -243,7 +242,6 @@ def _ignored(error: Exception) -> None:
 
 
 def _camera_beside(arm: Manipulator) -> Camera:
-    """Camera that sees an arm wherever it is clamped and points."""
     look_at = arm.base.to_world(arm.length * np.array(_CAMERA.look_at)) / arm.length
     position = look_at + np.subtract(_CAMERA.position, _CAMERA.look_at)
     return Camera(position=vector(position), look_at=vector(look_at))
@@ -255,7 +253,6 @@ def _refuse_file(session: Session, name: str, size: int) -> None:
 
 
 def _furnish(session: Session) -> None:
-    """Add the panels, and let clicks in the scene reach those that wait for them."""
     from softreach.studio.tabs.activation import ActivationPanel
     from softreach.studio.tabs.calibrate import CalibratePanel
     from softreach.studio.tabs.compare import ComparePanel

@@ -142,7 +142,6 @@ def scale_bar(pixels_per_length: float, room: float, length: float) -> ScaleBar:
 
 
 def _meters(length: float) -> str:
-    """Length [m] in the unit of a ruler that it is laid on."""
     for unit, size in (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)):
         if length >= size * (1 - 1e-9):
             return f"{length / size:.3g} {unit}"

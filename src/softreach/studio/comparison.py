@@ -10,11 +10,7 @@ from typing import NamedTuple
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
 from softreach.studio.markup import Part, Strong, paragraph, table
-from softreach.studio.shown_parameters import (
-    ShownParameter,
-    named_parameters,
-    slider_parameters,
-)
+from softreach.studio.shown_parameters import ShownParameter, named_parameters, slider_parameters
 from softreach.studio.snapshots import Numbers
 from softreach.support.errors import SoftreachError
 
@@ -104,7 +100,6 @@ def _cell(comparison: Comparison, row: int, column: int) -> list[Part]:
 
 
 def _change(difference: float, error: Value, first: Value, usual: str) -> str:
-    """Difference from the first design; of what has an error in percent too."""
     if difference == 0:
         return "="
     text = _digits(difference, error, "+", usual)
@@ -138,11 +133,7 @@ def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
 
 
 def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bool]:
-    """The sliders that differ; where these do not explain everything, other parameters too.
-
-    Returns:
-        Columns, and whether equal columns mean equal designs.
-    """
+    """Columns of sliders that differ, then of other parameters; and whether they tell all."""
     shown = _differing([_by_name(slider_parameters(design)) for design in designs])
     if _explained(designs, [name for name, _ in shown]):
         return [column for _, column in shown], True
@@ -157,7 +148,6 @@ def _by_name(shown: Iterable[ShownParameter]) -> dict[str, ShownParameter]:
 
 
 def _differing(designs: Sequence[dict[str, ShownParameter]]) -> list[tuple[str, _Column]]:
-    """Name and column of what is not the same in all."""
     columns = []
     for name in dict.fromkeys(name for design in designs for name in design):
         title = next(design[name].label for design in designs if name in design)

@@ -212,14 +212,11 @@ class _Unchanged(Exception):
 
 
 class _Binding(NamedTuple):
-    """A widget, and the value of the state that it stands for."""
-
     widget: Any
     at: Attribute
     options: Callable[[StudioState], Mapping[Any, str]] | None
 
     def write(self, state: StudioState) -> StudioState:
-        """The state with what the widget holds."""
         value = self.widget.value
         if self.options is not None:
             values = {name: value for value, name in self.options(state).items()}
@@ -229,7 +226,6 @@ class _Binding(NamedTuple):
         return self.at.write(state, value)
 
     def follow(self, state: StudioState, *, values: bool) -> None:
-        """Offer what the state offers, and show its value."""
         value = self.at.read(state)
         if self.options is not None:
             names = self.options(state)

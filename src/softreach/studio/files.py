@@ -16,14 +16,13 @@ from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.clouds import in_slice, sample_values
 from softreach.studio.state import Appearance, StudioState, design_of_text
 from softreach.support.errors import InvalidInput
+from softreach.support.files.text import text_of
 from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "CLOUD_FORMATS",
-    "SURFACE_FORMATS",
     "cloud_file",
     "figure_file",
     "state_from",
@@ -32,9 +31,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-CLOUD_FORMATS = (".parquet", ".csv", ".ply", ".npz", ".mat", ".vtu")
-LARGEST = 2_000_000  # bytes of a design or a state
-SURFACE_FORMATS = (".stl", ".ply", ".obj", ".glb", ".vtu")
+LARGEST = 2_000_000  # bytes of a file that a person opens
 
 
 def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
@@ -44,14 +41,10 @@ def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
         InvalidInput: Neither of them.
         InvalidDesign: The design in it cannot exist.
     """
-    if len(content) > LARGEST:
-        raise InvalidInput(name, f"{len(content) / 1e6:.3g} MB", f"at most {LARGEST / 1e6:g} MB")
+    text = text_of("file", name, content, LARGEST)
     if name.lower().endswith(".toml"):
-        try:
-            return state.replace(design=design_of_text(content.decode("utf-8"), name))
-        except UnicodeDecodeError as error:
-            raise InvalidInput(name, str(error), "text in UTF-8") from None
-    return StudioState.from_json(content)
+        return state.replace(design=design_of_text(text, name))
+    return StudioState.from_json(text)
 
 
 def cloud_file(reach: Reach, suffix: str) -> bytes:
@@ -85,7 +78,6 @@ def figure_file(reach: Reach, state: StudioState) -> bytes:
 
 
 def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.DataArray]:
-    """The samples within the slice, and what they are colored by, with its name."""
     known = [name for name in ("tip", "activation", "status") if name in reach.cloud]
     cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))
     color = sample_values(reach, look.level, look.color)

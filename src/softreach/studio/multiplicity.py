@@ -79,7 +79,6 @@ def _reached_once(reach: Reach) -> bool:
 def _counted(
     reach: Reach, targets: Array, check: StaleCheck
 ) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Blocks of the targets with their counts."""
     from softreach.inverse import solve_inverse
 
     for block in parallel.blocks(len(targets), _BLOCK):

@@ -12,7 +12,6 @@ from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 from softreach.support.units import LengthUnit
 
 __all__ = [
-    "LARGEST",
     "needs_of_text",
     "needs_parts",
     "reach_text",
@@ -24,7 +23,6 @@ __all__ = [
     "with_shortening",
 ]
 
-LARGEST = 1_000_000  # bytes of a file of requirements
 _MOST_PLACES = 300  # which are judged while a slider moves
 _FILES = "file", "mesh"
 """Keys under which a table may name another file."""
@@ -64,7 +62,6 @@ def _allowed(path: str) -> str:
 
 
 def _files_in(text: str) -> list[str]:
-    """Keys that name other files."""
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError):

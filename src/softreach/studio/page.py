@@ -61,7 +61,6 @@ def static_page(state: StudioState, reach: Reach) -> str:
 
 
 def _look(server: ViserServer, scene: Scene, state: StudioState) -> None:
-    """Begin at the camera of a state, and let it see the arm."""
     assert state.camera is not None
     first = server.initial_camera
     first.position, first.look_at = state.camera.position, state.camera.look_at
@@ -115,7 +114,8 @@ def picture_file(
     from matplotlib.figure import Figure
 
     height, width = (size / FINER for size in scene.shape[:2])
-    lines = _wrapped(_caption(state, reach), int(width))
+    room = max(20, int((int(width) - 2 * _EDGE) / _CHARACTER))
+    lines = [line for text in _caption(state, reach) for line in textwrap.wrap(text, room)]
     below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
     total, dpi = height + below, _DPI * FINER
     paper, ink = _INK[state.appearance.dark]
@@ -135,7 +135,6 @@ def picture_file(
 def _draw_bar(
     figure: Figure, bar: ScaleBar, at: tuple[float, float], size: tuple[float, float], ink: str
 ) -> None:
-    """A bar whose left end is at a place of the figure, 0 to 1, and its length above it."""
     from matplotlib.lines import Line2D
 
     (left, low), (width, height) = at, size
@@ -163,15 +162,9 @@ def _caption(state: StudioState, reach: Reach) -> list[str]:
     return [numbers, *([marks.strip()] if marks else []), design_text(state)]
 
 
-def _wrapped(paragraphs: list[str], width: int) -> list[str]:
-    room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
-    return [line for text in paragraphs for line in textwrap.wrap(text, room)]
-
-
 def _draw_key(
     figure: Figure, key: BundleKey | ScalarKey, place: tuple[float, float], ink: str
 ) -> None:
-    """A legend, or a color bar over half of the width, below the scene."""
     from matplotlib.patches import Patch
 
     from softreach.plot.coloring import BundleKey, color_map

@@ -294,8 +294,6 @@ def _slow_stages(work: _Work, level: int) -> Iterator[Reach]:
 
 
 class _Work(NamedTuple):
-    """One design, and whoever waits for what it can reach."""
-
     arm: Manipulator
     rod: TipMap
     quality: Quality

@@ -64,7 +64,6 @@ class Job(ABC):
     """Plot without which there is nothing to do either."""
 
     def __init__(self, session: Session) -> None:
-        """Work for a session, which it reads, and where it leaves its results."""
         self.session = session
 
     @classmethod
@@ -103,7 +102,6 @@ class AskedJob(Job):
         self.session.follow(type(self))
 
     def run(self, check: StaleCheck) -> None:
-        """Do the work once for each time that it was ordered."""
         wanted, self.wanted = self.wanted, False
         if wanted:
             self.do(check)
@@ -229,7 +227,8 @@ class Session:
         """
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
-            self._remember(old, goes_on=goes_on or by_widget)
+            self.history = self.history.after(old, self.state, goes_on=goes_on or by_widget)
+            self.is_touched = self.is_touched or old != self.state
             self.revision += not by_widget
             self.canceled = False
             self._follow_change(old)
@@ -327,10 +326,6 @@ class Session:
         """Make the next change a step of its own for who undoes it."""
         with self._changing:
             self.history = self.history.at_rest()
-
-    def _remember(self, old: StudioState, *, goes_on: bool) -> None:
-        self.history = self.history.after(old, self.state, goes_on=goes_on)
-        self.is_touched = self.is_touched or old != self.state
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""

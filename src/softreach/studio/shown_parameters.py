@@ -15,7 +15,7 @@ from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, changed, parameters
 from softreach.arm.parameters.draft import part_of
 from softreach.arm.parameters.parameter import OwnParameter
-from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 
 
 class ShownParameter(NamedTuple):
@@ -340,14 +340,16 @@ def _titled(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def refusal(error: InvalidDesign, shown: Iterable[ShownParameter], arm: Manipulator) -> str:
-    """Faults of a design, each number by the label and in the unit of its field.
+def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipulator) -> str:
+    """An error; of faults of a design each number by the label and in the unit of its field.
 
     Args:
         error: What is wrong.
         shown: The parameters that have fields.
         arm: The design that was to be changed.
     """
+    if not isinstance(error, InvalidDesign):
+        return str(error)
     known = {
         parameter.name: parameter._replace(label=f"{parameter.label} of {part.label}")
         for part in parts(arm).values()

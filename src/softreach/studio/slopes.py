@@ -89,7 +89,6 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
 def _one_by_one(
     slopes_by: Callable[[str], dict[str, Slope]], names: Iterable[str]
 ) -> dict[str, Slope]:
-    """Slopes by those that have one, as far as there is time."""
     slopes = dict[str, Slope]()
     for name in names:
         try:

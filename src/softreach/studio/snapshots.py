@@ -99,7 +99,6 @@ class Snapshots:
     """Those of one server, which all its tabs show; a store may keep them."""
 
     def __init__(self, store: SnapshotStore | None = None) -> None:
-        """Begin with what the store holds."""
         self._store = store
         self._lock = threading.RLock()  # tabs take and delete them at the same time
         self.changed: Callable[[], object] = lambda: None

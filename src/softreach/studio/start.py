@@ -15,7 +15,7 @@ from softreach.studio.files import LARGEST
 from softreach.studio.reach import Quality, Reach, reached
 from softreach.studio.snapshots import Snapshot
 from softreach.studio.state import StudioState
-from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.errors import SoftreachError
 from softreach.support.files.atomic import replacing
 from softreach.support.files.text import read_text
 
@@ -81,7 +81,6 @@ def user_folder() -> Path:
 # stays.
 
 
-_LARGEST = 1 << 20  # bytes of a file
 _MOST = 200  # files that are read
 
 
@@ -111,7 +110,7 @@ class KeptWork:
         known: dict[str, Snapshot] = {}
         for path in sorted(self._folder.glob("snapshot-*.json"))[:_MOST]:
             try:
-                snapshot = Snapshot.from_json(_text(path))
+                snapshot = Snapshot.from_json(read_text("file", path, LARGEST))
             except (SoftreachError, OSError) as error:
                 self._complain(path, error)
             else:
@@ -132,7 +131,9 @@ class KeptWork:
     def _latest(self) -> StudioState | None:
         path = self._folder / "latest.json"
         try:
-            return StudioState.from_json(_text(path)) if path.exists() else None
+            return (
+                StudioState.from_json(read_text("file", path, LARGEST)) if path.exists() else None
+            )
         except (SoftreachError, OSError) as error:
             self._complain(path, error)
             return None
@@ -160,19 +161,3 @@ def work_on(design: Manipulator, *, goes_on: bool = True) -> KeptWork:
 
 def _file_of(name: str) -> str:
     return f"snapshot-{hashlib.sha256(name.encode()).hexdigest()[:16]}.json"
-
-
-def _text(path: Path) -> bytes:
-    """The file, unless nobody would call it one of ours.
-
-    Raises:
-        InvalidInput: It is no plain file, or too large.
-        OSError: It cannot be read.
-    """
-    if not path.is_file():  # a pipe would never end
-        raise InvalidInput("file", path.name, "a plain file")
-    with path.open("rb") as file:
-        text = file.read(_LARGEST + 1)
-    if len(text) > _LARGEST:
-        raise InvalidInput("file", path.name, f"at most {_LARGEST} bytes")
-    return text

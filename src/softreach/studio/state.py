@@ -380,7 +380,6 @@ def _seen_as(view: StudioState, state: StudioState) -> StudioState:
 
 
 def _kind(old: StudioState, new: StudioState) -> str:
-    """Kind of a change; "" if nothing but the view differs."""
     settings = [name for name in _SETTINGS if getattr(old, name) != getattr(new, name)]
     if settings:  # activations may have been moved into other bounds
         return " ".join(settings)

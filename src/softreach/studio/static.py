@@ -133,8 +133,6 @@ def write_static(
 
 
 class _Entry(NamedTuple):
-    """A design of the grid."""
-
     content: dict[str, Any]
     """Its numbers and its box, or the reason for the gap."""
     file: Path | None
@@ -142,12 +140,12 @@ class _Entry(NamedTuple):
 
 
 def _design(space: DesignSpace, number: int, unit: str, folder: Path) -> _Entry:
-    """A design from its file, or computed and written there."""
     try:
         arm = space.design(number)
     except InvalidDesign as error:
         return _Entry(_gap(in_file_terms(error, "")), None, False)
-    key = _key(arm, unit)
+    made_of = [arm.to_toml(), unit, list(_DETAIL), versions()["softreach_version"]]
+    key = _digest(json.dumps(made_of))
     path = folder / f"{key}.js"
     if (content := _read(path, key)) is not None:
         return _Entry(_brief(content), path, False)
@@ -168,12 +166,6 @@ def _brief(content: dict[str, Any]) -> dict[str, Any]:
     return {name: content[name] for name in ("gap", "numbers", "box") if name in content}
 
 
-def _key(arm: Manipulator, unit: str) -> str:
-    """A name for what is in the file of a design."""
-    made_of = [arm.to_toml(), unit, list(_DETAIL), versions()["softreach_version"]]
-    return _digest(json.dumps(made_of))
-
-
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
@@ -190,7 +182,6 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 
 
 def _remove_older(folder: Path, kept: set[Path]) -> None:
-    """Remove designs that the page no longer shows."""
     for path in folder.glob("*.js"):
         with suppress(OSError, UnicodeDecodeError):
             if path not in kept and path.read_text("utf-8").startswith(_MARK):
@@ -198,7 +189,6 @@ def _remove_older(folder: Path, kept: set[Path]) -> None:
 
 
 def _content(arm: Manipulator, unit: LengthUnit) -> dict[str, Any]:
-    """Everything that the page shows of a design."""
     try:
         reached = reachable_set(arm)
         numbers = _numbers(reached, unit)
@@ -231,7 +221,6 @@ def _numbers(reached: ReachableSet, unit: LengthUnit) -> dict[str, Any]:
 
 
 def _errors(reached: ReachableSet, scene: Scene, box: np.ndarray) -> Iterator[str]:
-    """Sentences on how far what is drawn is from what was computed."""
     unit, step = scene.unit, float(np.ptp(box, axis=0).max()) / 65535
     if isinstance(reached, ReachableSolid | ReachableSurface):
         computed = reached.sheets() if isinstance(reached, ReachableSolid) else reached.surface()
@@ -252,6 +241,9 @@ def _errors(reached: ReachableSet, scene: Scene, box: np.ndarray) -> Iterator[st
 
 def _page(space: DesignSpace, entries: list[_Entry], unit: str, title: str) -> str:
     """The page, with the design in it that is nearest to the base."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
     known = [k for k, entry in enumerate(entries) if "gap" not in entry.content]
     if not known:
         allowed = "some that can exist and reach something"
@@ -278,7 +270,7 @@ def _page(space: DesignSpace, entries: list[_Entry], unit: str, title: str) -> s
         "first": first,
         "keys": content["keys"],
         "note": content["note"],
-        "colors": _colors(),
+        "colors": [to_hex(color) for color in colormaps[COLORMAP](np.linspace(0.0, 1.0, 33))],
         "name": title,
     }
     more = files("softreach.studio").joinpath("static.html").read_text(encoding="utf-8")
@@ -307,7 +299,6 @@ def _distances(space: DesignSpace) -> np.ndarray:
 def _slider(
     base: Manipulator, parameter: Parameter, values: tuple[float, ...], lengths: LengthUnit
 ) -> Mapping[str, Any]:
-    """A slider of the page, whose values are as a person reads them."""
     symbol, scale = readable_unit(parameter.unit, max(map(abs, values)), lengths)
     if parameter.unit == "m" and lengths.relative:  # of which arm, if it is the length that varies?
         symbol, scale = "m", 1.0
@@ -318,11 +309,3 @@ def _slider(
         "hint": f"{parameter.symbol}: {parameter.meaning}",
         "values": [float(f"{value / scale:.10g}") for value in values],
     }
-
-
-def _colors() -> list[str]:
-    """The map from low to high, as CSS has it."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return [to_hex(color) for color in colormaps[COLORMAP](np.linspace(0.0, 1.0, 33))]

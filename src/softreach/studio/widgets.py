@@ -286,7 +286,6 @@ class SliderField(TypedField):
         self._apply(event)
 
     def _follow(self) -> None:
-        """Move the thumb to the value, or to the end that is nearest."""
         thumb = self._within(self._value)
         if thumb != self._thumb:
             self._thumb = self._slider.value = thumb

@@ -52,7 +52,6 @@ class _Turns:
 
     @property
     def taken(self) -> bool:
-        """True while it is somebody's turn."""
         return self._lock.locked()
 
     def __enter__(self) -> None:
@@ -296,7 +295,6 @@ class IdleCompiler:
     """
 
     def __init__(self) -> None:
-        """Nothing runs yet."""
         self._process: subprocess.Popen[bytes] | None = None
         self._lock, self._closed = threading.Lock(), False
 
@@ -332,7 +330,6 @@ class CompilationWatch(event.Listener):
     """Calls back when compilation begins and when all of it has ended, on a compiling thread."""
 
     def __init__(self, changed: Callable[[bool], None]) -> None:
-        """Watch from now on, until `close`."""
         self._changed, self._running, self._lock = changed, 0, threading.Lock()
         self.done = 0
         """Number of times that all of it has ended: of the kernels of a studio, each once."""
@@ -348,12 +345,10 @@ class CompilationWatch(event.Listener):
         event.unregister(_KIND, self)
 
     def on_start(self, event: Any) -> None:
-        """Something is being compiled."""
         del event
         self._count(1)
 
     def on_end(self, event: Any) -> None:
-        """It is compiled; or that failed."""
         del event
         self._count(-1)
 

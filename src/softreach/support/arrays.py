@@ -194,5 +194,4 @@ def _array(name: str, values: object, allowed: str) -> NDArray[Any]:
 
 
 def _described(values: object, array: NDArray[Any]) -> object:
-    """A long array in short."""
     return f"{array.dtype} of shape {array.shape}" if array.ndim else as_given(values)

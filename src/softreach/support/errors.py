@@ -83,7 +83,7 @@ class Range(NamedTuple):
             return False
         above = value > self.low or (value == self.low and not self.open_low)
         below = value < self.high or (value == self.high and not self.open_high)
-        return above and below and math.isfinite(value)
+        return above and below and abs(value) <= sys.float_info.max
 
     def in_degrees(self) -> Range:
         """The same range of an angle, for files and the command line."""

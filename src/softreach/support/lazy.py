@@ -18,7 +18,6 @@ class lazy(Generic[Result]):
     """
 
     def __init__(self, compute: Callable[[Any], Result]) -> None:
-        """Keep the function that computes it."""
         self._compute, self.__doc__ = compute, compute.__doc__
 
     def __set_name__(self, owner: type, name: str) -> None:

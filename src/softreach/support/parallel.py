@@ -116,8 +116,6 @@ class _Unwanted(BaseException):
 
 
 class _Wanted:
-    """Tells tasks of a pool whether somebody still waits for them."""
-
     def __init__(self, outer: _Wanted | None) -> None:
         self.given_up, self._outer = False, outer
 
@@ -130,8 +128,6 @@ class _Wanted:
 
 
 class _Here(threading.local):
-    """The pool that the task of this thread belongs to."""
-
     wanted: _Wanted | None = None
 
 

@@ -73,8 +73,6 @@ def bar(label: str | Callable[[], str], total: int | None) -> Iterator[Progress]
 
 
 class _Lines:
-    """Writes a line on standard error now and then, when it is told of progress."""
-
     def __init__(self, label: Callable[[], str], total: int | None) -> None:
         self._label, self._total, self._done = label, total, 0
         self._begun = self._told = time.monotonic()

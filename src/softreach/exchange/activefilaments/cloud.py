@@ -130,7 +130,6 @@ def _warn(arm: Manipulator, activation: Array, difference: float) -> None:
 
 
 def _table(path: Path, columns: int, meaning: str) -> Array:
-    """A table of numbers without a header, shape (row, columns)."""
     name = fspath(path)
     if not path.is_file():
         raise InvalidInput("file", name, "a file that exists")
@@ -155,7 +154,6 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
 
 
 def _reason(error: Exception) -> str:
-    """Fault of a table, in a few printable words."""
     if isinstance(error, UnicodeDecodeError):
         return "no text"
     text = str(error).partition(";")[0] or type(error).__name__

@@ -53,8 +53,6 @@ def read_design(path: str | PathLike[str]) -> Manipulator:
 
 @dataclass(frozen=True)
 class _Value:
-    """A value of the file and its place there."""
-
     place: str
     value: Any
 

@@ -195,7 +195,6 @@ def is_from_inside_out(rings: Sequence[FilamentRing]) -> bool:
 
 
 def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
-    """One ring for each family of fibers, and one for each ring without any."""
     base, section = float(arm.profile.radius(0.0)), arm.section
     families = list(_families(arm))
     shared = Counter(ring for ring, _, _ in families)
@@ -217,7 +216,6 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
 
 
 def _families(arm: Manipulator) -> Iterator[tuple[int, int, FiberArchitecture]]:
-    """The ring of each family, its first bundle, and the family."""
     first = 0
     for fiber in arm.fibers:
         yield _place(arm.section, fiber.ring), first, fiber
@@ -225,7 +223,6 @@ def _families(arm: Manipulator) -> Iterator[tuple[int, int, FiberArchitecture]]:
 
 
 def _place(section: Section, which: int | str) -> int:
-    """The index of a ring that is named by its index or its name."""
     if isinstance(which, int):
         return which % len(section.rings)
     return [ring.name for ring in section.rings].index(which)
@@ -258,14 +255,6 @@ def _density(arm: Manipulator) -> float | None:
     return float(arm.section.mass_per_length(1.0)) / math.pi
 
 
-def _check_upright(arm: Manipulator) -> None:
-    """Refuse a base that stands anywhere but upright at the origin."""
-    if not arm.base.is_identity:
-        allowed = "upright at the origin in ActiveFilaments.jl"
-        hint = "give arm.replace(base=Base()), whose places are those in the frame of the base"
-        raise InvalidInput("base", str(arm.base), allowed, hint)
-
-
 def _check_section(section: Section, there: str) -> None:
     if section.measured is not None:
         raise InvalidInput("section.measured", section.measured, f"None {there}")
@@ -274,9 +263,10 @@ def _check_section(section: Section, there: str) -> None:
 
 
 def _check_expressible(arm: Manipulator) -> None:
-    """Refuse what no filament there has, one reason at a time."""
-    _check_upright(arm)
     there = "in ActiveFilaments.jl"
+    if not arm.base.is_identity:
+        hint = "give arm.replace(base=Base()), whose places are those in the frame of the base"
+        raise InvalidInput("base", str(arm.base), f"upright at the origin {there}", hint)
     if not isinstance(arm.profile, LinearTaper):
         raise InvalidInput("profile", type(arm.profile).__name__, f"a LinearTaper {there}")
     if arm.rigid_pieces:

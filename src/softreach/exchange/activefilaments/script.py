@@ -8,12 +8,7 @@ from os import PathLike
 
 from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.exchange.activefilaments.filament import (
-    Angle,
-    Filament,
-    FilamentRing,
-    filament_of,
-)
+from softreach.exchange.activefilaments.filament import Angle, Filament, FilamentRing, filament_of
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats
@@ -75,7 +70,6 @@ def _body(filament: Filament) -> Iterator[str]:
 
 
 def _activation(rings: Sequence[FilamentRing]) -> Iterator[str]:
-    """All sectors fully contracted, and the bounds of each."""
     yield "activation = ["
     for ring in rings:
         lows = _vector(low for low, _ in ring.bounds)
@@ -98,7 +92,6 @@ def _ring(ring: FilamentRing, length: float) -> str:
 
 
 def _comment(ring: FilamentRing) -> str:
-    """The name of what is in a ring, and how its activations count."""
     name = "".join(character if character.isprintable() else " " for character in ring.name)
     scale = f"γ is {ring.scale:g} times that of softreach" if ring.scale != 1 else ""
     told = "; ".join(part for part in (name.strip(), scale) if part)

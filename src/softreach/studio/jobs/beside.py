@@ -22,7 +22,6 @@ class DrawFree(Job):
     only_with = "design.loads"
 
     def run(self, check: StaleCheck) -> None:
-        """Compute what is not known of it, and draw it."""
         session, state = self.session, self.session.state
         free, known = state.unloaded, session.reach
         if state.design.loads is None:
@@ -31,16 +30,13 @@ class DrawFree(Job):
             if known is not None and known.fine and known.arm == free:
                 session.free = known  # the loads have just been put on
             else:
-                self._compute(free, check)
+                quality = session.quality
+                small = replace(quality, fine_level=quality.coarse_level)
+                for reach in stages(free, min(_LEVEL, quality.coarse_level), small, check):
+                    check()
+                    session.free = reach
+                    self._draw()
         self._draw()
-
-    def _compute(self, free: Manipulator, check: StaleCheck) -> None:
-        quality = self.session.quality
-        small = replace(quality, fine_level=quality.coarse_level)
-        for reach in stages(free, min(_LEVEL, quality.coarse_level), small, check):
-            check()
-            self.session.free = reach
-            self._draw()
 
     def _draw(self) -> None:
         session = self.session
@@ -60,7 +56,6 @@ class DrawReference(Job):
     only_with = "reference"
 
     def run(self, check: StaleCheck) -> None:
-        """Compute what is not known of it, and draw it."""
         session, state = self.session, self.session.state
         reference = state.reference
         if reference is None:
@@ -78,7 +73,6 @@ class DrawReference(Job):
         session.show()
 
     def _reach_of(self, reference: Manipulator, check: StaleCheck) -> Reach:
-        """Reach that is known already, if it is fine."""
         known = self.session.reach
         if known is not None and known.fine and known.arm == reference:
             return known
@@ -93,7 +87,6 @@ class DrawReferenceArm(Job):
     only_with = "side_by_side"
 
     def run(self, check: StaleCheck) -> None:
-        """Draw it, or take it away."""
         check()
         session, state = self.session, self.session.state
         reference = session.reference

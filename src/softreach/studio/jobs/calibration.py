@@ -58,7 +58,6 @@ class DrawSample(Job):
     depends_on = "design", "activation"
 
     def run(self, check: StaleCheck) -> None:
-        """Draw them, or take them away."""
         check()
         session, state, bench = self.session, self.session.state, self.session.bench
         if bench is None:
@@ -94,7 +93,6 @@ class FitArm(AskedJob):
     free: tuple[str, ...] = ()
 
     def do(self, check: StaleCheck) -> None:
-        """Fit, and show the calibrated arm."""
         session, bench = self.session, self.session.bench
         if bench is None:
             return

@@ -41,7 +41,6 @@ class SolveInverse(Job):
         self.session.follow(SolveInverse)  # also where the target is the one before
 
     def run(self, check: StaleCheck) -> None:
-        """Solve, draw, and move the arm if that was ordered."""
         check()
         state = self.session.state
         self.session.answer = None
@@ -84,8 +83,6 @@ def _solution(state: StudioState, target: Vector) -> Solution:
 
 
 class _Order(NamedTuple):
-    """Order of a drag."""
-
     place: NDArray[np.float64]
     """For the tip [L]."""
     rests: bool
@@ -114,7 +111,6 @@ class DragTip(Job):
         self.session.follow(DragTip)
 
     def run(self, check: StaleCheck) -> None:
-        """Drag the tip to where it is wanted by now."""
         check()
         session, state, order = self.session, self.session.state, self._order
         if order is None:

@@ -28,7 +28,6 @@ class CheckNeeds(Job):
     only_with = "needs"
 
     def run(self, check: StaleCheck) -> None:
-        """Judge the design as it is by now, and draw that."""
         check()
         session, state = self.session, self.session.state
         made, refusal = None, ""
@@ -48,7 +47,6 @@ class ConfirmNeeds(Job):
     """Looks for every pose where quick ones miss something, once the design stays as it is."""
 
     def run(self, check: StaleCheck) -> None:
-        """Judge the design again, and draw that."""
         session, quick = self.session, self.session.check
         if quick is None or all(f.met or f.kind not in _POSES for f in quick.findings):
             return

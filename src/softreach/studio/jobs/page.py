@@ -20,11 +20,9 @@ class KeepState(Job):
 
     @classmethod
     def has_use(cls, session: Session) -> bool:
-        """True where work is kept at all."""
         return session.work is not None
 
     def run(self, check: StaleCheck) -> None:
-        """Wait until nothing changes, and write."""
         if not self.session.is_touched:
             return
         for _ in range(10):
@@ -41,7 +39,6 @@ class SetTheme(Job):
     _dark = False
 
     def run(self, check: StaleCheck) -> None:
-        """Tell the page, if it does not look so already."""
         check()
         dark = self.session.state.appearance.dark
         if dark != self._dark:

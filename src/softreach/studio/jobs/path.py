@@ -24,7 +24,6 @@ class FollowPath(Job):
     only_with = "path"
 
     def run(self, check: StaleCheck) -> None:
-        """Follow and draw it; or take away what was drawn."""
         check()
         session, state = self.session, self.session.state
         session.figures.track = None
@@ -55,7 +54,6 @@ class PlayPath(AskedJob):
     """Moves the arm along the path."""
 
     def do(self, check: StaleCheck) -> None:
-        """Move from where the arm is, or from the first point, to the last that is followed."""
         track, path = self.session.figures.track, self.session.state.path
         if track is None or path is None:
             return

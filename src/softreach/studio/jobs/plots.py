@@ -10,13 +10,10 @@ from softreach.studio.work import StaleCheck
 
 def _job_of(plot: type[Plot]) -> type[Job]:
     class ComputePlot(Job):
-        """Computes one plot while it is shown."""
-
         depends_on = plot.depends_on
         shown_plot = plot.name
 
         def run(self, check: StaleCheck) -> None:
-            """Compute it, and show each result."""
             check()
             session = self.session
             if plot.name in session.state.appearance.plots.shown:

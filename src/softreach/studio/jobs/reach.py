@@ -37,7 +37,6 @@ class ComputeReach(Job):
     depends_on = ("design",)  # how many points are shown, `DrawCloud` watches
 
     def run(self, check: StaleCheck) -> None:
-        """Compute what is not known yet, and draw each stage; or say why it cannot be."""
         session, state = self.session, self.session.state
         if _is_complete(session.reach, state):
             _draw_cloud(session)
@@ -45,7 +44,12 @@ class ComputeReach(Job):
             return
         session.refusal = ""
         try:
-            self._compute(state, check)
+            level = state.appearance.level
+            for reach in stages(state.design, level, session.quality, check, session.report):
+                check()
+                session.reach = reach
+                _count_shown(session, check)
+                _draw_cloud(session)
             session.follow(DifferentiateVolume)
         except InvalidInput as error:
             _withdraw(session, str(error))
@@ -54,14 +58,6 @@ class ComputeReach(Job):
         except MemoryError:
             _withdraw(session, "Not computed: there is not enough free memory.")
 
-    def _compute(self, state: StudioState, check: StaleCheck) -> None:
-        session, level = self.session, state.appearance.level
-        for reach in stages(state.design, level, session.quality, check, session.report):
-            check()
-            session.reach = reach
-            _count_shown(session, check)
-            _draw_cloud(session)
-
 
 class DifferentiateVolume(Job):
     """Slopes of the volume by the sliders, once known; dropped when one moves."""
@@ -69,7 +65,6 @@ class DifferentiateVolume(Job):
     depends_on = ("design",)
 
     def run(self, check: StaleCheck) -> None:
-        """Differentiate the volume, if that is of the design and was not done yet."""
         check()
         session, reach = self.session, self.session.reach
         if reach is None or not reach.fine or reach.arm != session.state.design:
@@ -93,7 +88,6 @@ class DrawCloud(Job):
     )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
-        """Draw what is known; ask for more where it is not enough."""
         check()
         if _is_complete(self.session.reach, self.session.state):
             _count_shown(self.session, check)
@@ -113,7 +107,6 @@ class DrawSurface(Job):
     only_with = "appearance.surface"
 
     def run(self, check: StaleCheck) -> None:
-        """Draw it, which computes it the first time."""
         check()
         reach, look = self.session.reach, self.session.state.appearance
         if reach is None:
@@ -130,7 +123,6 @@ class DrawSurface(Job):
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:
-    """True if all there is to know was computed, or read from a file."""
     if known is None or not known.fine or known.arm != state.design:
         return False
     enough = max(known.samples, known.wanted) >= 1 << state.appearance.level
@@ -138,7 +130,6 @@ def _is_complete(known: Reach | None, state: StudioState) -> bool:
 
 
 def _withdraw(session: Session, refusal: str) -> None:
-    """Take away what belongs to the design before, and say what is wrong with this one."""
     session.reach, session.key, session.refusal = None, None, refusal
     with session.drawing:
         session.scene.remove("/cloud", "/unstable", "/slice", "/surface")
@@ -174,7 +165,6 @@ def _count(session: Session, reach: Reach, check: StaleCheck) -> None:
 
 
 def _draw_points(session: Session) -> None:
-    """Draw the cloud and its axes, and keep the key to its colors."""
     reach, look = session.reach, session.state.appearance
     if reach is None:
         return
@@ -201,7 +191,6 @@ class DrawArm(Job):
     depends_on = "design", "activation", "appearance.arm"
 
     def run(self, check: StaleCheck) -> None:
-        """Draw them, and note where the tip is."""
         check()
         session, state = self.session, self.session.state
         if not state.appearance.arm:
@@ -244,7 +233,6 @@ class SweepReach(AskedJob):
             self.ask()
 
     def do(self, check: StaleCheck) -> None:
-        """Move the arm, not the state, until the loop is closed or a person does anything."""
         session, state = self.session, self.session.state
         if session.is_touched or session.tip is None or not state.appearance.arm:
             return
@@ -302,7 +290,6 @@ class FollowCamera(Job):
     )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
-        """Look from where the camera is by now."""
         time.sleep(_PAUSE)
         session = self.session
         if session.camera.keep_width():

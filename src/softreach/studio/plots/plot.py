@@ -205,7 +205,6 @@ def pixels(figure: Figure, *, dark: bool = False) -> NDArray[np.uint8]:
 
 
 def _darken(figure: Figure) -> None:
-    """Areas keep their colors."""
     from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
     from matplotlib.spines import Spine

@@ -16,12 +16,7 @@ from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.slice import plot_slice
 from softreach.studio.multiplicity import counts_at
-from softreach.studio.plots.plot import (
-    Picture,
-    Plot,
-    complete_reach,
-    pixels,
-)
+from softreach.studio.plots.plot import Picture, Plot, complete_reach, pixels
 from softreach.studio.reach import Reach
 from softreach.studio.state import Slice, solvable_rod
 from softreach.studio.widgets import PictureFrame
@@ -211,13 +206,11 @@ class SectionPlot(Plot):
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:
-        """Cut and draw it, once the exact set is complete."""
         look, reach = session.state.appearance, complete_reach(session)
         if reach is not None:
             with session.working("cutting the reachable set"):
                 yield section_picture(reach, look.slice, check, dark=look.dark)
 
     def show(self, result: Picture) -> str:
-        """Show the picture."""
         self._frame.show(result.image)
         return result.text

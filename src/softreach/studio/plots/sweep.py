@@ -117,7 +117,6 @@ def _volume(
     quality: Quality,
     check: StaleCheck,
 ) -> float | None:
-    """[m³]; None for no design, or one that takes too much time or memory."""
     try:
         design = changed(arm, {parameter.name: value * parameter.scale})
         solvable_rod(design)
@@ -140,7 +139,6 @@ class SweepPlot(Plot):
 
     @classmethod
     def add_settings(cls, fields: Fields) -> None:
-        """Add a menu of the parameters that the design has; to choose one shows the plot."""
         fields.dropdown(
             "parameter",
             _offered,
@@ -155,7 +153,6 @@ class SweepPlot(Plot):
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Sweep]:
-        """One value after the other, unless all are known."""
         state, latest = session.state, session.figures.plots.get(SweepPlot.name)
         parameter = swept_parameter(state)
         if parameter is None:
@@ -165,7 +162,6 @@ class SweepPlot(Plot):
             yield from sweep(state.design, parameter, session.quality, check, latest)
 
     def show(self, result: Sweep) -> str:
-        """Draw the volumes that are known so far."""
         unit = result.arm.length_unit
         volumes = result.volume[result.value == result.parameter.shown]
         if len(result.value) > 1:

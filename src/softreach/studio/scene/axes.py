@@ -24,7 +24,6 @@ class NumberedBox:
     """One box, drawn into one scene."""
 
     def __init__(self, api: SceneApi) -> None:
-        """Draw into a scene, around an arm for the time being."""
         self._api = api
         self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         self._unit, self._scale = in_lengths(1.0), 1.0  # of the numbers, and L in it

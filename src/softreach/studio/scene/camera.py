@@ -58,7 +58,6 @@ def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
 
 
 def _half_sine(aspect: float) -> float:
-    """Sine of half of the smaller angle of a picture."""
     return float(np.sin(np.arctan(np.tan(FOV / 2) * min(1.0, aspect))))
 
 
@@ -66,7 +65,6 @@ class TabCamera:
     """Camera of one tab, which the user and the studio both move."""
 
     def __init__(self, client: ClientHandle) -> None:
-        """Follow the camera of a client."""
         self._client = client
         self._aspect: float | None = None
         self._latest: float | None = None

@@ -54,7 +54,6 @@ class Clouds:
     """Draws clouds, and draws those again whose hidden points change as camera or arm move."""
 
     def __init__(self, api: SceneApi) -> None:
-        """Draw into a scene."""
         self._api = api
         self._known: dict[str, tuple[Dots, NDArray[np.bool_]]] = {}
         self._viewpoint: Viewpoint | None = None

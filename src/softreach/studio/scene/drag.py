@@ -116,7 +116,6 @@ class DragBall:
         return halo, ball
 
     def _draw_axis(self, halo: Any, axis: int, name: str) -> None:
-        """An arrow that drags the tip along one axis of the world alone."""
         from trimesh.creation import revolve
 
         direction = np.eye(3)[axis]

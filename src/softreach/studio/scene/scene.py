@@ -13,12 +13,7 @@ from softreach.arm.rest_shape import STRAIGHT
 from softreach.arm.skin import inside
 from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
-from softreach.rod.arm_shape import (
-    arm_surface,
-    bundle_skins,
-    marker_points,
-    rest_configuration,
-)
+from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.axes import NumberedBox, add_label
@@ -82,7 +77,6 @@ class Scene:
     """One scene and what has been drawn into it."""
 
     def __init__(self, api: SceneApi) -> None:
-        """Draw into the scene of a client, or of a server for a page that is saved."""
         self._api = api
         self.clouds = Clouds(api)
         self.axes = NumberedBox(api)
@@ -121,13 +115,10 @@ class Scene:
         colors = lit(coloring.rgb, points)
         size = point_size(len(points))
         self._points("/cloud", points[stable], colors[stable], size)
-        self._draw_unstable(points[kept & unstable], size)
+        marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
+        self._points("/unstable", marks, color, _UNSTABLE_SIZE * size, shape="diamond")
         self._slab(look.slice, points)
         return coloring.key
-
-    def _draw_unstable(self, points: Array, size: float) -> None:
-        color = np.array(UNSTABLE, np.uint8)
-        self._points("/unstable", points, color, _UNSTABLE_SIZE * size, shape="diamond")
 
     def draw_free(self, reach: Reach | None, cut: Slice) -> None:
         """The reach of the arm without its loads, a faint surface; None takes it away.
@@ -176,7 +167,8 @@ class Scene:
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)
-        self._spines[path] = _spine(arm, shape)
+        centers, radii = shape["position"].values, shape["radius"].values
+        self._spines[path] = centers / arm.length, radii / arm.length  # balls that fill the arm
         if path == "/arm":
             self.pointing = shape["directors"].values[-1, 2]
         self.draw_dots(f"{path}/markers", marker_points(arm, shape) / length, _MARKER)
@@ -245,7 +237,6 @@ class Scene:
         return self._draw_boundary(reach, look)
 
     def _draw_boundary(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
-        """The exact boundary in the colors of what is asked, with its edges and folds."""
         coloring, sheets = surface_colors(reach, look.color), reach.sheets
         vertices = sheets.vertices / reach.arm.length
         colors = shaded(coloring.rgb, vertex_normals(vertices, sheets.faces))
@@ -413,7 +404,6 @@ class Scene:
             self._mesh(path, skin.vertices, skin.faces, color, opacity)
 
     def _slab(self, cut: Slice, points: Array) -> None:
-        """The middle plane of the slice, as wide as the cloud."""
         self.remove("/slice")
         if cut.axis == "none" or not len(points):
             return
@@ -438,11 +428,6 @@ def shows_cloud(reach: Reach, look: Appearance) -> bool:
     return look.cloud or (look.surface and not reach.has_surface)
 
 
-def _spine(arm: Manipulator, shape: Any) -> Spine:
-    """Balls that fill the arm [L]."""
-    return shape["position"].values / arm.length, shape["radius"].values / arm.length
-
-
 def _without_tip(centers: Array, radii: Array) -> Spine:
     apart = np.linalg.norm(centers - centers[-1], axis=1) > _AROUND_TIP
     return centers[apart], radii[apart]
@@ -462,7 +447,6 @@ def _arm_meshes(
 
 
 def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
-    """Of the body and of every bundle."""
     hidden = any(inside(arm)) or arm.markers
     return [_CLEAR if hidden else None, *[None] * (meshes - 1)]
 

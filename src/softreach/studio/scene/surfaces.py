@@ -106,8 +106,6 @@ def glb(
 
 
 class _Gltf:
-    """A file of glTF under way: accessors to parts of one buffer, and what is drawn of them."""
-
     def __init__(self, both_sides: bool) -> None:
         self._both_sides = both_sides
         self._data = b""
@@ -116,7 +114,6 @@ class _Gltf:
         self._primitives: list[dict[str, Any]] = []
 
     def add(self, mode: int, places: Array, colors: Array, indices: NDArray[Any]) -> None:
-        """Triangles or lines between places in colors, RGBA from 0 to 255."""
         linear = colors / 255
         linear[:, :3] **= 2.2
         limits = {"min": places.min(axis=0).tolist(), "max": places.max(axis=0).tolist()}
@@ -140,7 +137,6 @@ class _Gltf:
         return number
 
     def binary(self) -> bytes:
-        """The file."""
         material = {
             "alphaMode": "BLEND",
             "doubleSided": self._both_sides,

@@ -129,15 +129,12 @@ def guard_inputs(client: ClientHandle, refuse: Callable[[str, int], None]) -> No
 
 
 class _Inputs:
-    """Message of a page about what a person did."""
-
     def __init__(self, gui: Any, refuse: Callable[[str, int], None]) -> None:
         self._gui, self._refuse = gui, refuse
         self._taken: dict[str, int] = {}
         """Bytes of the files that are on their way."""
 
     async def change(self, accept: Any, number: int, message: Any) -> None:
-        """A widget has another value."""
         handle = self._gui._gui_input_handle_from_uuid.get(message.uuid)
         if handle is None or set(message.updates) != {"value"}:
             return
@@ -146,7 +143,6 @@ class _Inputs:
             await accept(number, message)
 
     def begin_file(self, accept: Any, number: int, message: Any) -> None:
-        """A file is announced."""
         from viser import _messages
 
         if message.size_bytes <= LARGEST_UPLOAD:
@@ -172,13 +168,10 @@ class _Inputs:
 
 def close_sockets(server: ViserServer) -> None:
     """Close the sockets of all tabs; without a way to do so the server's end closes them."""
-    close = getattr(_sockets(server), "disconnect_all_clients", None)
+    sockets = getattr(server, "_websock_server", None)
+    close = getattr(sockets, "disconnect_all_clients", None)
     if close is not None:
         close()
-
-
-def _sockets(server: ViserServer) -> Any:
-    return getattr(server, "_websock_server", None)
 
 
 def without_tunnel(server: ViserServer) -> None:

@@ -50,7 +50,6 @@ class ActivationPanel:
         self._tip.say(*tip_text(session))
 
     def _fit(self, session: Session) -> None:
-        """Make the sliders anew, unless the design has the same bundles within the same bounds."""
         ends = _slider_ends(session.state.design)
         if ends == self._ends:
             return

@@ -78,14 +78,12 @@ class CalibratePanel:
         self._apply.visible = bench.fitted(session.state.design) is not None
 
     def _read(self, file: UploadedFile) -> None:
-        """Take the poses of a file, and move the arm to the first."""
         arm = self._session.state.design
         data = read_measurements(arm, read_table(io.BytesIO(file.content), file.name))
         self._session.bench = Bench(data=replace(data, source=file.name), arm=arm)
         self._pose(self._session.bench)
 
     def _pose(self, bench: Bench) -> None:
-        """Move the arm to the inputs of the sample."""
         session = self._session
         if not bench.fits(session.state.design):
             allowed = "one with the inputs and markers of the data"
@@ -113,7 +111,6 @@ class CalibratePanel:
 
 
 def _residuals_text(bench: Bench, session: Session) -> str:
-    """Distances of the markers of the sample in mm."""
     if bench.distances is None:
         return "The arm is not at a sample: move the slider."
     names, design = bench.data.marker_names, session.state.design
@@ -127,7 +124,6 @@ def _residuals_text(bench: Bench, session: Session) -> str:
 
 
 def _summary(result: Calibration) -> str:
-    """Tables and remarks on a fit, as HTML."""
     unit = result.arm.length_unit
     tables = (
         (("number", "calibrated", "design"), number_rows(result, unit)),

@@ -63,7 +63,9 @@ class ComparePanel:
             if self._known == (kept, design, numbers):
                 return
             self._known = (kept, design, numbers)
-            self._follow_menu(tuple(each.name for each in kept))
+            names = tuple(each.name for each in kept) or (_NONE,)
+            if tuple(self._choice.options) != names:
+                self._choice.options = names
             self._of_chosen.visible = bool(kept)
             if not kept:
                 self._table.say(_HINT)
@@ -83,17 +85,11 @@ class ComparePanel:
         return *kept, Snapshot(name=REFERENCE, state=state, taken=0.0, numbers=numbers)
 
     def _measure(self, session: Session) -> None:
-        """Note the numbers of snapshots whose design has only now been measured."""
         for each in session.snapshots.all:
             if each.numbers is None and (numbers := numbers_of(session.reach, each.state)):
                 session.snapshots.measure(each.name, numbers)
 
-    def _follow_menu(self, names: tuple[str, ...]) -> None:
-        if tuple(self._choice.options) != (names or (_NONE,)):
-            self._choice.options = names or (_NONE,)
-
     def _follow_drawn(self, state: StudioState) -> None:
-        """Show how the chosen snapshot is drawn."""
         chosen, drawn = self._named(), _UNDRAWN
         if chosen is not None and chosen.state.design == state.reference:
             drawn = _BESIDE if state.side_by_side else _AROUND
@@ -105,7 +101,6 @@ class ComparePanel:
             attempt(self._session, lambda: self._become_drawn(self._drawn.value))
 
     def _become_drawn(self, how: str) -> None:
-        """Draw the chosen snapshot so, instead of any other."""
         design, beside_now = self._chosen().state.design, how == _BESIDE
         reference = None if how == _UNDRAWN else design
         if beside_now != self._session.state.side_by_side:
@@ -115,7 +110,6 @@ class ComparePanel:
         )
 
     def _step(self, back: bool) -> None:
-        """Move the camera so that two clouds side by side fit; or to where it was."""
         session = self._session
         if session.reach is not None:
             shift = beside(session.reach)

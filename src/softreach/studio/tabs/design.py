@@ -21,7 +21,7 @@ from softreach.studio.slopes import NO_BAR, slope_bars
 from softreach.studio.state import StudioState, rod_of
 from softreach.studio.tabs.parts import typed_number
 from softreach.studio.widgets import Line, SliderField
-from softreach.support.errors import InvalidDesign, SoftreachError
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -74,7 +74,6 @@ class DesignPanel:
             self._show_slopes(session)
 
     def _show_slopes(self, session: Session) -> None:
-        """Bars of the same scale under the sliders; until they are known, room for them."""
         slopes, design = session.slopes, session.state.design
         if slopes is None:
             bars = dict.fromkeys(self._bars, NO_BAR) if rod_of(design).box.dimension > 2 else {}
@@ -107,7 +106,6 @@ class DesignPanel:
             ]
 
     def _follow_body(self, arm: Manipulator) -> None:
-        """Show the numbers of the body; others have other fields."""
         numbers = body_numbers(arm)
         if [number.name for number in numbers] == self._typed:
             self._numbers.show(self._session)
@@ -144,8 +142,6 @@ class DesignPanel:
         return new
 
     def _words(self, error: SoftreachError) -> str:
-        if not isinstance(error, InvalidDesign):
-            return str(error)
         rows = [parameter for parameter, _ in self._rows]
         return refusal(error, rows, self._session.state.design)
 
@@ -156,7 +152,6 @@ def _designs() -> dict[str, Manipulator]:
 
 
 def _name(state: StudioState) -> str:
-    """Name of a design; "" for one that has none."""
     return next((name for name, arm in _designs().items() if arm == state.design), "")
 
 

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from softreach.export.clouds import CLOUD_FILES
+from softreach.export.surfaces import SURFACE_FILES
 from softreach.studio.captions import scale_bar
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.files import (
-    CLOUD_FORMATS,
-    SURFACE_FORMATS,
-    cloud_file,
-    figure_file,
-    state_from,
-    surface_file,
-)
+from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import picture_file, static_page
 from softreach.studio.scene.camera import FINER
 from softreach.support.errors import InvalidInput
@@ -40,9 +35,6 @@ _ABOUT = {
 }
 _SECOND: Any = {"color": "gray"}
 """Looks of the buttons that are not the first of their group."""
-_DESIGN = "design (.toml)"
-_CLOUD, _SURFACE = "cloud ({})", "exact surface ({})"
-_SEEN, _VIEWS, _PAGE = "as it is seen (.png)", "four views (.png)", "web page (.html)"
 
 
 class ExportPanel:
@@ -50,10 +42,16 @@ class ExportPanel:
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         self._session = session
-        self._writers = self._data_writers()
+        self._writers = {
+            "design (.toml)": self._save_design,
+            **self._files("cloud", "cloud", CLOUD_FILES, cloud_file),
+            **self._files("exact surface", "surface", SURFACE_FILES, surface_file),
+        }
         self._painters = {
-            _SEEN: self._save_picture, _VIEWS: self._save_figure, _PAGE: self._save_page
-        }  # fmt: skip
+            "as it is seen (.png)": partial(self._write, "studio.png", self._picture),
+            "four views (.png)": partial(self._write, "reachability.png", self._figure),
+            "web page (.html)": partial(self._write, "reachability.html", self._page),
+        }
         with tab:
             with gui.add_folder("this work"):
                 self._button("Save this work", self._save_state)
@@ -68,13 +66,15 @@ class ExportPanel:
                 self._button("Save picture", lambda: self._painters[self._kind.value]())
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
 
-    def _data_writers(self) -> dict[str, Callable[[], None]]:
-        """Files of the design, its cloud and its surface -> what writes them."""
-        clouds = {_CLOUD.format(each): partial(self._save_cloud, each) for each in CLOUD_FORMATS}
-        surfaces = {
-            _SURFACE.format(each): partial(self._save_surface, each) for each in SURFACE_FORMATS
+    def _files(
+        self, kind: str, stem: str, suffixes: Iterable[str], content: Callable[[Reach, str], bytes]
+    ) -> dict[str, Callable[[], None]]:
+        return {
+            f"{kind} ({suffix})": partial(
+                self._write, stem + suffix, lambda reach, suffix=suffix: content(reach, suffix)
+            )
+            for suffix in suffixes
         }
-        return {_DESIGN: self._save_design, **clouds, **surfaces}
 
     def _save_state(self) -> None:
         self._send("softreach-studio.json", self._session.state_now().to_json().encode())
@@ -82,27 +82,17 @@ class ExportPanel:
     def _save_design(self) -> None:
         self._send("design.toml", self._session.state.design.file_text.encode())
 
-    def _save_cloud(self, suffix: str) -> None:
-        self._write(f"cloud{suffix}", lambda: cloud_file(self._reach(), suffix))
+    def _picture(self, reach: Reach) -> bytes:
+        session, picture = self._session, self._session.picture()
+        focal, length = session.camera.pixels_per_length, session.state.design.length
+        bar = scale_bar(focal, picture.shape[1] / FINER / 5, length)
+        return picture_file(picture, session.state, reach, session.key, bar)
 
-    def _save_surface(self, suffix: str) -> None:
-        self._write(f"surface{suffix}", lambda: surface_file(self._reach(), suffix))
+    def _figure(self, reach: Reach) -> bytes:
+        return figure_file(reach, self._session.state)
 
-    def _save_figure(self) -> None:
-        self._write("reachability.png", lambda: figure_file(self._reach(), self._session.state))
-
-    def _save_picture(self) -> None:
-        session, reach = self._session, self._reach()
-        camera, state = session.camera, session.state
-        focal, picture = camera.pixels_per_length, session.picture()
-        bar = scale_bar(focal, picture.shape[1] / FINER / 5, state.design.length)
-        self._write("studio.png", lambda: picture_file(picture, state, reach, session.key, bar))
-
-    def _save_page(self) -> None:
-        session = self._session
-        self._write(
-            "reachability.html", lambda: static_page(session.state_now(), self._reach()).encode()
-        )
+    def _page(self, reach: Reach) -> bytes:
+        return static_page(self._session.state_now(), reach).encode()
 
     def _button(self, label: str, action: Callable[[], None], **looks: Any) -> None:
         button = self._session.client.gui.add_button(label, hint=_ABOUT[label], **looks)
@@ -117,17 +107,14 @@ class ExportPanel:
             raise InvalidInput("cloud", "still being computed", "complete", "try again soon")
         return reach
 
-    def _write(self, name: str, content: Callable[[], bytes]) -> None:
+    def _write(self, name: str, content: Callable[[Reach], bytes]) -> None:
         """Send what takes a while to make, and say so meanwhile."""
+        reach = self._reach()
         with self._session.working(f"writing {name}"):
-            data = content()
+            data = content(reach)
         self._send(name, data)
-        self._session.say(f"{name} is written: {_size(len(data))}.")
+        size = f"{len(data) / 1e6:.1f} MB" if len(data) >= 1e5 else f"{len(data) / 1e3:.1f} kB"
+        self._session.say(f"{name} is written: {size}.")
 
     def _send(self, name: str, content: bytes) -> None:
         self._session.client.send_file_download(name, content, save_immediately=True)
-
-
-def _size(count: int) -> str:
-    """Bytes in words."""
-    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

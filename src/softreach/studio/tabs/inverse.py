@@ -107,7 +107,6 @@ class InversePanel:
         return self._unit.label("target"), vector_kind(self._unit.name, length)
 
     def _follow_unit(self, unit: LengthUnit) -> None:
-        """The same place in the unit that the design is shown in."""
         if unit != self._unit:
             place = unit.of(self._unit.size * np.array(self._target.value))
             self._unit = unit
@@ -171,7 +170,6 @@ def _is_near(activation: Any, state: StudioState) -> bool:
 
 
 def _answer_text(answer: Solution, arm: Manipulator) -> str:
-    """Result of a solution in words."""
     place, unit = place_text(answer.target / arm.length, arm), arm.length_unit
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"

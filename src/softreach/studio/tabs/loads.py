@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.arm.base import POINTS
 from softreach.arm.design_file import in_file_terms
-from softreach.arm.loads import GRAVITY, Loads
+from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import Attribute, Fields
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
     from viser import GuiApi
 
     from softreach.studio.session import Session
-
-GRAVITIES: Mapping[str, Vector] = {
-    "none": (0.0, 0.0, 0.0),
-    "down": (0.0, 0.0, -GRAVITY),
-    "up": (0.0, 0.0, GRAVITY),
-    "sideways": (GRAVITY, 0.0, 0.0),
-}
-"""Gravity in the world, whose z points up [m/s²]."""
 
 _WAYS: Mapping[str, str] = {name: name for name in POINTS} | {
     "up": "up (upright)",
@@ -74,11 +66,7 @@ _QUANTITIES = {
         "g: acceleration of gravity as x, y, z in the world, whose z points up",
     ),
     "payload": _Quantity(
-        "payload",
-        "payload",
-        "g",
-        1e-3,
-        "m: mass at the tip; it weighs what gravity makes of it",
+        "payload", "payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"
     ),
     "payload_arm": _Quantity(
         "lever arm",
@@ -88,11 +76,7 @@ _QUANTITIES = {
         "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
     ),
     "tip_force": _Quantity(
-        "tip force",
-        "tip force",
-        "N",
-        1.0,
-        "F: force on the tip as x, y, z in the world",
+        "tip force", "tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"
     ),
 }
 

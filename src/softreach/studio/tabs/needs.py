@@ -11,9 +11,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.requirements import Check, Finding, Requirements
 from softreach.studio import markup
 from softreach.studio.fields import attempt, bind_button
+from softreach.studio.files import LARGEST
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.needs import (
-    LARGEST,
     needs_of_text,
     needs_parts,
     reach_text,
@@ -26,6 +26,7 @@ from softreach.studio.needs import (
 from softreach.studio.scene.needs import MISSED, REACHED
 from softreach.studio.widgets import Line, number_of, show_where
 from softreach.support.errors import InvalidInput
+from softreach.support.files.text import text_of
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -72,7 +73,11 @@ class NeedsPanel:
         with tab, gui.add_folder("requirements"):
             Line(gui, _HINT)
             self._add_widgets(gui)
-        self._listen()
+        self._kind.on_update(lambda _: attempt(session, self._explain))
+        bind_button(self._add, session, self._added)
+        bind_button(self._remove, session, self._removed)
+        self._load.on_upload(lambda _: attempt(session, lambda: self._read(self._load.value)))
+        bind_button(self._save, session, self._saved)
 
     def _add_widgets(self, gui: GuiApi) -> None:
         self._kind = gui.add_dropdown("add", tuple(_EMPTY), hint=_ABOUT["add"])
@@ -87,14 +92,6 @@ class NeedsPanel:
         self._save = gui.add_button(
             "Save needs (TOML)", hint=_ABOUT["save"], color="gray", visible=False
         )
-
-    def _listen(self) -> None:
-        session = self._session
-        self._kind.on_update(lambda _: attempt(session, self._explain))
-        bind_button(self._add, session, self._added)
-        bind_button(self._remove, session, self._removed)
-        self._load.on_upload(lambda _: attempt(session, lambda: self._read(self._load.value)))
-        bind_button(self._save, session, self._saved)
 
     def show(self, session: Session) -> None:
         """Show what is met and missed."""
@@ -111,7 +108,8 @@ class NeedsPanel:
             return False
         spot = self._session.picked_place(origin, direction)
         if spot is not None:
-            attempt(self._session, lambda: self._keep_place(spot.tolist()))
+            needs = requirements_of(self._session.state.needs)
+            attempt(self._session, lambda: self._keep(with_place(needs, spot.tolist())))
         return spot is not None
 
     @property
@@ -119,7 +117,6 @@ class NeedsPanel:
         return self._session.state.design.length_unit
 
     def _explain(self) -> None:
-        """Say what the field holds."""
         self._expected.say(_EMPTY[self._kind.value].format(unit=self._unit.name))
 
     def _offer_parts(self, needs: Requirements) -> None:
@@ -151,9 +148,6 @@ class NeedsPanel:
         }[self._kind.value]
         self._keep(add(requirements_of(self._session.state.needs), str(self._field.value)))
         self._field.value = ""
-
-    def _keep_place(self, place: list[float]) -> None:
-        self._keep(with_place(requirements_of(self._session.state.needs), place))
 
     def _place(self, needs: Requirements, text: str) -> Requirements:
         session = self._session
@@ -192,13 +186,7 @@ class NeedsPanel:
         self._keep(parts[part](needs) if part in parts else Requirements())
 
     def _read(self, file: UploadedFile) -> None:
-        if len(file.content) > LARGEST:
-            size, most = len(file.content) / 1e6, LARGEST / 1e6
-            raise InvalidInput(file.name, f"{size:.3g} MB", f"at most {most:g} MB")
-        try:
-            text = file.content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise InvalidInput(file.name, str(error), "text in UTF-8") from None
+        text = text_of("file", file.name, file.content, LARGEST)
         length = self._session.state.design.length
         self._keep(needs_of_text(text, length=length, source=file.name))
 
@@ -208,11 +196,7 @@ class NeedsPanel:
 
 
 def _numbers(text: str, count: int) -> list[float]:
-    """Numbers that a text lists.
-
-    Raises:
-        InvalidInput: Others, or another number of them.
-    """
+    """So many numbers that a text lists; anything else is refused."""
     parts = text.replace(";", ",").replace(",", " ").split()
     numbers = [number for part in parts if (number := number_of(part)) is not None]
     if not len(parts) == len(numbers) == count:
@@ -222,9 +206,6 @@ def _numbers(text: str, count: int) -> list[float]:
 
 
 def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
-    """A finding in words: a place by its gap, all else by its own text."""
     color, sign = (REACHED, "\N{CHECK MARK}") if finding.met else (MISSED, "\N{MULTIPLICATION X}")
-    text = finding.text
-    if finding.kind == "reach":
-        text = reach_text(check, finding)
+    text = reach_text(check, finding) if finding.kind == "reach" else finding.text
     return Swatch(color), f" {sign} ", Term(finding.name, finding.text), f": {text}"

@@ -13,13 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
 from softreach.arm.parameters import Parameter, changed, parameters
 from softreach.studio.fields import Attribute, Fields
-from softreach.studio.shown_parameters import (
-    Part,
-    ShownParameter,
-    part_parameters,
-    parts,
-    refusal,
-)
+from softreach.studio.shown_parameters import Part, ShownParameter, part_parameters, parts, refusal
 from softreach.studio.state import StudioState
 from softreach.studio.widgets import Line, TextKind, TypedField
 from softreach.support.errors import InvalidDesign, SoftreachError
@@ -121,7 +115,6 @@ class PartsPanel:
         return menu
 
     def _add_words(self, arm: Manipulator, part: Part) -> None:
-        """Add fields for its name, its material, and the ring that it is in."""
         if part.ring is not None or part.actuator:
             at = Attribute(
                 lambda _: part.name, lambda state, name: self._renamed(state, part, name)
@@ -190,7 +183,6 @@ class PartsPanel:
         self._edit(added, lambda arm: arm.actuators[-1].name)
 
     def _lacks_material(self, kind: str) -> bool:
-        """True if the design has no Young's modulus, and the actuator needs one."""
         try:
             edits.with_actuator(self._session.state.design, kind)
         except InvalidDesign as error:
@@ -208,7 +200,6 @@ class PartsPanel:
             self._edit(lambda arm: edits.without_actuator(arm, part.actuator))
 
     def _renamed(self, state: StudioState, part: Part, name: str) -> StudioState:
-        """The design in which a part has another name; it stays the one that is chosen."""
         if name == part.name:
             return state
         ring = part.ring
@@ -223,8 +214,6 @@ class PartsPanel:
         return new
 
     def _edit(self, change: Change, chosen: Callable[[Manipulator], str] | None = None) -> None:
-        """Change the parts of the design, and choose one of the new ones."""
-
         def edited(state: StudioState) -> StudioState:
             new = state.replace(design=change(state.design))
             if chosen is not None:
@@ -234,8 +223,6 @@ class PartsPanel:
         self._fields.apply(edited)
 
     def _words(self, error: SoftreachError) -> str:
-        if not isinstance(error, InvalidDesign):
-            return str(error)
         return refusal(error, self._numbers, self._session.state.design)
 
 
@@ -270,6 +257,5 @@ def _known(arm: Manipulator) -> dict[str, Parameter]:
 
 
 def _ring_of(arm: Manipulator, actuator: str) -> int:
-    """The ring that an actuator is in, counted from 0."""
     home = next(part.home for part in parts(arm).values() if part.actuator == actuator)
     return arm.section.rings.index(arm.section.ring(home or 0))

@@ -11,12 +11,14 @@ from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
 from softreach.studio.fields import attempt, bind_button
+from softreach.studio.files import LARGEST
 from softreach.studio.jobs.path import PlayPath, at_point
 from softreach.studio.plots.plot import Chart, Curve
 from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.widgets import Line, show_where
 from softreach.support.errors import InvalidInput
+from softreach.support.files.text import text_of
 from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:
@@ -28,7 +30,6 @@ if TYPE_CHECKING:
 
 _HINT = "The tip follows a path as far as its branch of solutions goes: load one, or click it."
 _MOST_CURVES = 8  # in the timeline: more are not told apart
-_FILE_SIZE = 1 << 20  # bytes of a path that is loaded
 _POINTS = 24  # of the straight line to each place that is clicked
 
 
@@ -46,7 +47,11 @@ class PathPanel:
             self._walk = gui.add_folder("along it", visible=False)
             with self._walk:
                 self._walk_widgets(gui)
-        self._listen()
+        bind_button(self._clear, session, lambda: self._take(None))
+        bind_button(self._play, session, self._played)
+        bind_button(self._save, session, self._save_csv)
+        self._load.on_upload(lambda _: attempt(session, lambda: self._read(self._load.value)))
+        self._at.on_update(self._moved)
 
     def _path_widgets(self, gui: GuiApi) -> None:
         self._load = gui.add_upload_button(
@@ -66,14 +71,6 @@ class PathPanel:
         graph = gui.add_folder("activations along the path")
         self._timeline = Chart(gui, graph, "activation")
         self._save = gui.add_button("Save the path (CSV)", hint="with its activations")
-
-    def _listen(self) -> None:
-        session = self._session
-        bind_button(self._clear, session, lambda: self._take(None))
-        bind_button(self._play, session, self._played)
-        bind_button(self._save, session, self._save_csv)
-        self._load.on_upload(lambda _: attempt(session, lambda: self._read(self._load.value)))
-        self._at.on_update(self._moved)
 
     def show(self, session: Session) -> None:
         """Say how far the arm follows, and where it is."""
@@ -100,7 +97,6 @@ class PathPanel:
         return True
 
     def _list(self, track: xr.Dataset) -> None:
-        """Show the result of following."""
         count = int((track.status == PathStatus.FOLLOWED).sum())
         arm = self._session.state.design
         self._text.say(end_text(track, arm))
@@ -120,7 +116,6 @@ class PathPanel:
         self._session.update(lambda state: state.replace(path=path))
 
     def _extend(self, point: np.ndarray) -> None:
-        """On to one more point, straight; what there is of a path begins at the tip."""
         state, path = self._session.state, self._session.state.path
         before = np.array(path.points) if path is not None else _tip(state)[None]
         start = state.activation if path is None else path.start
@@ -128,13 +123,7 @@ class PathPanel:
         self._take(TipPath.through(np.concatenate([before, more]), start))
 
     def _read(self, file: UploadedFile) -> None:
-        if len(file.content) > _FILE_SIZE:
-            raise InvalidInput(file.name, f"{len(file.content)} bytes", f"at most {_FILE_SIZE}")
-        try:
-            text = file.content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise InvalidInput(file.name, str(error), "a CSV file, UTF-8") from None
-        points = positions_in(text, file.name)
+        points = positions_in(text_of("file", file.name, file.content, LARGEST), file.name)
         if not 2 <= len(points) <= MOST_POINTS:
             raise InvalidInput(file.name, f"{len(points)} points", f"2 to {MOST_POINTS} points")
         state = self._session.state
@@ -146,10 +135,10 @@ class PathPanel:
         if event.client_id is None or self._shown is None:
             return
         activations, session = self._shown.activation.values, self._session
-        attempt(session, lambda: session.update(self._walked(activations)))
-
-    def _walked(self, activations: np.ndarray) -> Any:
-        return lambda state: at_point(state, activations, int(self._at.value))
+        attempt(
+            session,
+            lambda: session.update(lambda state: at_point(state, activations, int(self._at.value))),
+        )
 
     def _played(self) -> None:
         if self._play.value == "Play":
@@ -188,11 +177,7 @@ def end_text(track: xr.Dataset, arm: Manipulator) -> str:
 
 
 def _tip(state: StudioState) -> np.ndarray:
-    """Place of the tip [m].
-
-    Raises:
-        InvalidInput: The arm has no equilibrium.
-    """
+    """Place of the tip [m]; an arm without equilibrium is refused."""
     tip = solvable_rod(state.design).tips(np.array([state.activation]))[0]
     if not np.isfinite(tip).all():
         raise InvalidInput("activation", state.activation, "one with an equilibrium")

@@ -23,8 +23,6 @@ _COMPUTING = "computing ..."
 
 
 class _Place:
-    """Place of a plot in the window."""
-
     def __init__(self, gui: GuiApi, kind: type[Plot]) -> None:
         self.name = kind.name
         self._folder = gui.add_folder(kind.label, visible=False)

@@ -35,7 +35,9 @@ class StatusPanel:
         self._known = Line(gui, "computing ...")
         self._note, self._toast = "", None
         self._cancel = gui.add_button(_CANCEL, visible=False, hint=_ABOUT_CANCEL)
-        bind_button(self._cancel, session, lambda: _stop_or_go_on(session))
+        bind_button(
+            self._cancel, session, lambda: (session.cancel if session.busy else session.resume)()
+        )
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
@@ -55,7 +57,6 @@ class StatusPanel:
         self._offer(session)
 
     def _tell(self, session: Session) -> None:
-        """Show a note over the scene, until the next one or the next change."""
         if session.note == self._note:
             return
         self._note = session.note
@@ -68,7 +69,6 @@ class StatusPanel:
         )
 
     def _offer(self, session: Session) -> None:
-        """Offer to cancel while something is computed, and to go on where something is missing."""
         busy, lacking = session.busy, is_behind(session) and not session.refusal
         label = _GO_ON if lacking and not busy else _CANCEL
         if self._cancel.label != label:
@@ -77,7 +77,6 @@ class StatusPanel:
 
 
 def _marks(session: Session) -> list[list[Part]]:
-    """The legend, why there is no exact volume, and what is coarser than wanted."""
     reach = session.reach
     if reach is None:
         return []
@@ -107,7 +106,6 @@ def _numbers_text(session: Session) -> list[Part]:
 
 
 def _work(session: Session) -> str:
-    """Work in progress; that there is none, where something is missing."""
     if session.compiling:
         done = f", {session.compiled} kernels so far" if session.compiled else ""
         return f"compiling, once on this machine{done} ..."
@@ -118,10 +116,6 @@ def _work(session: Session) -> str:
     if session.busy:
         return "computing ..."
     return "canceled" if session.canceled else "not computed"
-
-
-def _stop_or_go_on(session: Session) -> None:
-    (session.cancel if session.busy else session.resume)()
 
 
 def add_history(gui: GuiApi, session: Session) -> None:

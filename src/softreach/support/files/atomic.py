@@ -89,7 +89,6 @@ def check_place(
 
 
 def _refusal(place: Path, mode: int, foreign: Foreign | None, overwrite: bool) -> tuple[str, ...]:
-    """Reason why what is there is not replaced: what is allowed, and what to do."""
     is_folder = stat.S_ISDIR(mode)
     if not (stat.S_ISREG(mode) or (is_folder and foreign is not None)):
         return ("a new name: a folder, a device or a pipe is there",)

@@ -291,7 +291,6 @@ class CheckedStore(WrapperStore[Any]):
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
 
     def _fault(self, chunk: Chunk, content: Buffer | None) -> str:
-        """What is wrong with a file; empty if nothing is."""
         watch = self.watch
         if content is None:
             needed = chunk.array in watch.digests if chunk.place is None else watch.required(chunk)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from softreach.support.errors import InvalidInput
 
-__all__ = ["MEGABYTE", "read_text"]
+__all__ = ["MEGABYTE", "read_text", "text_of"]
 
 MEGABYTE = 1_000_000
 
@@ -34,6 +34,11 @@ def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
         raise InvalidInput(name, shown, "a file that exists") from None
     except OSError as error:
         raise InvalidInput(name, shown, f"a file that can be read; {error.strerror}") from None
+    return text_of(name, shown, content, most)
+
+
+def text_of(name: str, shown: str, content: bytes, most: int) -> str:
+    """The text that `read_text` makes of the content of a file, which errors show so."""
     if len(content) > most:
         raise InvalidInput(name, shown, f"at most {most / MEGABYTE:,.3g} MB large")
     try:
