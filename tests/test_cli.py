@@ -252,10 +252,6 @@ class TestReach:
         assert "at = 9.0: must be between" in streams.err
         assert [path.name for path in folder.iterdir()] == ["a.ply"]
 
-    def test_a_place_without_slices_is_refused(self, capsys):
-        assert run([*self.ARM, "--at", "0,0,0.1"]) == 2
-        assert "left out without a picture" in capsys.readouterr().err
-
 
 class TestShow:
     @pytest.mark.parametrize(
@@ -316,79 +312,6 @@ helical_angle_deg = 0.0
 """
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["desgin"], 'Did you mean "design"'),
-        (["design"], "must be a design file or a built-in design, or use --schema"),
-        (["design", "nowhere.toml"], "nowhere.toml: must be a file that exists"),
-        (
-            ["design", "elephant"],
-            "elephant: must be a .toml file, or one of elephant_trunk, filament",
-        ),
-        (["design", "minimal_trank"], 'did you mean "minimal_trunk"?'),
-        (
-            ["design", "minimal_trunk", "--set", "left.tension=3"],
-            "commands; their bounds are left.lower and left.upper",
-        ),
-        (["cloud", "minimal_trunk", "--sampler", "unifrom"], 'did you mean "uniform"?'),
-        (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
-        (
-            ["design", "minimal_trunk", "--taper-deg", "steep"],
-            "taper_deg = steep: must be a finite number",
-        ),
-        (["cloud", "minimal_trunk", "--n", "many"], "n = many: must be a whole number"),
-        (["cloud", "minimal_trunk", "--n", "0"], "n = 0: must be a whole number, 1 or more"),
-        (["cloud", "minimal_trunk", "--seed", "-1"], "seed = -1"),
-        (["cloud", "minimal_trunk", "--tol", "0"], "tol = 0"),
-        (
-            ["cloud", "minimal_trunk", "--sampler", "halton"],
-            "one of uniform, boundary, sobol, grid",
-        ),
-        (["cloud", "minimal_trunk", "--sampler", "sobol", "--n", "1000"], "512 or 1024"),
-        (["cloud", "minimal_trunk", "--sampler", "grid", "--n", "999"], "9^3 = 729 or 10^3 = 1000"),
-        (
-            ["volume", "nowhere.zarr"],
-            "nowhere.zarr: must be a Zarr store written by softreach; it does not exist",
-        ),
-        (
-            ["atlas", "status", "nowhere.zarr"],
-            "must be an atlas written by build_atlas; it does not exist",
-        ),
-        (["studio", "nowhere.zarr", "--no-open"], "it does not exist"),
-        (["volume", "minimal_trunk", "--n", "9", "--alpha", "wide"], "alpha = wide"),
-        (["volume", "minimal_trunk", "--n", "9", "--alpha=-1L"], "alpha = -1L"),
-        (["show", "minimal_trunk", "--n", "9", "--color", "pink"], "left, right, longitudinal"),
-        (["show", "minimal_trunk", "--n", "9", "--activation", "1"], "3 comma-separated numbers"),
-        (["show", "minimal_trunk", "--out", "a.doc"], "a.doc: must be a file name ending in .png"),
-        (["show", "minimal_trunk", "--out", "a"], "a: must be a file name ending in .png"),
-        (["export", "minimal_trunk", "arm.doc"], ".ply, .stl, .obj, .glb"),
-        (["export", "minimal_trunk"], "requires an argument"),
-    ],
-)
-def test_wrong_input_is_one_line_and_exit_code_2(arguments, message, folder, capsys):
-    assert run(arguments) == 2
-    streams = capsys.readouterr()
-    assert streams.err.startswith("error: ")
-    assert streams.err.count("\n") == 1
-    assert message in streams.err
-    assert streams.out == ""
-    assert not any(folder.iterdir())
-
-
-def test_a_cloud_in_a_format_for_surfaces_is_refused(stored, folder, capsys):
-    assert run(["export", stored, "cloud.stl"]) == 2
-    assert ".csv, .parquet" in capsys.readouterr().err
-    assert not any(folder.iterdir())
-
-
-def test_a_variation_that_cannot_exist_is_refused_in_degrees(capsys):
-    assert run(["design", "minimal_trunk", "--taper-deg", "10"]) == 2
-    text = capsys.readouterr().err
-    assert "taper_deg = 10" in text
-    assert "3.57633 deg" in text
-
-
 def test_every_fault_of_a_design_file_has_its_line(folder, capsys):
     (folder / "bad.toml").write_text(BAD_DESIGN)
     assert run(["design", "bad.toml"]) == 2
@@ -407,14 +330,6 @@ def test_text_that_is_no_toml_is_refused_with_its_line(folder, capsys):
     (folder / "bad.toml").write_text("length_m = = 1\n")
     assert run(["design", "bad.toml"]) == 2
     assert "at line 1" in capsys.readouterr().err
-
-
-def test_a_place_that_cannot_be_written_is_an_error_of_one_line(folder, capsys):
-    (folder / "file").write_text("")
-    assert run(["cloud", "minimal_trunk", "--n", "10", "--out", "file/cloud.zarr"]) == 2
-    text = capsys.readouterr().err
-    assert text.startswith("error: ")
-    assert text.count("\n") == 1
 
 
 def strict_json(text):

@@ -232,29 +232,6 @@ def test_pictures_in_different_units_do_not_share_axes(cloud, lce, shape):
 # Commands and files of designs
 
 
-def test_a_unit_that_does_not_exist_costs_one_line(folder, capsys):
-    for command in ("design", "reach", "cloud", "volume", "payload", "equilibria", "show", "demo"):
-        words = [command, "lce_arm"][: 1 if command == "demo" else 2]
-        assert run([*words, "--unit", "ft"]) == 2
-        streams = capsys.readouterr()
-        assert streams.err == "error: unit = 'ft': must be one of m, cm, mm, L\n"
-        assert streams.out == ""
-    assert not list(folder.iterdir())
-
-
-def test_mixed_or_unknown_units_of_targets_cost_one_line(folder, capsys):
-    (folder / "places.csv").write_text("x [inch],y [inch],z [inch]\n1,2,3\n")
-    for words, said in {
-        ("--target", "80mm,50mm,-240"): "target = 80mm,50mm,-240: must be three comma-separated",
-        ("--target", "0,0,5inch"): "or each with its unit (m, cm, mm, um, µm, L)",
-        ("--targets", "places.csv"): "error: places.csv, header = x [inch]",
-    }.items():
-        assert run(["solve", "lce_arm", *words]) == 2
-        error = capsys.readouterr().err
-        assert said in error
-        assert error.count("\n") == 1
-
-
 def test_numbers_for_machines_do_not_depend_on_the_unit(lce, printed):
     asked = ["volume", "lce_arm", "--n", "3000", "--alpha", "0.4L", "--unit"]
     facts, *others = (printed(*asked, unit) for unit in UNITS)

@@ -38,13 +38,6 @@ def test_a_built_atlas_is_that_of_the_library(tmp_path, capsys):
     np.testing.assert_allclose(volume, sr.concave_hull(alone.tip, 0.8).volume, rtol=1e-12)
 
 
-@pytest.mark.parametrize("text", ["0.05", "L", "-1L", "nanL", "infL", "5cm"])
-def test_a_radius_without_l_is_refused_as_designs_differ_in_length(text, tmp_path, capsys):
-    assert run(["atlas", "build", str(tmp_path / "a.zarr"), *BUILD, f"--alpha={text}"]) != 0
-    said = capsys.readouterr().err
-    assert f"alpha = {text}: must be a radius > 0 over the length of each design" in said
-
-
 def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
     store = str(tmp_path / "a.zarr")
     assert run(["atlas", "build", store, *BUILD, "--alpha", "0.8L"]) == 0
