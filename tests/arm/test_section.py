@@ -50,21 +50,13 @@ def test_the_ratio_of_a_ring_is_that_of_its_own_radii():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: Material(poisson_ratio=0.6), "poisson_ratio = 0.6: .*>= 0 and <= 0.5"),
-        (lambda: Material(poisson_ratio=-0.1), "poisson_ratio = -0.1"),
-        (lambda: Material(poisson_ratio=None), "poisson_ratio: must be a finite number"),
-        (lambda: Ring(inner_ratio=1.0), "inner_ratio = 1: .*< 1"),
-        (lambda: Ring(inner_ratio=None), "inner_ratio: must be a finite number"),
         (lambda: Ring(inner_ratio=0.5, outer_ratio=0.5), "must be below outer_ratio = 0.5"),
-        (lambda: Ring(inner_ratio=0.5, outer_ratio="1"), "outer_ratio = '1'"),
         (lambda: Ring(inner_ratio=0.5, material=0.5), "material = 0.5: must be a Material"),
         (lambda: Section(rings=()), r"section.rings = \(\): must hold one Ring"),
         (
             lambda: Section(rings=Ring(inner_ratio=0.5)),
             r"section.rings = Ring\(.*must hold one Ring",
         ),
-        (lambda: Section(rings=(3,)), r"section.rings = \(3,\): must hold one Ring"),
-        (lambda: Section(rings=None), "section.rings: must hold one Ring"),
         (
             lambda: Section(rings=(Ring(inner_ratio=0.5, outer_ratio=0.9),)),
             r"rings\[0\].outer_ratio = 0.9: must be 1",
