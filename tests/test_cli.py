@@ -17,6 +17,7 @@ import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.arm.summary import describe
 from softreach.cli.app import app, run
+from softreach.cli.changes import Changes
 from softreach.cli.console import console
 
 # Few samples make the α-shape too fine; the command line prints that and goes on.
@@ -422,3 +423,302 @@ def test_every_command_calls_its_output_by_one_name():
 
 def _function(name):
     return app[name].default_command or (lambda: None)
+
+
+# Options that change a design, the same on every command that takes one
+
+
+OPTIONS = (
+    "--base",
+    "--payload",
+    "--gravity",
+    "--tip-force",
+    "--set",
+    "--taper-deg",
+    "--revolution-deg",
+)
+TAKE_ONE_DESIGN = ("design", "cloud", "volume", "reach", "solve", "track", "show", "export")
+NUMBERS = ("rings[0].material.young_modulus=1MPa", "rings[0].material.density=1000kg/m3")
+
+
+def saved(folder, *arguments):
+    """The design that `softreach design ... --out` writes."""
+    assert run(["design", *arguments, "--out", "a.toml"]) == 0
+    return sr.Manipulator.load("a.toml")
+
+
+@pytest.mark.parametrize("command", TAKE_ONE_DESIGN)
+def test_every_command_that_takes_a_design_offers_to_change_it(command, capsys):
+    assert run([command, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(f"{option} " in text for option in OPTIONS)
+    assert "in the world, whose +z points up" in " ".join(text.replace("│", "").split())
+
+
+@pytest.mark.parametrize(
+    ("options", "loads"),
+    [
+        (["--payload", "2g"], {"payload": 0.002}),
+        (["--payload", "2e-3 kg", "--gravity", "down"], {"payload": 0.002}),
+        (["--gravity", "upright"], {}),
+        (["--gravity", "up"], {"gravity": (0, 0, 9.81)}),
+        (["--gravity", "hanging"], {"gravity": (0, 0, 9.81)}),
+        (["--gravity", "sideways"], {"gravity": (9.81, 0, 0)}),
+        (["--gravity", "-1.62,0,0.5"], {"gravity": (-1.62, 0, 0.5)}),
+        (["--gravity", "0, 0, -1.62 m/s2"], {"gravity": (0, 0, -1.62)}),
+        (
+            ["--gravity", "none", "--tip-force", "-5,0,2.5mN"],
+            {"gravity": (0, 0, 0), "tip_force": (-0.005, 0, 0.0025)},
+        ),
+        (["--tip-force=0,0,-0.01"], {"tip_force": (0, 0, -0.01)}),
+        (["--set", "loads.payload=2g"], {"payload": 0.002}),
+        (["--set", "loads.payload_kg=0.002"], {"payload": 0.002}),
+        (
+            ["--set", "loads.tip_moment[1]=3N mm", "--payload", "1g"],
+            {"tip_moment": (0, 0.003, 0), "payload": 0.001},
+        ),
+    ],
+)
+def test_loads_are_those_of_the_library(options, loads, folder):
+    expected = sr.designs.lce_arm().replace(loads=sr.Loads(**loads))
+    assert saved(folder, "lce_arm", *options) == expected
+
+
+def test_options_change_the_loads_that_a_design_has(folder):
+    loads = sr.Loads(gravity=(0, 0, 9.81), payload=0.001)
+    sr.designs.lce_arm().replace(loads=loads).save("loaded.toml")
+    made = saved(folder, "loaded.toml", "--payload", "3g")
+    assert made.loads == loads.replace(payload=0.003)
+    bare = saved(folder, "loaded.toml", "--payload", "0g", "--gravity", "none")
+    assert bare == sr.designs.lce_arm()
+
+
+@pytest.mark.parametrize(
+    ("options", "values"),
+    [
+        (["--set", "taper=1deg"], {"taper": math.radians(1)}),
+        (["--set", "taper=0.01rad"], {"taper": 0.01}),
+        (["--set", "taper_deg=1"], {"taper": math.radians(1)}),
+        (
+            ["--set", "length=80cm", "--set", "left.offset_deg=30"],
+            {"length": 0.8, "left.offset": math.radians(30)},
+        ),
+        (
+            ["--set", "left.lower=-2", "--taper-deg", "1"],
+            {"left.lower": -2, "taper": math.radians(1)},
+        ),
+        (["--set", "radius_ratio = 0.5"], {"radius_ratio": 0.5}),
+    ],
+)
+def test_settings_are_parameters_of_the_library(options, values, folder):
+    assert saved(folder, "minimal_trunk", *options) == changed(sr.designs.minimal_trunk(), values)
+
+
+def test_moduli_and_densities_may_come_with_the_loads_that_need_them(folder):
+    settings = [word for text in NUMBERS for word in ("--set", text)]
+    made = saved(folder, "minimal_trunk", "--payload", "200g", *settings)
+    material = made.section.rings[0].material
+    assert (material.young_modulus, material.density) == (1e6, 1000.0)
+    assert made.loads == sr.Loads(payload=0.2)
+
+
+@pytest.mark.parametrize(
+    ("word", "points"),
+    [("hanging", "down"), ("upright", "up"), ("down", "down"), ("x", "x"), ("-y", "-y")],
+)
+def test_the_base_points_the_way_that_is_said(folder, word, points):
+    assert saved(folder, "minimal_trunk", "--base", word).base == sr.Base(points=points)
+
+
+def test_the_place_and_the_turn_of_a_file_stay(folder):
+    base = sr.Base(position=(0, 0, 2), points="x", turn=0.3)
+    sr.designs.minimal_trunk().replace(base=base).save("posed.toml")
+    made = saved(folder, "posed.toml", "--base", "hanging", "--set", "base.turn=0.4rad")
+    assert made.base == base.replace(points="down", turn=0.4)
+
+
+def test_gravity_down_beside_a_hanging_base_pulls_along_the_arm(folder, capsys):
+    made = saved(folder, "lce_arm", "--base", "hanging", "--gravity", "down")
+    assert (made.base.points, made.loads) == ("down", sr.Loads())
+    assert run(["design", "lce_arm", "--base", "hanging", "--gravity", "down", "--json"]) == 0
+    *_, last = capsys.readouterr().out.splitlines()
+    assert json.loads(last)["base"] == "hanging: points down"
+
+
+def test_a_place_below_a_hanging_arm_is_reached(capsys):
+    place = ["minimal_trunk", "--target", "0.2,0.1,-0.6"]
+    assert run(["solve", *place, "--base", "hanging"]) == 0
+    assert "reached" in capsys.readouterr().out.splitlines()[0]
+    assert run(["solve", *place]) == 0
+    assert "unreachable" in capsys.readouterr().out.splitlines()[0]
+
+
+def test_a_loaded_cloud_counts_its_stable_samples(folder, capsys):
+    options = ["--n", "64", "--payload", "2g", "--gravity", "hanging", "--json"]
+    assert run(["cloud", "lce_arm", *options]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["stable"], facts["unstable"], facts["no_equilibrium"]) == (64, 0, 0)
+    assert (facts["payload_kg"], facts["base"]) == (0.002, "hanging")
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(0, 0, 9.81), payload=0.002))
+    assert sr.open_cloud("lce_arm.zarr").identical(sr.compute_cloud(arm, 64))
+
+
+class TestRestInTheSummary:
+    def facts(self, capsys, *arguments):
+        assert run(["design", *arguments, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    def test_a_loaded_arm_has_its_sag_in_l_and_m(self, capsys):
+        arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(9.81, 0, 0), payload=0.001))
+        facts = self.facts(capsys, "lce_arm", "--gravity", "sideways", "--payload", "1g")
+        known = sr.rest.rest(arm)
+        assert facts["sag_at_rest_L"] == known.sag_over_length
+        assert facts["sag_at_rest_m"] == known.sag
+        assert facts["at_rest"] == "stable"
+
+    def test_an_arm_that_cannot_stand_is_said_not_to_be_stable(self, capsys):
+        assert self.facts(capsys, "lce_arm", "--payload", "50g")["at_rest"] == "not stable"
+
+    def test_an_arm_too_heavy_to_be_followed_is_still_described(self, capsys):
+        facts = self.facts(capsys, "lce_arm", "--gravity", "sideways", "--payload", "100kg")
+        assert facts["at_rest"] == "unknown: the loads are too large"
+        assert facts["sag_at_rest_L"] is None
+
+    def test_an_arm_without_loads_is_judged_by_its_own_weight(self, capsys):
+        facts = self.facts(capsys, "lce_arm")
+        held = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(9.81, 0, 0)))
+        assert facts["sag_at_rest_sideways_L"] == sr.rest.rest(held).sag_over_length
+        assert facts["at_rest_upright"] == "stable"
+
+    def test_nothing_is_said_where_moduli_are_not_known(self, capsys):
+        assert not any("rest" in name for name in self.facts(capsys, "minimal_trunk"))
+
+    def test_loads_beyond_the_verified_ones_are_warned_of_once(self, capsys, tmp_path):
+        assert run(["design", "lce_arm", "--payload", "100g"]) == 0
+        assert capsys.readouterr().err.count("load number is") == 1
+        out = ["--out", str(tmp_path / "a.zarr")]
+        assert run(["cloud", "lce_arm", "--payload", "100g", "--n", "8", *out]) == 0
+        assert capsys.readouterr().err.count("load number is above 12") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "lacking"),
+    [
+        (["--payload", "200g"], ("young_modulus", "density")),
+        (["--tip-force", "0,0,1N", "--gravity", "none"], ("young_modulus",)),
+        (["--gravity", "up", "--set", NUMBERS[0]], ("density",)),
+        (["--set", "loads.payload=1g"], ("young_modulus", "density")),
+    ],
+)
+def test_loads_ask_in_one_line_for_what_the_arm_lacks(options, lacking, capsys):
+    assert run(["design", "minimal_trunk", *options]) == 2
+    text = capsys.readouterr().err
+    assert text.count("\n") == 1
+    asked = text.partition("must be on an arm with ")[2].partition(";")[0]
+    assert asked == " and ".join(f"rings[0].material.{name}" for name in lacking)
+    assert all(f"--set rings[0].material.{name}=" in text for name in lacking)
+
+
+def test_no_gravity_on_an_arm_without_loads_changes_nothing(folder):
+    assert saved(folder, "minimal_trunk", "--gravity", "none") == sr.designs.minimal_trunk()
+
+
+def test_every_change_has_an_option(capsys):
+    """No field of the changes is forgotten in what a stored cloud refuses."""
+    every = Changes(
+        base="up",
+        revolution_deg=1.0,
+        taper_deg=1.0,
+        payload="1g",
+        gravity="up",
+        tip_force="0",
+        settings=["a=1"],
+    )
+    assert len(every.given) == len(vars(every))
+    _, bound, *_ = app.parse_args(["design", "x", "--set", "a=1", "--set", "b=2"])
+    assert bound.arguments["changes"].settings == ["a=1", "b=2"]
+
+
+# The commands of the exact reachable set and the inverse problem
+
+
+@pytest.fixture(scope="module")
+def target(trunk):
+    return sr.tip_positions(trunk, [[-0.9, -0.3, -0.6]])[0]
+
+
+def test_a_target_is_solved_and_the_activations_lead_there(trunk, target, capsys):
+    text = ",".join(f"{x:.17g}" for x in target)
+    assert run(["solve", "minimal_trunk", f"--target={text}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)[0]
+    assert found["status"] == "reached"
+    tips = sr.tip_positions(trunk, found["activations"])
+    np.testing.assert_allclose(tips, np.tile(target, (len(tips), 1)), atol=1e-9)
+
+
+def test_targets_come_from_a_file_with_or_without_a_header(tmp_path, target, capsys):
+    row = ",".join(f"{x:.17g}" for x in target)
+    for header in ("", "x,y,z\n"):
+        path = tmp_path / "targets.csv"
+        path.write_text(f"{header}{row}\n2,0,0\n")
+        assert run(["solve", "minimal_trunk", "--targets", str(path), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert [one["status"] for one in found] == ["reached", "unreachable"]
+        assert found[1]["gap_m"] > 1
+
+
+def test_activations_are_told_in_their_units(capsys):
+    assert run(["solve", "three_tendon_robot", "--target=0,0,1"]) == 0
+    assert capsys.readouterr().out.count(" N") == 3
+
+
+def test_a_family_that_is_smaller_than_asked_says_so(capsys):
+    arm = sr.designs.redundant_trunk()
+    text = ",".join(f"{x:.17g}" for x in sr.tip_positions(arm, arm.bounds[:, 0])[0])
+    assert run(["solve", "redundant_trunk", f"--target={text}", "--family", "3"]) == 0
+    assert "no others found: further searches end at this one" in capsys.readouterr().out
+
+
+def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):
+    gamma = np.linspace([-0.9, -0.3, -0.6], [-0.5, -0.8, -0.7], 5)
+    points = sr.tip_positions(trunk, gamma)
+    np.savetxt(tmp_path / "path.csv", points, delimiter=",", header="x,y,z", comments="")
+    out = tmp_path / "activations.csv"
+    assert run(["track", "minimal_trunk", str(tmp_path / "path.csv"), "--out", str(out)]) == 0
+    assert "5 of 5 points followed" in capsys.readouterr().out
+    found = np.loadtxt(out, delimiter=",", skiprows=1)[:, :3]
+    np.testing.assert_allclose(sr.tip_positions(trunk, found), points, atol=1e-8)
+
+
+def test_a_path_says_that_the_arm_loses_its_stability(tmp_path, capsys, monkeypatch):
+    import xarray as xr
+
+    from softreach.inverse import path
+
+    ended = xr.Dataset(
+        {
+            "activation": (("point", "bundle"), [[0.0, 0.0, 0.0], [np.nan] * 3]),
+            "tip_error": ("point", [0.0, np.nan]),
+            "status": ("point", [0, 4]),
+            "end_length": ((), 0.25),
+            "end_length_error": ((), 1e-8),
+        },
+        attrs={"end": "unstable", "end_bundle": "", "end_bound": ""},
+    )
+    monkeypatch.setattr(path, "track_path", lambda *_: ended)
+    (tmp_path / "path.csv").write_text("x,y,z\n0,0,1\n0,0,0.5\n")
+    out = tmp_path / "activations.csv"
+    assert run(["track", "minimal_trunk", str(tmp_path / "path.csv"), "--out", str(out)]) == 0
+    assert "1 of 2 points followed, up to 0.25 m of path" in (said := capsys.readouterr().out)
+    assert "where the arm loses its stability" in said
+
+
+def test_the_reachable_set_is_reported_drawn_and_written(tmp_path, capsys):
+    surface, figure = tmp_path / "reach.ply", tmp_path / "reach.png"
+    arguments = ["reach", "minimal_trunk", "--accuracy", "0.02", "--json"]
+    assert run([*arguments, "-o", str(surface), "--out", str(figure)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["volume_L3"] == pytest.approx(0.691, abs=0.002)
+    assert 0 < found["unreachability"] < 1
+    assert surface.stat().st_size > 10_000
+    assert figure.stat().st_size > 10_000
