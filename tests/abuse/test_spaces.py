@@ -1,0 +1,88 @@
+"""Spaces of designs and metrics as nobody should ask for them: refused in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+import softreach as sr
+from softreach.atlas import DesignSpace, Metric, Need
+from softreach.atlas.space_file import parse_space
+from tests.abuse.refusals import raised_by
+
+NUMBERS = "must be numbers: a list, or start:stop:count"
+ENDS = "two numbers, the lower one first"
+COUNT = "must be a whole number, from 1 to 1,000,000"
+
+
+def sampled(line: str) -> str:
+    return f'layout = "latin"\n{line}\n'
+
+
+SPACES = [
+    pytest.param("[parameters]\ntaper_deg = [true]", NUMBERS, id="truth values"),
+    pytest.param('[parameters]\ntaper_deg = ["0", "1"]', NUMBERS, id="texts in a list"),
+    pytest.param("[parameters]\ntaper_deg = [[0, 1], [2]]", NUMBERS, id="ragged rows"),
+    pytest.param("[parameters]\ntaper_deg = 1979-05-27", NUMBERS, id="a date"),
+    pytest.param("[parameters]\ntaper_deg = [nan]", "finite value", id="NaN"),
+    pytest.param('[parameters]\ntaper_deg = "0:1:2:3"', NUMBERS, id="four parts"),
+    pytest.param("parameters = 5", "a table of parameters", id="no table"),
+    pytest.param("[[parameters]]\ntaper_deg = 1", "a table of parameters", id="a list of tables"),
+    pytest.param("[parameters]", "at least one of", id="nothing"),
+    pytest.param("layout = 5", "one of grid, list, sobol, latin", id="a layout of 5"),
+    pytest.param("x,y\n1,2", "must be valid TOML", id="a table of numbers"),
+    *(
+        pytest.param(f"{sampled(line)}[parameters]\ntaper_deg = [0, 3]", expected, id=line)
+        for line, expected in {
+            "designs = 1e9": COUNT,
+            "designs = 1000000000": COUNT,
+            "designs = true": COUNT,
+            "designs = 0": COUNT,
+            "designs = 64.5": COUNT,
+            'designs = "x"': COUNT,
+            "seed = -1": "seed = -1: must be a whole number",
+            'seed = "x"': "seed = 'x': must be a whole number",
+        }.items()
+    ),
+    *(
+        pytest.param(sampled(f"[parameters]\ntaper_deg = {ends}"), ENDS, id=f"ends {ends}")
+        for ends in ("[3, 0]", "[1, 1]")
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), SPACES)
+def test_a_space_that_is_none_is_refused_in_one_line(text, expected):
+    error = raised_by(lambda: parse_space(text, lambda name: getattr(sr.designs, name)()))
+    assert expected in str(error)
+    assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("number", [-1, 4, 1.5, "a", None, True])
+def test_a_number_that_no_design_has_is_refused(trunk, number):
+    space = DesignSpace.grid(trunk, taper=[0.0, 0.01])
+    assert "from 0 to 1" in str(raised_by(lambda: space.design(number)))
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"name": 5}, "must be text"),
+        ({"name": "a b"}, "letters, digits and underscores"),
+        ({"name": ""}, "letters, digits and underscores"),
+        ({"unit": 5}, "unit of metric m = 5: must be text"),
+        ({"meaning": None}, "must be text"),
+        ({"nan_if": True}, "must be text"),
+        ({"needs": 5}, "must be a tuple"),
+        ({"needs": ("TIPS",)}, "some of Need.ARM"),
+        ({"compute": None}, "must be a function"),
+        ({"over": "x"}, "must be () or"),
+    ],
+)
+def test_a_metric_that_is_none_is_refused(change, expected):
+    fine = {"name": "m", "unit": "1", "meaning": "x", "needs": (Need.TIPS,), "compute": len}
+    assert expected in str(raised_by(lambda: Metric(**{**fine, **change})))
+
+
+def test_a_parameter_is_differentiated_by_once(trunk):
+    error = raised_by(lambda: sr.volume_gradient(trunk, ["taper", "taper"]))
+    assert "parameters = taper: must be given once" in str(error)
