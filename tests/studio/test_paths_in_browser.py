@@ -1,0 +1,113 @@
+"""End to end: a path of the tip is loaded, clicked, followed, played and saved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+
+ACTIVATION = (-1.0, -0.2, -0.5)
+
+
+@pytest.fixture(autouse=True)
+def _begin(tab):
+    tab.session.update(lambda s: s.replace(path=None, activation=ACTIVATION, target=None))
+    tab.settle()
+    tab.open("Move")
+
+
+def circled(tab, folder):
+    """A circle of 97 points from where the tip is, from a file."""
+    around = 2 * np.pi * np.linspace(0, 1, 97)
+    offset = 0.05 * np.stack([np.cos(around) - 1, np.sin(around), 0 * around], axis=1)
+    tip = sr.tip_positions(tab.session.state.design, [ACTIVATION])[0]
+    file = folder / "circle.csv"
+    np.savetxt(file, tip + offset, "%.17g", ",", header="x,y,z", comments="")
+    load(tab, file)
+    tab.wait(lambda: tab.session.figures.track is not None, "the path is followed")
+    tab.settle()
+    return tab.session.figures.track
+
+
+def test_a_path_from_a_file_is_followed_from_the_present_activation(tab, tmp_path):
+    found, state = circled(tab, tmp_path), tab.session.state
+    tab.page.get_by_text("All 97 points are followed").wait_for()
+    tab.wait(lambda: tab.drawn("/grip/ball").opacity, "where the path begins is seen in the ball")
+    np.testing.assert_allclose(found.activation.values[0], ACTIVATION, atol=1e-6)
+    tips = sr.tip_positions(state.design, found.activation.values)
+    np.testing.assert_allclose(tips, found.position, atol=2e-5 * state.design.length)
+    assert tab.drawn("/path/followed")
+    assert not tab.drawn("/path/end")
+    tab.page.locator(".uplot canvas").first.wait_for()
+
+
+@pytest.mark.large
+def test_playing_leads_the_arm_to_the_end_and_the_slider_back(tab, tmp_path):
+    found = circled(tab, tmp_path)
+    tab.press("Play")
+    tab.wait(lambda: tab.session.state.path.at > 2, "the arm moves")
+    tab.press("Stop")
+    tab.settle()
+    stopped = tab.session.state.path.at
+    assert stopped < 96
+    tab.press("Play")
+    tab.wait(lambda: tab.session.state.path.at == 96, "the arm is at the end")
+    tab.settle()
+    np.testing.assert_allclose(tab.session.state.activation, found.activation.values[-1])
+    tab.drag("point", -60)
+    tab.wait(lambda: tab.session.state.path.at < 96, "the arm goes back")
+    tab.settle()
+    at, state = tab.session.state.path.at, tab.session.state
+    np.testing.assert_allclose(state.activation, found.activation.values[at])
+    place = found.position.values[at] / state.design.length
+    np.testing.assert_allclose(tab.session.tip, place, atol=2e-5)
+
+
+@pytest.mark.large
+def test_the_page_says_where_the_branch_ends_and_why(tab, tmp_path):
+    state = tab.session.state
+    tip = sr.tip_positions(state.design, [ACTIVATION])[0]
+    file = tmp_path / "out.csv"
+    share = np.linspace(0, 1, 21)[:, None]
+    np.savetxt(file, tip + share * [1.5, 0, 0], "%.9g", ",", header="x,y,z", comments="")
+    load(tab, file)
+    tab.page.get_by_text("of 21 points are followed").wait_for()
+    tab.settle()
+    found = tab.session.figures.track
+    assert found.attrs["end"] in ("bound", "fold")
+    reason = "bound." if found.attrs["end"] == "bound" else "turns back"
+    assert tab.page.get_by_text(reason).count()
+    end = tab.drawn("/path/end")
+    np.testing.assert_allclose(end.position, found.end_position / state.design.length, atol=1e-6)
+
+
+@pytest.mark.large
+def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
+    tab.choose("mouse", "adds points to the path")
+    tab.wait(lambda: tab.session.state.appearance.mouse == "path", "the mouse is for the path")
+    points = tab.session.reach.cloud.tip.values / tab.session.state.design.length
+    one, other = lowest(tab, points)  # notes of uploads cover the upper part of the canvas
+    tab.click_at(one)
+    tab.wait(lambda: tab.session.state.path is not None, "the path begins")
+    first = tab.session.state.path
+    np.testing.assert_allclose(first.points[0], tab.session.tip, atol=1e-4)
+    assert tab.session.state.target is None
+    tab.click_at(other)
+    tab.wait(lambda: tab.session.state.path != first, "the path goes on")
+    assert tab.session.state.path.points[: len(first.points)] == first.points
+    tab.press("Remove the path")
+    tab.wait(lambda: tab.session.state.path is None, "the path is gone")
+    tab.settle()
+    assert not tab.drawn("/path")
+
+
+def lowest(tab, points, count=2):
+    """Points of those given that appear low in the canvas."""
+    return [point for point in points[:2000] if tab.projected(point)[1] > 0.65][:count]
+
+
+def load(tab, path) -> None:
+    with tab.page.expect_file_chooser() as caught:
+        tab.press("Load a path (CSV)")
+    caught.value.set_files(path)
