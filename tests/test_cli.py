@@ -101,14 +101,6 @@ def test_importing_and_helping_load_no_heavy_library(code):
     assert not HEAVY & loaded
 
 
-def test_the_installed_command_ends_with_the_exit_code():
-    command = [sys.executable, "-m", "softreach", "design", "nowhere.toml"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.startswith("error: ")
-
-
 class TestDesign:
     def test_what_is_printed_follows_from_the_design(self, capsys):
         facts = printed_json(capsys, "design", "minimal_trunk", "--taper-deg", "3")

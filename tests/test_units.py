@@ -128,11 +128,6 @@ def test_a_file_says_its_unit_in_its_header(header, folder, printed):
     assert one["target_m"] == [0.03, 0.02, 0.06]
 
 
-@pytest.mark.parametrize("alpha", ["40cm", "400mm", "0.4", "0.4m", "0.4L"])
-def test_a_radius_is_the_same_in_any_unit(alpha, printed):
-    assert printed("volume", "minimal_trunk", "--n", "3000", "--alpha", alpha)["alpha_m"] == 0.4
-
-
 # What is written
 
 

@@ -169,12 +169,3 @@ def test_replacing_lengths_by_ratios_and_back():
     assert (by_ratio.distance, by_ratio.radius) == (None, None)
     assert by_ratio.replace(distance=0.008, radius=0.004) == chamber()
     assert by_ratio.value_on("radius", CYLINDER, SECTION) == pytest.approx(0.2 * RADIUS)
-
-
-def test_its_forces_need_a_modulus():
-    section = Section(rings=(Ring(inner_ratio=0.5),))
-    with pytest.raises(
-        InvalidDesign,
-        match=r"^rings\[0\].material.young_modulus: must be given in Pa for chamber 'left'",
-    ):
-        Manipulator(profile=CYLINDER, section=section, actuators=(chamber(name="left"),))

@@ -24,12 +24,10 @@ from softreach.arm import (
     Samples,
     Section,
     Tendon,
-    designs,
 )
 from softreach.arm.design_file.schema import json_schema
 from softreach.arm.material import named_material
 from tests.arm.drawn_arms import any_arms
-from tests.laws import arms
 
 FILES = Path(__file__).parents[2] / "designs"
 
@@ -58,28 +56,12 @@ def test_an_arm_of_any_kind_survives_a_file_to_the_last_bit(arm):
     assert same(again, arm)
 
 
-@given(arm=arms())
-def test_a_design_survives_a_file_to_the_last_bit(arm):
-    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
-
-
 def test_a_saved_design_loads_equal_and_nothing_is_left_beside_it(tmp_path, trunk):
     path = tmp_path / "folder" / "trunk.toml"
     trunk.save(path)
     trunk.save(path, overwrite=True)
     assert sr.Manipulator.load(path) == trunk
     assert list(path.parent.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("name", ["minimal_trunk", "redundant_trunk"])
-def test_the_named_designs_are_also_files(name):
-    assert sr.Manipulator.load(FILES / f"{name}.toml") == getattr(designs, name)()
-
-
-@pytest.mark.parametrize("name", designs.__all__)
-def test_a_named_design_survives_a_file(name):
-    arm = getattr(designs, name)()
-    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
 
 
 def test_what_is_left_out_has_its_default():
