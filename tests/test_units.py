@@ -81,6 +81,8 @@ def test_other_units_are_refused_and_l_without_an_arm():
             as_unit(name, 1.0)
     with pytest.raises(InvalidInput, match="one of m, cm, mm; the length L of the arm is not"):
         as_unit("L")
+    with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
+        export.export_mesh((np.eye(3), [[0, 1, 2]]), "a.stl", unit="L")
 
 
 # What is typed
@@ -170,11 +172,6 @@ def test_the_command_line_writes_meters_unless_asked_and_says_so(
     assert (streams.out, streams.err) == ("arm.stl\n", f"arm.stl: lengths in {unit}\n")
     top = trimesh.load("arm.stl").bounds[1, 2]
     assert top == pytest.approx(size * float(shape.position[:, 2].max()), rel=0.1)
-
-
-def test_a_mesh_alone_has_no_l(tmp_path):
-    with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
-        export.export_mesh((np.eye(3), [[0, 1, 2]]), tmp_path / "a.stl", unit="L")
 
 
 # What is drawn

@@ -294,7 +294,9 @@ def test_a_durable_file_is_synced_before_it_counts(atlas_files, tmp_path, monkey
 # What softreach did not write
 
 
-def test_stores_of_other_programs_are_refused(cloud, tmp_path):
+def test_stores_of_other_programs_and_of_another_kind_are_refused(
+    cloud, cloud_files, atlas_files, tmp_path
+):
     bare = cloud.drop_vars(["axis", "bundle"])
     bare.to_zarr(tmp_path / "own.zarr", zarr_format=3, consolidated=False)
     bare.to_zarr(tmp_path / "old.zarr", zarr_format=2, consolidated=False)
@@ -303,13 +305,9 @@ def test_stores_of_other_programs_are_refused(cloud, tmp_path):
     for place in sorted(tmp_path.iterdir()):
         for ask in (sr.open_cloud, open_atlas, verify_atlas):
             assert str(place) in str(raised_by(lambda place=place, ask=ask: ask(place)))
-
-
-def test_a_cloud_and_an_atlas_are_not_taken_for_each_other(cloud_files, atlas_files, tmp_path):
-    cloud = written(cloud_files, tmp_path / "cloud.zarr")
-    atlas = written(atlas_files, tmp_path / "atlas.zarr")
+    atlas, other = (written(one, tmp_path / str(len(one))) for one in (atlas_files, cloud_files))
     assert "this is an atlas" in str(raised_by(lambda: sr.open_cloud(atlas)))
-    assert "an atlas written by build_atlas" in str(raised_by(lambda: open_atlas(cloud)))
+    assert "an atlas written by build_atlas" in str(raised_by(lambda: open_atlas(other)))
 
 
 def test_an_atlas_gives_way_to_a_cloud_only_if_one_says_so(cloud, atlas_files, tmp_path):

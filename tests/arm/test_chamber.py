@@ -108,12 +108,6 @@ def test_a_chamber_around_a_tendon_takes_its_tension_away(tension, taper):
     np.testing.assert_allclose(tip, [0, 0, LENGTH], atol=1e-13)
 
 
-def test_the_area_factor_scales_what_a_pressure_does():
-    one, twice = (tables(arm(chamber(area_factor=f)), [0.0]) for f in (1.0, 2.0))
-    np.testing.assert_allclose(twice.extension, 2 * one.extension, rtol=1e-15)
-    np.testing.assert_allclose(twice.curvature, 2 * one.curvature, rtol=1e-15)
-
-
 def test_fibers_that_leave_no_length_of_matter_are_refused_also_where_pressure_lengthens_the_arm():
     fiber = FiberArchitecture(extent=6.0, helical_angle=0.0, activation_bounds=(-5.0, 0.0))
     alone = arm(fiber)

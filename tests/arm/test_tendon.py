@@ -247,12 +247,6 @@ def test_tendons_break_the_arm_where_they_start_end_and_turn():
     np.testing.assert_allclose(arm(one, profile=profile).breakpoints, [0.1, 0.3, 0.5, 0.75])
 
 
-def test_a_tendon_is_measured_in_newtons():
-    one = arm(tendon(name="left"))
-    assert one.bundle_units == ("N",)
-    assert sr.compute_cloud(one, n=8).activation.attrs["units"] == "N"
-
-
 @pytest.mark.parametrize(
     ("fields", "message"),
     [

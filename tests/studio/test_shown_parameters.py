@@ -108,11 +108,6 @@ def test_sliders_end_where_the_design_ends_and_not_before(design):
                     changed(arm, {control.name: beyond * control.scale})
 
 
-def test_the_taper_slider_of_the_trunk_ends_at_its_cone(trunk):
-    limit = np.degrees(np.arctan(trunk.profile.radius(0.0) / trunk.length))
-    assert slider_ends(trunk)["taper"][1] == pytest.approx(limit, abs=0.01)
-
-
 def test_refusals_use_the_words_of_the_panel(trunk):
     """No name of a file, and no symbol that the page does not show."""
     shown = slider_parameters(trunk)
