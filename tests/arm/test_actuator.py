@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from dataclasses import dataclass
@@ -343,9 +342,3 @@ def test_the_command_line_speaks_inputs(tmp_path, capsys):
     inputs = json.loads(capsys.readouterr().out)["inputs"]
     assert inputs[0] == {"name": "x", "unit": "turns", "bounds": [-1.0, 1.0]}
     assert [each["name"] for each in inputs] == ["x", "y", "fiber"]
-
-
-def test_drives_are_plain_values():
-    drive = Drive(name="a", bounds=(0, 1), gains={"t": 1})
-    assert dataclasses.replace(drive) == drive
-    assert hash(drive) == hash(dataclasses.replace(drive))

@@ -367,11 +367,6 @@ def test_an_arm_with_stations_can_be_sent_and_is_a_key():
     assert again.to_toml() == made.to_toml()
 
 
-def test_a_place_in_meters_is_no_name():
-    named = body({"start": "low"}, stations=STATIONS)
-    assert named != body({"start": 0.1}, stations=STATIONS)
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [

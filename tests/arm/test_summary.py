@@ -322,19 +322,6 @@ def test_the_range_of_extension_holds_every_sample(arm):
     assert zeta.max() <= high + 1e-12
 
 
-def test_curvature_grows_as_the_arm_thins():
-    z = np.array([0.0, 1.0])
-    arm = designs.minimal_trunk(taper=math.radians(3))
-    table = tables(arm, z)
-    size = np.linalg.norm(table.curvature[:, :, 2], axis=1)
-    assert size[1] / size[0] == pytest.approx(np.divide(*arm.profile.radius(z)), rel=1e-12)
-
-
-def test_contraction_shortens():
-    table = tables(single(), [0.0])
-    assert table.extension[0, 0] > 0
-
-
 def test_an_arm_that_an_activation_would_shorten_to_nothing_is_refused(trunk):
     with pytest.raises(InvalidDesign, match=r"reaches extension ζ = -0.5\d+; must keep ζ > 0"):
         check_extension(trunk.with_bounds((-9.0, 0.0)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -441,11 +440,6 @@ def test_a_number_with_a_unit_is_applied_and_shown_in_that_of_the_field(page):
 )  # fmt: skip
 def test_units_that_measure_the_same_may_be_typed(text, label, value):
     assert number_kind(unit_in(label), lambda: 0.4).value(text) == value
-
-
-def test_every_unit_of_an_angle_is_the_angle_that_it_says():
-    value = number_kind("deg", lambda: 1.0).value("0.5 rad")
-    assert value == pytest.approx(math.degrees(0.5), rel=1e-14)
 
 
 @pytest.mark.parametrize(
