@@ -155,12 +155,16 @@ BAD_FILES = {
 }
 
 
-def test_a_file_of_no_needs_is_refused_and_the_needs_before_stay(opened):
+def test_files_and_numbers_of_no_needs_are_refused_and_the_needs_before_stay(opened):
     before = opened.state
     for content, words in BAD_FILES.values():
         with pytest.raises(SoftreachError, match=words) as caught:
             panel_of(opened)._read(SimpleNamespace(name="<b>.toml", content=content))
         assert "root" not in str(caught.value)
+        assert opened.state == before
+    for kind, text in (("place to reach", "1, b"), ("box to avoid", ""), ("payload", "-1")):
+        with pytest.raises(SoftreachError, match="three numbers|six numbers|payloads"):
+            added(opened, kind, text)
         assert opened.state == before
 
 

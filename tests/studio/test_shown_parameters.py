@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -433,6 +434,7 @@ def test_a_number_with_a_unit_is_applied_and_shown_in_that_of_the_field(page):
     ("text", "label", "value"),
     [
         ("100g", "payload [g]", 100.0), ("0.1 kg", "payload [g]", 100.0), ("5", "L [mm]", 5.0),
+        ("0.5 rad", "taper φ [deg]", pytest.approx(math.degrees(0.5), rel=1e-14)),
         ("5 cm", "L [mm]", 50.0), ("0.1 L", "L [mm]", 40.0), ("2 deg", "taper φ [deg]", 2.0),
         ("0.5", "ratio", 0.5), ("5 %", "ratio", None), ("1 kg", "L [mm]", None),
         ("m", "L [mm]", None), ("nan m", "L [mm]", None),
