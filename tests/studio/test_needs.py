@@ -163,7 +163,7 @@ def test_files_and_numbers_of_no_needs_are_refused_and_the_needs_before_stay(ope
         assert "root" not in str(caught.value)
         assert opened.state == before
     for kind, text in (("place to reach", "1, b"), ("box to avoid", ""), ("payload", "-1")):
-        with pytest.raises(SoftreachError, match="three numbers|six numbers|payloads"):
+        with pytest.raises(SoftreachError, match=r"three numbers|six numbers|payloads"):
             added(opened, kind, text)
         assert opened.state == before
 
