@@ -17,6 +17,7 @@ import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.arm.summary import describe
 from softreach.cli.app import app, run
+from softreach.cli.changes import Changes
 from softreach.cli.console import console
 
 # Few samples make the α-shape too fine; the command line prints that and goes on.
@@ -98,14 +99,6 @@ def test_importing_and_helping_load_no_heavy_library(code):
     )
     loaded = {name.partition(".")[0] for name in done.stderr.split()}
     assert not HEAVY & loaded
-
-
-def test_the_installed_command_ends_with_the_exit_code():
-    command = [sys.executable, "-m", "softreach", "design", "nowhere.toml"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.startswith("error: ")
 
 
 class TestDesign:
@@ -252,10 +245,6 @@ class TestReach:
         assert "at = 9.0: must be between" in streams.err
         assert [path.name for path in folder.iterdir()] == ["a.ply"]
 
-    def test_a_place_without_slices_is_refused(self, capsys):
-        assert run([*self.ARM, "--at", "0,0,0.1"]) == 2
-        assert "left out without a picture" in capsys.readouterr().err
-
 
 class TestShow:
     @pytest.mark.parametrize(
@@ -316,79 +305,6 @@ helical_angle_deg = 0.0
 """
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["desgin"], 'Did you mean "design"'),
-        (["design"], "must be a design file or a built-in design, or use --schema"),
-        (["design", "nowhere.toml"], "nowhere.toml: must be a file that exists"),
-        (
-            ["design", "elephant"],
-            "elephant: must be a .toml file, or one of elephant_trunk, filament",
-        ),
-        (["design", "minimal_trank"], 'did you mean "minimal_trunk"?'),
-        (
-            ["design", "minimal_trunk", "--set", "left.tension=3"],
-            "commands; their bounds are left.lower and left.upper",
-        ),
-        (["cloud", "minimal_trunk", "--sampler", "unifrom"], 'did you mean "uniform"?'),
-        (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
-        (
-            ["design", "minimal_trunk", "--taper-deg", "steep"],
-            "taper_deg = steep: must be a finite number",
-        ),
-        (["cloud", "minimal_trunk", "--n", "many"], "n = many: must be a whole number"),
-        (["cloud", "minimal_trunk", "--n", "0"], "n = 0: must be a whole number, 1 or more"),
-        (["cloud", "minimal_trunk", "--seed", "-1"], "seed = -1"),
-        (["cloud", "minimal_trunk", "--tol", "0"], "tol = 0"),
-        (
-            ["cloud", "minimal_trunk", "--sampler", "halton"],
-            "one of uniform, boundary, sobol, grid",
-        ),
-        (["cloud", "minimal_trunk", "--sampler", "sobol", "--n", "1000"], "512 or 1024"),
-        (["cloud", "minimal_trunk", "--sampler", "grid", "--n", "999"], "9^3 = 729 or 10^3 = 1000"),
-        (
-            ["volume", "nowhere.zarr"],
-            "nowhere.zarr: must be a Zarr store written by softreach; it does not exist",
-        ),
-        (
-            ["atlas", "status", "nowhere.zarr"],
-            "must be an atlas written by build_atlas; it does not exist",
-        ),
-        (["studio", "nowhere.zarr", "--no-open"], "it does not exist"),
-        (["volume", "minimal_trunk", "--n", "9", "--alpha", "wide"], "alpha = wide"),
-        (["volume", "minimal_trunk", "--n", "9", "--alpha=-1L"], "alpha = -1L"),
-        (["show", "minimal_trunk", "--n", "9", "--color", "pink"], "left, right, longitudinal"),
-        (["show", "minimal_trunk", "--n", "9", "--activation", "1"], "3 comma-separated numbers"),
-        (["show", "minimal_trunk", "--out", "a.doc"], "a.doc: must be a file name ending in .png"),
-        (["show", "minimal_trunk", "--out", "a"], "a: must be a file name ending in .png"),
-        (["export", "minimal_trunk", "arm.doc"], ".ply, .stl, .obj, .glb"),
-        (["export", "minimal_trunk"], "requires an argument"),
-    ],
-)
-def test_wrong_input_is_one_line_and_exit_code_2(arguments, message, folder, capsys):
-    assert run(arguments) == 2
-    streams = capsys.readouterr()
-    assert streams.err.startswith("error: ")
-    assert streams.err.count("\n") == 1
-    assert message in streams.err
-    assert streams.out == ""
-    assert not any(folder.iterdir())
-
-
-def test_a_cloud_in_a_format_for_surfaces_is_refused(stored, folder, capsys):
-    assert run(["export", stored, "cloud.stl"]) == 2
-    assert ".csv, .parquet" in capsys.readouterr().err
-    assert not any(folder.iterdir())
-
-
-def test_a_variation_that_cannot_exist_is_refused_in_degrees(capsys):
-    assert run(["design", "minimal_trunk", "--taper-deg", "10"]) == 2
-    text = capsys.readouterr().err
-    assert "taper_deg = 10" in text
-    assert "3.57633 deg" in text
-
-
 def test_every_fault_of_a_design_file_has_its_line(folder, capsys):
     (folder / "bad.toml").write_text(BAD_DESIGN)
     assert run(["design", "bad.toml"]) == 2
@@ -407,14 +323,6 @@ def test_text_that_is_no_toml_is_refused_with_its_line(folder, capsys):
     (folder / "bad.toml").write_text("length_m = = 1\n")
     assert run(["design", "bad.toml"]) == 2
     assert "at line 1" in capsys.readouterr().err
-
-
-def test_a_place_that_cannot_be_written_is_an_error_of_one_line(folder, capsys):
-    (folder / "file").write_text("")
-    assert run(["cloud", "minimal_trunk", "--n", "10", "--out", "file/cloud.zarr"]) == 2
-    text = capsys.readouterr().err
-    assert text.startswith("error: ")
-    assert text.count("\n") == 1
 
 
 def strict_json(text):
@@ -507,3 +415,217 @@ def test_every_command_calls_its_output_by_one_name():
 
 def _function(name):
     return app[name].default_command or (lambda: None)
+
+
+# Options that change a design, the same on every command that takes one
+
+
+OPTIONS = (
+    "--base",
+    "--payload",
+    "--gravity",
+    "--tip-force",
+    "--set",
+    "--taper-deg",
+    "--revolution-deg",
+)
+TAKE_ONE_DESIGN = ("design", "cloud", "volume", "reach", "solve", "track", "show", "export")
+NUMBERS = ("rings[0].material.young_modulus=1MPa", "rings[0].material.density=1000kg/m3")
+
+
+def saved(folder, *arguments):
+    """The design that `softreach design ... --out` writes."""
+    assert run(["design", *arguments, "--out", "a.toml"]) == 0
+    return sr.Manipulator.load("a.toml")
+
+
+@pytest.mark.parametrize("command", TAKE_ONE_DESIGN)
+def test_every_command_that_takes_a_design_offers_to_change_it(command, capsys):
+    assert run([command, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(f"{option} " in text for option in OPTIONS)
+    assert "in the world, whose +z points up" in " ".join(text.replace("│", "").split())
+
+
+@pytest.mark.parametrize(
+    ("options", "loads"),
+    [
+        (["--payload", "2g"], {"payload": 0.002}),
+        (["--payload", "2e-3 kg", "--gravity", "down"], {"payload": 0.002}),
+        (["--gravity", "upright"], {}),
+        (["--gravity", "up"], {"gravity": (0, 0, 9.81)}),
+        (["--gravity", "hanging"], {"gravity": (0, 0, 9.81)}),
+        (["--gravity", "sideways"], {"gravity": (9.81, 0, 0)}),
+        (["--gravity", "-1.62,0,0.5"], {"gravity": (-1.62, 0, 0.5)}),
+        (["--gravity", "0, 0, -1.62 m/s2"], {"gravity": (0, 0, -1.62)}),
+        (
+            ["--gravity", "none", "--tip-force", "-5,0,2.5mN"],
+            {"gravity": (0, 0, 0), "tip_force": (-0.005, 0, 0.0025)},
+        ),
+        (["--tip-force=0,0,-0.01"], {"tip_force": (0, 0, -0.01)}),
+        (["--set", "loads.payload=2g"], {"payload": 0.002}),
+        (["--set", "loads.payload_kg=0.002"], {"payload": 0.002}),
+        (
+            ["--set", "loads.tip_moment[1]=3N mm", "--payload", "1g"],
+            {"tip_moment": (0, 0.003, 0), "payload": 0.001},
+        ),
+    ],
+)
+def test_loads_are_those_of_the_library(options, loads, folder):
+    expected = sr.designs.lce_arm().replace(loads=sr.Loads(**loads))
+    assert saved(folder, "lce_arm", *options) == expected
+
+
+def test_options_change_the_loads_that_a_design_has(folder):
+    loads = sr.Loads(gravity=(0, 0, 9.81), payload=0.001)
+    sr.designs.lce_arm().replace(loads=loads).save("loaded.toml")
+    made = saved(folder, "loaded.toml", "--payload", "3g")
+    assert made.loads == loads.replace(payload=0.003)
+    bare = saved(folder, "loaded.toml", "--payload", "0g", "--gravity", "none")
+    assert bare == sr.designs.lce_arm()
+
+
+@pytest.mark.parametrize(
+    ("options", "values"),
+    [
+        (["--set", "taper=1deg"], {"taper": math.radians(1)}),
+        (["--set", "taper=0.01rad"], {"taper": 0.01}),
+        (["--set", "taper_deg=1"], {"taper": math.radians(1)}),
+        (
+            ["--set", "length=80cm", "--set", "left.offset_deg=30"],
+            {"length": 0.8, "left.offset": math.radians(30)},
+        ),
+        (
+            ["--set", "left.lower=-2", "--taper-deg", "1"],
+            {"left.lower": -2, "taper": math.radians(1)},
+        ),
+        (["--set", "radius_ratio = 0.5"], {"radius_ratio": 0.5}),
+    ],
+)
+def test_settings_are_parameters_of_the_library(options, values, folder):
+    assert saved(folder, "minimal_trunk", *options) == changed(sr.designs.minimal_trunk(), values)
+
+
+def test_moduli_and_densities_may_come_with_the_loads_that_need_them(folder):
+    settings = [word for text in NUMBERS for word in ("--set", text)]
+    made = saved(folder, "minimal_trunk", "--payload", "200g", *settings)
+    material = made.section.rings[0].material
+    assert (material.young_modulus, material.density) == (1e6, 1000.0)
+    assert made.loads == sr.Loads(payload=0.2)
+
+
+@pytest.mark.parametrize(
+    ("word", "points"),
+    [("hanging", "down"), ("upright", "up"), ("down", "down"), ("x", "x"), ("-y", "-y")],
+)
+def test_the_base_points_the_way_that_is_said(folder, word, points):
+    assert saved(folder, "minimal_trunk", "--base", word).base == sr.Base(points=points)
+
+
+def test_the_place_and_the_turn_of_a_file_stay(folder):
+    base = sr.Base(position=(0, 0, 2), points="x", turn=0.3)
+    sr.designs.minimal_trunk().replace(base=base).save("posed.toml")
+    made = saved(folder, "posed.toml", "--base", "hanging", "--set", "base.turn=0.4rad")
+    assert made.base == base.replace(points="down", turn=0.4)
+
+
+def test_gravity_down_beside_a_hanging_base_pulls_along_the_arm(folder, capsys):
+    made = saved(folder, "lce_arm", "--base", "hanging", "--gravity", "down")
+    assert (made.base.points, made.loads) == ("down", sr.Loads())
+    assert run(["design", "lce_arm", "--base", "hanging", "--gravity", "down", "--json"]) == 0
+    *_, last = capsys.readouterr().out.splitlines()
+    assert json.loads(last)["base"] == "hanging: points down"
+
+
+def test_a_place_below_a_hanging_arm_is_reached(capsys):
+    place = ["minimal_trunk", "--target", "0.2,0.1,-0.6"]
+    assert run(["solve", *place, "--base", "hanging"]) == 0
+    assert "reached" in capsys.readouterr().out.splitlines()[0]
+    assert run(["solve", *place]) == 0
+    assert "unreachable" in capsys.readouterr().out.splitlines()[0]
+
+
+def test_a_loaded_cloud_counts_its_stable_samples(folder, capsys):
+    options = ["--n", "64", "--payload", "2g", "--gravity", "hanging", "--json"]
+    assert run(["cloud", "lce_arm", *options]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["stable"], facts["unstable"], facts["no_equilibrium"]) == (64, 0, 0)
+    assert (facts["payload_kg"], facts["base"]) == (0.002, "hanging")
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(0, 0, 9.81), payload=0.002))
+    assert sr.open_cloud("lce_arm.zarr").identical(sr.compute_cloud(arm, 64))
+
+
+class TestRestInTheSummary:
+    def facts(self, capsys, *arguments):
+        assert run(["design", *arguments, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    def test_a_loaded_arm_has_its_sag_in_l_and_m(self, capsys):
+        arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(9.81, 0, 0), payload=0.001))
+        facts = self.facts(capsys, "lce_arm", "--gravity", "sideways", "--payload", "1g")
+        known = sr.rest.rest(arm)
+        assert facts["sag_at_rest_L"] == known.sag_over_length
+        assert facts["sag_at_rest_m"] == known.sag
+        assert facts["at_rest"] == "stable"
+
+    def test_an_arm_that_cannot_stand_is_said_not_to_be_stable(self, capsys):
+        assert self.facts(capsys, "lce_arm", "--payload", "50g")["at_rest"] == "not stable"
+
+    def test_an_arm_too_heavy_to_be_followed_is_still_described(self, capsys):
+        facts = self.facts(capsys, "lce_arm", "--gravity", "sideways", "--payload", "100kg")
+        assert facts["at_rest"] == "unknown: the loads are too large"
+        assert facts["sag_at_rest_L"] is None
+
+    def test_an_arm_without_loads_is_judged_by_its_own_weight(self, capsys):
+        facts = self.facts(capsys, "lce_arm")
+        held = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(9.81, 0, 0)))
+        assert facts["sag_at_rest_sideways_L"] == sr.rest.rest(held).sag_over_length
+        assert facts["at_rest_upright"] == "stable"
+
+    def test_nothing_is_said_where_moduli_are_not_known(self, capsys):
+        assert not any("rest" in name for name in self.facts(capsys, "minimal_trunk"))
+
+    def test_loads_beyond_the_verified_ones_are_warned_of_once(self, capsys, tmp_path):
+        assert run(["design", "lce_arm", "--payload", "100g"]) == 0
+        assert capsys.readouterr().err.count("load number is") == 1
+        out = ["--out", str(tmp_path / "a.zarr")]
+        assert run(["cloud", "lce_arm", "--payload", "100g", "--n", "8", *out]) == 0
+        assert capsys.readouterr().err.count("load number is above 12") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "lacking"),
+    [
+        (["--payload", "200g"], ("young_modulus", "density")),
+        (["--tip-force", "0,0,1N", "--gravity", "none"], ("young_modulus",)),
+        (["--gravity", "up", "--set", NUMBERS[0]], ("density",)),
+        (["--set", "loads.payload=1g"], ("young_modulus", "density")),
+    ],
+)
+def test_loads_ask_in_one_line_for_what_the_arm_lacks(options, lacking, capsys):
+    assert run(["design", "minimal_trunk", *options]) == 2
+    text = capsys.readouterr().err
+    assert text.count("\n") == 1
+    asked = text.partition("must be on an arm with ")[2].partition(";")[0]
+    assert asked == " and ".join(f"rings[0].material.{name}" for name in lacking)
+    assert all(f"--set rings[0].material.{name}=" in text for name in lacking)
+
+
+def test_no_gravity_on_an_arm_without_loads_changes_nothing(folder):
+    assert saved(folder, "minimal_trunk", "--gravity", "none") == sr.designs.minimal_trunk()
+
+
+def test_every_change_has_an_option(capsys):
+    """No field of the changes is forgotten in what a stored cloud refuses."""
+    every = Changes(
+        base="up",
+        revolution_deg=1.0,
+        taper_deg=1.0,
+        payload="1g",
+        gravity="up",
+        tip_force="0",
+        settings=["a=1"],
+    )
+    assert len(every.given) == len(vars(every))
+    _, bound, *_ = app.parse_args(["design", "x", "--set", "a=1", "--set", "b=2"])
+    assert bound.arguments["changes"].settings == ["a=1", "b=2"]

@@ -41,21 +41,6 @@ def test_activations_are_told_in_their_units(capsys):
     assert capsys.readouterr().out.count(" N") == 3
 
 
-def test_an_activation_that_leaves_no_shape_is_refused(tmp_path, capsys):
-    out = tmp_path / "arm.glb"
-    given = ["export", "three_chamber_arm", str(out), "--activation=-1e9,0,0"]
-    assert run(given) == 2
-    assert (
-        "activation = -1e+09,0,0: must be such that the arm has a shape" in capsys.readouterr().err
-    )
-    assert not out.exists()
-
-
-def test_a_cloud_is_not_exported_at_one_activation(capsys):
-    assert run(["export", "cloud.zarr", "cloud.ply", "--activation=0,0,0"]) == 2
-    assert "activation = 0,0,0: must be left out for a cloud" in capsys.readouterr().err
-
-
 def test_a_family_that_is_smaller_than_asked_says_so(capsys):
     arm = sr.designs.redundant_trunk()
     text = ",".join(f"{x:.17g}" for x in sr.tip_positions(arm, arm.bounds[:, 0])[0])
@@ -95,23 +80,6 @@ def test_a_path_says_that_the_arm_loses_its_stability(tmp_path, capsys, monkeypa
     assert run(["track", "minimal_trunk", str(tmp_path / "path.csv"), "--out", str(out)]) == 0
     assert "1 of 2 points followed, up to 0.25 m of path" in (said := capsys.readouterr().out)
     assert "where the arm loses its stability" in said
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["solve", "minimal_trunk"], "--targets"),
-        (["solve", "minimal_trunk", "--target", "1,2"], "three comma-separated numbers"),
-        (["solve", "minimal_trunk", "--targets", "nowhere.csv"], "must be a file that exists"),
-        (["track", "minimal_trunk", "nowhere.csv"], "must be a file that exists"),
-        (["reach", "minimal_trunk", "--accuracy", "2"], "accuracy = 2.0: must be"),
-    ],
-)
-def test_wrong_input_costs_one_line_and_exit_code_2(arguments, message, capsys):
-    assert run(arguments) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert "Traceback" not in error
 
 
 def test_the_reachable_set_is_reported_drawn_and_written(tmp_path, capsys):

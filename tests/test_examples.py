@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -10,8 +11,10 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from tools.gallery import PAGE, PICTURES, measured, page, rows_of
 
 import softreach
+from softreach.arm import designs
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "examples"
@@ -76,3 +79,39 @@ def test_an_actuator_of_ones_own_and_an_atlas_that_is_interrupted(installed, tmp
     *_, last = (line for line in text.splitlines() if line.startswith("  done"))
     assert last.split() == ["done", "12"]
     assert "best exact_volume of spines.zarr" in text
+
+
+# The gallery shows every named design as it is
+
+
+TEXT = PAGE.read_text(encoding="utf-8")
+ROWS = rows_of(TEXT)
+QUICK = [name for name in designs.__all__ if getattr(designs, name)().bundles == 3]
+
+
+def test_the_page_is_written_by_the_tool_from_all_named_designs():
+    assert list(ROWS) == designs.__all__
+    assert page(ROWS) == TEXT
+
+
+def parsed(text: str) -> tuple[float, float, str]:
+    """Value, error and unit of a number as people write it."""
+    found = re.fullmatch(r"\(?([\d.]+) ± ([\d.]+)\)?(e-\d+)? (.+)", text)
+    assert found
+    power = found[3] or ""
+    return float(found[1] + power), float(found[2] + power), found[4]
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_numbers_on_the_page_are_those_of_the_exact_set(name):
+    for text, again in zip(ROWS[name], measured(name), strict=True):
+        value, error, unit = parsed(text)
+        assert error < 0.01 * value
+        assert parsed(again)[0] == pytest.approx(value, abs=error, rel=1e-6)
+        assert parsed(again)[2] == unit
+
+
+def test_every_design_has_a_small_picture():
+    sizes = {path.stem: path.stat().st_size for path in PICTURES.glob("*.png")}
+    assert sorted(sizes) == sorted(designs.__all__)
+    assert max(sizes.values()) < 150_000

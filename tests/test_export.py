@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -13,7 +11,7 @@ from scipy.io import loadmat
 import softreach as sr
 from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.export.clouds import column_names
-from softreach.support.errors import InvalidInput, MissingExtra
+from softreach.support.errors import InvalidInput
 
 meshio = pytest.importorskip("meshio")
 trimesh = pytest.importorskip("trimesh")
@@ -226,48 +224,3 @@ class TestArm:
         export_arm(arm, bent, tmp_path / "arm.glb")
         names = set(trimesh.load(tmp_path / "arm.glb").geometry)
         assert names == {"body", "body (1)", "right", "longitudinal"}
-
-
-class TestWhole:
-    @pytest.mark.parametrize("stop", [KeyboardInterrupt, OSError])
-    def test_an_interrupted_write_leaves_the_old_file_alone(
-        self, stop, cloud, tmp_path, monkeypatch
-    ):
-        path = tmp_path / "cloud.ply"
-        path.write_text("old")
-
-        def fail(file, *_):
-            file.write(b"half")
-            raise stop
-
-        monkeypatch.setattr("softreach.export.clouds.write_ply_points", fail)
-        with pytest.raises(stop):
-            export_cloud(cloud, path, overwrite=True)
-        assert path.read_text() == "old"
-        assert not left_over(tmp_path, "cloud.ply")
-
-    def test_an_unknown_suffix_names_the_known_ones(self, trunk, cloud, ball, bent, tmp_path):
-        with pytest.raises(InvalidInput, match=r"\.ply, \.csv, \.parquet, \.npz, \.mat"):
-            export_cloud(cloud, tmp_path / "cloud.xls")
-        with pytest.raises(InvalidInput, match=r"\.ply, \.stl, \.obj, \.glb"):
-            export_mesh(ball, tmp_path / "hull")
-        with pytest.raises(InvalidInput, match=r"\.glb"):
-            export_arm(trunk, bent, tmp_path / "arm.step")
-
-    @pytest.mark.parametrize(
-        ("suffix", "library"), [("csv", "pyarrow"), ("vtu", "meshio"), ("parquet", "pyarrow")]
-    )
-    def test_a_missing_library_is_named_with_its_extra(
-        self, suffix, library, cloud, tmp_path, monkeypatch
-    ):
-        real = importlib.import_module
-
-        def refuse(name, *args):
-            if name.split(".")[0] == library:
-                raise ModuleNotFoundError(name=name)
-            return real(name, *args)
-
-        monkeypatch.setattr(importlib, "import_module", refuse)
-        with pytest.raises(MissingExtra, match=rf"{library}.*softreach\[export\]"):
-            export_cloud(cloud, tmp_path / f"cloud.{suffix}")
-        assert not left_over(tmp_path)

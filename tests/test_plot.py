@@ -6,11 +6,29 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.arm import designs
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.redundancy import activation_distance
 from softreach.picture.projection import VIEWS, project
-from softreach.plot import plot_arm, plot_cloud, plot_hull, plot_views, save_figure
+from softreach.plot import (
+    DesignPanel,
+    plot_arm,
+    plot_cloud,
+    plot_cross_section,
+    plot_designs,
+    plot_distance,
+    plot_distance_histograms,
+    plot_hull,
+    plot_redundancy,
+    plot_slab,
+    plot_views,
+    plot_volume_curve,
+    save_figure,
+)
 from softreach.plot.coloring import BundleKey, ScalarKey, color_samples
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import activation_colors, bundle_color
+from tests.test_redundancy import made_up
 
 plt = pytest.importorskip("matplotlib.pyplot")
 
@@ -211,3 +229,139 @@ class TestFigures:
         drawing = (tmp_path / "cloud.svg").read_text()
         assert "x / L</text>" in drawing
         assert drawing.count("<image") == 1
+
+
+# Laws of the pictures of designs: sectors where the bundles are, one scale, curves in L
+
+
+def sectors(ax):
+    from matplotlib.patches import Wedge
+
+    wedges = [patch for patch in ax.patches if isinstance(patch, Wedge)]
+    return [wedge for wedge in wedges if not wedge.get_hatch()]  # not what sectors share
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_sectors_stand_where_the_bundles_are_at_that_station(share):
+    arm = designs.redundant_trunk(length=2.0)
+    ax = plot_cross_section(arm, share * arm.length)
+    angles = np.degrees(arm.outline(share * arm.length).center[0])
+    assert len(sectors(ax)) == arm.bundles
+    for k, wedge in enumerate(sectors(ax)):
+        assert (wedge.theta1 + wedge.theta2) / 2 == pytest.approx(angles[k])
+        assert wedge.theta2 - wedge.theta1 == pytest.approx(48)
+        assert wedge.r == pytest.approx(float(arm.profile.radius(share * arm.length)) / arm.length)
+        assert wedge.width == pytest.approx(0.25 * wedge.r)
+        assert wedge.get_facecolor()[:3] == bundle_color(k)
+
+
+def test_some_bundles_keep_their_colors(trunk):
+    (wedge,) = sectors(plot_cross_section(trunk, bundles=[2]))
+    assert wedge.get_facecolor()[:3] == bundle_color(2)
+
+
+def test_designs_and_their_sections_share_one_scale():
+    panels = [
+        DesignPanel(name, getattr(designs, f"{name}_trunk")()) for name in ("minimal", "redundant")
+    ]
+    figure = plot_designs(panels, stations_over_length=(0.0, 0.5))
+    arms, base, middle = np.array(figure.axes).reshape(3, 2)
+    assert [ax.get_title() for ax in arms] == ["minimal", "redundant"]
+    assert len({(*ax.get_xlim(), *ax.get_ylim()) for ax in arms}) == 1
+    assert len({(*ax.get_xlim(), *ax.get_ylim()) for ax in (*base, *middle)}) == 1
+    assert [len(sectors(ax)) for ax in base] == [3, 4]
+
+
+def test_stations_off_the_arm_are_refused(trunk):
+    with pytest.raises(InvalidInput, match=r"z = 1.5: must be within \[0, 1\] m"):
+        plot_cross_section(trunk, 1.5)
+
+
+def test_volume_curves_are_drawn_in_lengths():
+    ax = plot_volume_curve({"a": [0.8, 1.6]}, [0.1, 0.2], length=2.0, exact=4.0)
+    curve, exact = ax.lines
+    np.testing.assert_allclose(curve.get_xydata(), [[0.05, 0.1], [0.1, 0.2]])
+    np.testing.assert_allclose(exact.get_ydata(), 0.5)
+
+
+def test_volumes_of_other_radii_are_refused():
+    with pytest.raises(InvalidInput, match=r"a = \(3,\): must be volumes of \(2,\) radii"):
+        plot_volume_curve({"a": [1, 2, 3]}, [0.1, 0.2])
+
+
+# Pictures of redundancy: what they show, what they say of it, what they refuse
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    cloud = compute_cloud(designs.redundant_trunk(), n=3000)
+    return cloud, activation_distance(cloud, 1 / 60)
+
+
+def image_colors(ax) -> set[tuple[int, ...]]:
+    rgba = np.asarray(ax.images[0].get_array())
+    return {tuple(int(c) for c in rgb) for rgb in rgba[rgba[..., 3] == 255][:, :3]}
+
+
+def shown_pixels(ax) -> int:
+    return int(np.count_nonzero(np.asarray(ax.images[0].get_array())[..., 3]))
+
+
+def test_a_slice_shows_the_slab_and_states_it(drawn):
+    ax = plot_slab(drawn[0], view="side", thickness=0.1, color=3)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("y / L", "z / L")
+    assert "|x| ≤ 0.05 L" in [text.get_text() for text in ax.texts]
+    whole = plot_slab(drawn[0], view="side", thickness=10.0, size=1.0, key=False)
+    thin = plot_slab(drawn[0], view="side", thickness=0.01, size=1.0, key=False)
+    assert 0 < shown_pixels(thin) < 0.2 * shown_pixels(whole)
+
+
+def test_isolated_points_are_gray_and_never_hide_others(drawn):
+    cloud, distance = drawn
+    colors = image_colors(plot_distance(cloud, distance, key=False))
+    assert (190, 190, 190) in colors
+    # one known point behind an isolated one
+    pair = made_up([[0.0, 0.1, 0.0], [0.0, -0.1, 0.0], [0.5, 0.0, 0.5]])
+    values = distance[:3].copy(data=[1.0, np.nan, 1.0]).assign_coords(sample=[0, 1, 2])
+    assert (190, 190, 190) not in image_colors(plot_distance(pair, values, key=False))
+
+
+def test_histograms_share_their_scale_and_count_every_point(drawn):
+    _, distance = drawn
+    figure = plot_distance_histograms({"some": distance[:500], "all": distance}, bins=20)
+    some, every = figure.axes
+    assert (some.get_title(), every.get_title()) == ("some", "all")
+    assert some.get_xlim() == every.get_xlim()
+    drawn_share = sum(bar.get_height() for bar in every.patches)
+    assert drawn_share == pytest.approx(100 * float(distance.notnull().mean()))
+
+
+def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
+    cloud, distance = drawn
+    small = cloud.assign(tip=cloud.tip.copy(data=0.5 * cloud.tip.values))
+    figure = plot_redundancy({"a": cloud, "b": small}, {"a": distance, "b": 0.5 * distance})
+    panels = np.reshape([ax for ax in figure.axes if ax.images], (2, 4))
+    assert [ax.get_xlabel() for ax in panels[1]] == ["x / L", "x / L", "y / L", "x / L"]
+    assert [ax.get_ylabel() for ax in panels[:, 0]] == ["a\nz / L", "b\nz / L"]
+    for above, below in panels.T:
+        assert above.get_xlim() == below.get_xlim()
+        assert above.get_ylim() == below.get_ylim()
+    left, right = panels[1, 0].get_xlim()
+    assert left < float(cloud.tip[:, 0].min())
+    assert right > float(cloud.tip[:, 0].max())
+    # The scale of D̄ is shared as well: half of the largest is green, not yellow.
+    yellow = [{c for c in image_colors(ax) if c[0] > 150 and c[2] < 100} for ax in panels[:, 3]]
+    assert yellow[0]
+    assert not yellow[1]
+
+
+def test_what_cannot_be_drawn_is_refused(drawn):
+    cloud, distance = drawn
+    with pytest.raises(InvalidInput, match="view = oblique"):
+        plot_slab(cloud, view="oblique")
+    with pytest.raises(InvalidInput, match=r"thickness = -1\.0: must be a finite number > 0 m"):
+        plot_slab(cloud, thickness=-1.0)
+    with pytest.raises(InvalidInput, match="distances = none"):
+        plot_distance_histograms({})
+    with pytest.raises(InvalidInput, match=r"distances = \['b'\]: must be of the clouds"):
+        plot_redundancy({"a": cloud}, {"b": distance})

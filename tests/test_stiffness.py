@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
 from scipy.integrate import quad
 
 import softreach as sr
-from softreach.arm.loads import Loads
+from softreach.arm import Base, Loads, Manipulator, designs
+from softreach.arm.parameters import changed, find_parameters
+from softreach.arm.summary import load_number
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.dexterity import dexterity, solution_measure
+from softreach.inverse import solve_inverse
+from softreach.rest import rest
 from softreach.rod.free import FreeRod
+from softreach.rod.kinematics import tip_jacobian, tip_positions
 from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipStatus
 from softreach.rod.view import free_bundles
 from softreach.stiffness import (
     cloud_compliance,
@@ -17,8 +28,13 @@ from softreach.stiffness import (
     stiffness_along,
     tip_compliance,
 )
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
+from softreach.workspace import reachable_set
+from softreach.workspace.shifts import shifts_along
+from softreach.workspace.tip_derivatives import TipDerivatives
 from tests.bodies import rubber
+from tests.laws import arms
 
 TRUNK = sr.designs.minimal_trunk()
 GAMMA = np.array([[-1.2, -0.3, -0.8], [-0.2, -1.5, 0.0], [0.0, 0.0, -0.4]])
@@ -190,3 +206,293 @@ def test_the_command_line_colors_a_cloud_by_compliance(tmp_path):
     out = tmp_path / "soft.png"
     assert run(["show", "lce_arm", "--n", "500", "--color", "compliance", "--out", str(out)]) == 0
     assert out.stat().st_size > 10_000
+
+
+# Dexterity of clouds
+
+
+def differences(arm, gamma, step=1e-6):
+    """Central differences of the tips, shape (n, 3, m)."""
+    columns = []
+    for j in range(arm.bundles):
+        shift = step * np.eye(arm.bundles)[j]
+        ahead, behind = tip_positions(arm, gamma + shift), tip_positions(arm, gamma - shift)
+        columns.append((ahead - behind) / (2 * step))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk])
+def test_manipulability_is_the_root_of_det_of_j_times_its_transpose(design):
+    arm = design(np.radians(36), np.radians(3))
+    cloud = compute_cloud(arm, n=300)
+    found, slope = dexterity(cloud), differences(arm, cloud.activation.values)
+    gram = slope @ slope.transpose(0, 2, 1)
+    expected = np.sqrt(np.maximum(np.linalg.det(gram), 0))
+    assert np.allclose(found.manipulability, expected, rtol=1e-4, atol=1e-7)
+    well = found.condition.values < 1e3
+    assert np.allclose(found.condition[well], np.linalg.cond(slope[well]), rtol=1e-3)
+
+
+def test_both_orientations_occur_where_the_map_folds():
+    arm = designs.minimal_trunk(np.radians(36), np.radians(3))
+    cloud = compute_cloud(arm, n=2000)
+    found = dexterity(cloud)
+    signs = np.sign(np.linalg.det(differences(arm, cloud.activation.values)))
+    sure = found.manipulability.values > 1e-5
+    assert np.array_equal(found.orientation.values[sure], signs[sure])
+    assert {-1, 1} == set(found.orientation.values)
+
+
+def test_three_bundles_sweep_the_volume_that_manipulability_says(trunk):
+    found = dexterity(compute_cloud(trunk, n=20_000))
+    swept = float(found.manipulability.mean()) * (5 / 3) ** 3
+    assert swept == pytest.approx(0.69, abs=0.02)  # the doubly covered part is negligible
+
+
+def test_fewer_bundles_have_an_area_or_a_length_and_no_orientation(trunk):
+    for kept in (1, 2):
+        arm = trunk.replace(actuators=trunk.actuators[:kept])
+        cloud = compute_cloud(arm, n=50)
+        found, slope = dexterity(cloud), differences(arm, cloud.activation.values)
+        gram = slope.transpose(0, 2, 1) @ slope
+        assert np.allclose(found.manipulability, np.sqrt(np.linalg.det(gram)), rtol=1e-5)
+        assert "orientation" not in found
+
+
+def test_only_a_cloud_has_dexterity(trunk):
+    with pytest.raises(InvalidInput, match="cloud"):
+        dexterity(compute_cloud(trunk, n=10).drop_vars("tip"))
+
+
+def position_slope(arm, gamma):
+    """Tip and ∂r/∂γ of one activation."""
+    tip, twist = tip_positions(arm, [gamma])[0], tip_jacobian(arm, [gamma])[0]
+    return tip, twist[:3] + np.cross(twist[3:], tip[:, None], axis=0)
+
+
+def solution_curve(arm, target, start, step=0.04):
+    """Points every `step` along the curve of activations of one tip through `start`."""
+    curve = [start]
+    for sense in (1, -1):
+        gamma, way = start, sense * np.linalg.svd(position_slope(arm, start)[1])[2][3]
+        while True:
+            ahead = gamma + step * way
+            for _ in range(2):
+                tip, slope = position_slope(arm, ahead)
+                ahead = ahead + np.linalg.pinv(slope) @ (target - tip)
+            if not ((arm.bounds[:, 0] <= ahead) & (ahead <= arm.bounds[:, 1])).all():
+                break
+            new = np.linalg.svd(slope)[2][3]
+            gamma, way = ahead, new * np.sign(new @ way)
+            curve.append(gamma)
+    return np.array(curve)
+
+
+@pytest.mark.large
+def test_with_four_bundles_the_measure_is_the_length_of_the_curve_of_solutions():
+    arm, step = designs.redundant_trunk(), 0.1
+    cloud = compute_cloud(arm, n=1 << 19, sampler="sobol")
+    measure = solution_measure(cloud, cell=0.2).solution_measure
+    for place in ([0.1, -0.3, 0.5], [-0.1, 0.3, 0.7]):  # cells that lie inside
+        found = float(measure.sel(dict(zip("xyz", place, strict=True)), method="nearest"))
+        targets = place + np.random.default_rng(0).uniform(-0.1, 0.1, (80, 3))
+        total = 0.0
+        for solution in solve_inverse(arm, targets, family=6):
+            known = np.full((1, 4), np.inf)
+            for start in solution.activations:
+                if np.linalg.norm(known - start, axis=1).min() > step:
+                    curve = solution_curve(arm, solution.target, start, step)
+                    total += step * len(curve)  # half a step is lost at each end
+                    known = np.vstack([known, curve])
+        # Both are means over the cell, of standard errors about 0.02 and 0.03.
+        assert found == pytest.approx(total / len(targets), rel=0.1)
+
+
+def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
+    cloud = compute_cloud(trunk, n=1 << 17, sampler="sobol")
+    measure = solution_measure(cloud, cell=0.1).solution_measure
+    reached = reachable_set(trunk)
+    centers = np.stack(np.meshgrid(measure.x, measure.y, measure.z, indexing="ij"), -1)
+    depth = reached.distance(centers.reshape(-1, 3)).reshape(measure.shape)
+    inner = measure.values[depth < -0.1]
+    assert len(inner) > 100
+    assert inner.mean() == pytest.approx(1.0, abs=5e-3)
+    assert inner.std() < 0.12  # some 190 samples in each cell
+    total = float(measure.sum()) * 0.1**3
+    assert total == pytest.approx(reached.volume, rel=2e-3)
+
+
+def test_measures_of_many_clouds_scatter_by_their_standard_error(trunk):
+    clouds = [compute_cloud(trunk, n=4096, seed=seed, tol=1e-4) for seed in range(60)]
+    inner = {"x": 0.1, "y": 0.3, "z": 0.5}
+    found = [
+        solution_measure(cloud, cell=0.2).sel(inner, method="nearest").to_array()
+        for cloud in clouds
+    ]
+    values, errors = np.array(found).T
+    assert errors.mean() == pytest.approx(values.std(), rel=0.25)
+
+
+def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
+    for sampler, n in (("boundary", 100), ("grid", 125)):
+        with pytest.raises(InvalidInput, match=f"sampler = {sampler}: must be one of uniform"):
+            solution_measure(compute_cloud(trunk, n=n, sampler=sampler))
+    flat = trunk.replace(actuators=trunk.actuators[:2])
+    with pytest.raises(InvalidInput, match="bundles = 2: must be 3 or more"):
+        solution_measure(compute_cloud(flat, n=100))
+    fixed = trunk.with_bounds(((-1, 0), (-1, 0), (-1, -1)))
+    with pytest.raises(InvalidInput, match="must be lower < upper for every bundle"):
+        solution_measure(compute_cloud(fixed, n=100))
+    with pytest.raises(InvalidInput, match="cell = 0: must be"):
+        solution_measure(compute_cloud(trunk, n=100), cell=0)
+
+
+# Derivatives of tips by parameters of the design: against differences, and in closed form
+
+
+NAMES = ("taper", "outer_radius", "extent", "lower")
+
+
+def derivatives(arm: Manipulator, names: tuple[str, ...], tol: float) -> TipDerivatives:
+    return TipDerivatives(tip_map(arm, tol), list(find_parameters(arm, names).values()))
+
+
+def places(arm: Manipulator, n: int = 40) -> Array:
+    return np.random.default_rng(0).random((n, tip_map(arm).box.dimension))
+
+
+def by_six_neighbors(arm: Manipulator, name: str, cube: Array, tol: float, step: float) -> Array:
+    shifts = shifts_along(arm, find_parameters(arm, (name,))[name], 3, step)
+    rods = [tip_map(each, tol) for each in shifts.arms]
+    tips = [rod.tips(rod.box.from_free_cube(cube)) for rod in rods]
+    return np.tensordot(shifts.weights, tips, 1)
+
+
+@settings(max_examples=5)
+@given(arms())
+def test_two_neighbors_in_equal_steps_tell_what_six_of_finer_steps_tell(arm):
+    free = arm.bounds[:, 1] > arm.bounds[:, 0]
+    names = tuple(find_parameters(arm, NAMES if free.all() else NAMES[:3]))
+    cube, found = places(arm), derivatives(arm, names, 1e-9)
+    for k, (name, value) in enumerate(zip(names, found.at(cube).T, strict=True)):
+        expected = by_six_neighbors(arm, name, cube, 1e-11, 2e-3).T
+        assert np.abs(value - expected).max() < 1e-6 * np.abs(expected).max() + found.error[k]
+
+
+def test_under_loads_they_are_as_good_as_equilibria_are_found():
+    arm = designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81)))
+    cube, found = places(arm, 20), derivatives(arm, ("taper", "upper"), 1e-9)
+    for k, name in enumerate(("taper", "upper")):
+        expected = by_six_neighbors(arm, name, cube, 1e-11, 1e-2)
+        assert found.at(cube)[:, :, k] == pytest.approx(expected, abs=2e-5 * np.abs(expected).max())
+
+
+def test_by_a_bound_the_tip_moves_as_its_activation_does():
+    arm = designs.minimal_trunk()
+    rod, cube = tip_map(arm, 1e-9), places(arm)
+    found = derivatives(arm, ("left.lower", "right.upper"), 1e-9).at(cube)
+    slopes = rod.tips_and_slopes(rod.box.from_free_cube(cube))[1]
+    names = [actuator.name for actuator in arm.actuators]
+    left, right = names.index("left"), names.index("right")
+    expected = [
+        (1 - cube[:, left, None]) * slopes[:, :, left],
+        cube[:, right, None] * slopes[:, :, right],
+    ]
+    assert found == pytest.approx(np.stack(expected, axis=2), abs=1e-7)
+
+
+def test_all_actuators_turned_turn_the_tip_about_the_axis():
+    arm = changed(designs.minimal_trunk(), {"left.offset": 0.3})
+    names = tuple(f"{actuator.name}.offset" for actuator in arm.actuators)
+    rod, cube = tip_map(arm), places(arm)
+    tips = rod.tips(rod.box.from_free_cube(cube))
+    found = derivatives(arm, names, 1e-6).at(cube).sum(axis=2)
+    assert found == pytest.approx(np.cross([0.0, 0.0, 1.0], tips), abs=1e-5)
+
+
+def test_at_the_end_of_a_range_they_are_those_of_the_side_that_exists():
+    arm = designs.minimal_trunk(np.radians(108), 0.0)
+    cube = places(arm)
+    found = derivatives(arm, ("taper",), 1e-9).at(cube)[:, :, 0]
+    expected = by_six_neighbors(arm, "taper", cube, 1e-12, 1e-3)
+    assert found == pytest.approx(expected, rel=1e-4, abs=1e-5)
+
+
+def test_they_turn_with_the_base():
+    arm = designs.minimal_trunk()
+    base = Base(points="down", position=(1.0, 2.0, 3.0))
+    cube = places(arm)
+    found, turned = (
+        derivatives(each, ("taper",), 1e-9).at(cube)[:, :, 0]
+        for each in (arm, arm.replace(base=base))
+    )
+    assert turned == pytest.approx(found @ base.rotation.T, abs=1e-6)
+
+
+# The arm at rest under its loads
+
+
+SIDEWAYS = (9.81, 0.0, 0.0)
+
+
+def cylinder(loads: sr.Loads) -> sr.Manipulator:
+    return rubber(sr.designs.minimal_trunk(taper=0.0), loads)
+
+
+def at_load_number(number: float, direction: tuple[float, float, float]) -> sr.Manipulator:
+    """The cylinder under as much gravity as gives this load number."""
+    x, y, z = direction
+    size = number / load_number(cylinder(sr.Loads(gravity=(1.0, 0.0, 0.0))))
+    return cylinder(sr.Loads(gravity=(size * x, size * y, size * z)))
+
+
+def test_a_light_arm_held_sideways_sags_by_w_l4_over_8_ei():
+    """4 Λ/8 of its length."""
+    found = rest(at_load_number(1e-3, (1, 0, 0)))
+    assert found.status == TipStatus.STABLE
+    assert found.sag_over_length == pytest.approx(4e-3 / 8, rel=1e-3)
+    assert found.sag == found.sag_over_length * sr.designs.minimal_trunk().length
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.97, "STABLE"), (1.03, "UNSTABLE")])
+def test_an_upright_cylinder_at_rest_is_stable_up_to_the_load_of_greenhill(share, status):
+    """Up to a share for the compression by its own weight."""
+    found = rest(at_load_number(share * 7.83734744 / 4, (0, 0, -1)))
+    assert found.status.name == status
+
+
+@pytest.mark.parametrize("number", [2.2, 4.0, 8.0, 11.2, 11.9])
+def test_no_cylinder_stands_that_is_heavier(number):
+    """Two losses of stability close to each other do not make it stable again."""
+    assert rest(at_load_number(number, (0, 0, -1))).status == TipStatus.UNSTABLE
+
+
+def test_it_is_where_the_tip_map_puts_the_tip_without_activation():
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=SIDEWAYS, payload=0.002))
+    found = rest(arm)
+    np.testing.assert_array_equal(found.activation, 0.0)
+    np.testing.assert_allclose(
+        found.tip, tip_map(arm).tips(np.zeros((1, arm.bundles)))[0], atol=2e-6 * arm.length
+    )
+    free = np.array([0.0, 0.0, arm.length])
+    assert found.sag == pytest.approx(math.dist(found.tip, free), rel=1e-9)
+
+
+def test_where_zero_is_out_of_bounds_the_nearest_activation_is_rest():
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads())
+    bounds = arm.bounds.copy()
+    bounds[0] = -3.0, -1.0
+    found = rest(arm.with_bounds(bounds))
+    np.testing.assert_array_equal(found.activation, [-1.0, 0.0, 0.0])
+    assert found.status == TipStatus.STABLE
+
+
+def test_an_arm_without_loads_is_refused(trunk):
+    with pytest.raises(sr.InvalidInput, match="loads = None: must be given"):
+        rest(trunk)
+
+
+def test_a_tip_map_beyond_the_verified_loads_warns_and_one_within_does_not():
+    with pytest.warns(SoftreachWarning, match="load number is above 12"):
+        tip_map(at_load_number(12.5, (0, 0, 1)))
+    tip_map(at_load_number(11.9, (0, 0, 1)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 
 import numpy as np
@@ -16,6 +17,7 @@ from softreach.arm.scale import scale_warnings
 from softreach.arm.summary import design_warnings
 from softreach.cli.app import run
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
+from softreach.support.quantity import quantity, read_quantity, unit_names
 from softreach.support.units import UNITS, as_unit, lengths_in, read_length
 
 
@@ -68,7 +70,7 @@ def test_areas_and_volumes_have_units_of_their_own(name, lengths, areas, volumes
     assert unit.label("V", 3) == f"V [{volumes}]"
 
 
-def test_a_value_ends_with_the_first_digit_of_its_error():
+def test_a_value_in_a_unit_ends_with_the_first_digit_of_its_error():
     assert as_unit("mm").text(6.322431e-4, 3, 2.4e-7) == "632.2 ± 0.2 mL"
     assert as_unit("L", 2.0).text(0.25) == "0.125 L"
 
@@ -79,6 +81,8 @@ def test_other_units_are_refused_and_l_without_an_arm():
             as_unit(name, 1.0)
     with pytest.raises(InvalidInput, match="one of m, cm, mm; the length L of the arm is not"):
         as_unit("L")
+    with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
+        export.export_mesh((np.eye(3), [[0, 1, 2]]), "a.stl", unit="L")
 
 
 # What is typed
@@ -126,11 +130,6 @@ def test_a_file_says_its_unit_in_its_header(header, folder, printed):
     assert one["target_m"] == [0.03, 0.02, 0.06]
 
 
-@pytest.mark.parametrize("alpha", ["40cm", "400mm", "0.4", "0.4m", "0.4L"])
-def test_a_radius_is_the_same_in_any_unit(alpha, printed):
-    assert printed("volume", "minimal_trunk", "--n", "3000", "--alpha", alpha)["alpha_m"] == 0.4
-
-
 # What is written
 
 
@@ -173,11 +172,6 @@ def test_the_command_line_writes_meters_unless_asked_and_says_so(
     assert (streams.out, streams.err) == ("arm.stl\n", f"arm.stl: lengths in {unit}\n")
     top = trimesh.load("arm.stl").bounds[1, 2]
     assert top == pytest.approx(size * float(shape.position[:, 2].max()), rel=0.1)
-
-
-def test_a_mesh_alone_has_no_l(tmp_path):
-    with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
-        export.export_mesh((np.eye(3), [[0, 1, 2]]), tmp_path / "a.stl", unit="L")
 
 
 # What is drawn
@@ -230,29 +224,6 @@ def test_pictures_in_different_units_do_not_share_axes(cloud, lce, shape):
 
 
 # Commands and files of designs
-
-
-def test_a_unit_that_does_not_exist_costs_one_line(folder, capsys):
-    for command in ("design", "reach", "cloud", "volume", "payload", "equilibria", "show", "demo"):
-        words = [command, "lce_arm"][: 1 if command == "demo" else 2]
-        assert run([*words, "--unit", "ft"]) == 2
-        streams = capsys.readouterr()
-        assert streams.err == "error: unit = 'ft': must be one of m, cm, mm, L\n"
-        assert streams.out == ""
-    assert not list(folder.iterdir())
-
-
-def test_mixed_or_unknown_units_of_targets_cost_one_line(folder, capsys):
-    (folder / "places.csv").write_text("x [inch],y [inch],z [inch]\n1,2,3\n")
-    for words, said in {
-        ("--target", "80mm,50mm,-240"): "target = 80mm,50mm,-240: must be three comma-separated",
-        ("--target", "0,0,5inch"): "or each with its unit (m, cm, mm, um, µm, L)",
-        ("--targets", "places.csv"): "error: places.csv, header = x [inch]",
-    }.items():
-        assert run(["solve", "lce_arm", *words]) == 2
-        error = capsys.readouterr().err
-        assert said in error
-        assert error.count("\n") == 1
 
 
 def test_numbers_for_machines_do_not_depend_on_the_unit(lce, printed):
@@ -364,3 +335,74 @@ def test_what_weighs_as_a_mountain_is_told_its_mass(lce):
         r"90 m long and weighs \d\.\d\de\+0\d kg",
         design_warnings(sr.Manipulator.from_toml(text))[0],
     )
+
+
+# Numbers as they are printed: no digit that the error makes worthless
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.691642, 2.3e-5, "0.69164 ± 0.00002 m³"),
+        (31.158, 0.0123, "31.16 ± 0.01 m³"),
+        (1234.5, 20.0, "1234 ± 20 m³"),
+        (5.5332e-6, 1e-10, "(5.5332 ± 0.0001)e-6 m³"),
+        (0.0, 2e-4, "(0 ± 2)e-4 m³"),
+        (0.5, 0.0, "0.5 m³"),
+        (0.5, math.nan, "0.5 m³"),
+        (math.nan, 0.1, "nan m³"),
+    ],
+)
+def test_a_value_ends_with_the_first_digit_of_its_error(value, error, text):
+    assert quantity(value, "m³", error) == text
+
+
+@given(value=st.floats(1e-12, 1e12), share=st.floats(1e-9, 1.0))
+def test_what_is_printed_is_off_by_less_than_the_error(value, share):
+    text = quantity(value, error=share * value)
+    mantissa, error, power = re.fullmatch(r"\(?([\d.]+) ± ([\d.]+)(?:\)e(-\d+))?", text).groups()
+    scale = 10.0 ** int(power or 0)
+    assert abs(float(mantissa) * scale - value) <= 0.51 * share * value
+    assert float(error) * scale == pytest.approx(share * value, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("200g", "kg", 0.2),
+        ("0.2 kg", "kg", 0.2),
+        ("250mg", "kg", 250e-6),
+        ("+2e-1kg", "kg", 0.2),
+        ("-3 mN", "N", -0.003),
+        ("5cm", "m", 0.05),
+        (".5mm", "m", 0.0005),
+        ("1.4 MPa", "Pa", 1.4e6),
+        ("2bar", "Pa", 2e5),
+        ("1.07g/cm3", "kg/m³", 1070.0),
+        ("-9.81m/s²", "m/s²", -9.81),
+        ("2 N m", "N m", 2.0),
+        ("2Nmm", "N m", 0.002),
+        ("90deg", "rad", math.pi / 2),
+        ("90°", "rad", math.pi / 2),
+        ("0.5rad", "rad", 0.5),
+        ("0.5", "1", 0.5),
+        ("3K", "K", 3.0),
+    ],
+)
+def test_a_number_with_a_unit_is_read_to_the_last_bit(text, unit, value):
+    assert read_quantity(text, unit) == value
+
+
+@pytest.mark.parametrize("unit", ["kg", "m", "N", "N m", "N/m", "Pa", "kg/m³", "m/s²", "rad"])
+@pytest.mark.parametrize(
+    "text",
+    ["", "g", "5", "5 stone", "nan{}", "inf{}", "1e999{}", "5{} {}", "1,5{}", "1_0{}", "0x1{}"],
+)
+def test_what_is_no_finite_number_with_a_unit_of_its_kind_is_refused(text, unit):
+    with pytest.raises(ValueError, match=r"^"):
+        read_quantity(text.format(*[unit_names(unit)[0]] * 2), unit)
+
+
+@given(value=st.floats(-1e200, 1e200))
+def test_a_number_in_its_si_unit_is_read_as_it_was_written(value):
+    assert read_quantity(f"{value!r}kg", "kg") == value

@@ -102,16 +102,12 @@ def assert_named(error: object, name: str, place: Path) -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_damage_of_any_file_of_a_cloud_is_named(cloud_files, tmp_path, way):
-    for number, (name, content) in enumerate(cloud_files.items()):
-        place = written(cloud_files, tmp_path / f"{number}.zarr", name, WAYS[way](content))
-        assert_named(raised_by(lambda at=place: sr.open_cloud(at)), name, place)
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_damage_of_any_file_of_an_atlas_is_named_and_mended_by_the_same_command(
-    atlas_files, tmp_path, way
+def test_damage_of_any_file_is_named_and_mended_by_the_command_that_built_the_atlas(
+    cloud_files, atlas_files, tmp_path, way
 ):
+    for number, (name, content) in enumerate(cloud_files.items()):
+        place = written(cloud_files, tmp_path / f"cloud{number}.zarr", name, WAYS[way](content))
+        assert_named(raised_by(lambda at=place: sr.open_cloud(at)), name, place)
     for number, (name, content) in enumerate(atlas_files.items()):
         place = written(atlas_files, tmp_path / f"{number}.zarr", name, WAYS[way](content))
         array, chunk = name.split("/")[0], Chunk.of_key(name)
@@ -224,9 +220,8 @@ def test_damaged_designs_are_left_out_with_a_warning(atlas_files, tmp_path):
     assert atlas.status.values.tolist() == [[5, 1], [3, 1]]
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_damaged_tips_are_noticed_when_they_are_read(atlas_files, tmp_path, way):
-    place = written(atlas_files, tmp_path / "a.zarr", TIP, WAYS[way](atlas_files[TIP]))
+def test_damaged_tips_are_noticed_when_they_are_read(atlas_files, tmp_path):
+    place = written(atlas_files, tmp_path / "a.zarr", TIP, flipped(atlas_files[TIP]))
     atlas = open_atlas(place)
     at = {name: float(atlas[name][0]) for name in ("taper", "outer_radius")}
     for ask in (lambda: atlas_cloud(atlas, **at), lambda: atlas.tip.isel(taper=0).load()):
@@ -299,7 +294,9 @@ def test_a_durable_file_is_synced_before_it_counts(atlas_files, tmp_path, monkey
 # What softreach did not write
 
 
-def test_stores_of_other_programs_are_refused(cloud, tmp_path):
+def test_stores_of_other_programs_and_of_another_kind_are_refused(
+    cloud, cloud_files, atlas_files, tmp_path
+):
     bare = cloud.drop_vars(["axis", "bundle"])
     bare.to_zarr(tmp_path / "own.zarr", zarr_format=3, consolidated=False)
     bare.to_zarr(tmp_path / "old.zarr", zarr_format=2, consolidated=False)
@@ -308,13 +305,9 @@ def test_stores_of_other_programs_are_refused(cloud, tmp_path):
     for place in sorted(tmp_path.iterdir()):
         for ask in (sr.open_cloud, open_atlas, verify_atlas):
             assert str(place) in str(raised_by(lambda place=place, ask=ask: ask(place)))
-
-
-def test_a_cloud_and_an_atlas_are_not_taken_for_each_other(cloud_files, atlas_files, tmp_path):
-    cloud = written(cloud_files, tmp_path / "cloud.zarr")
-    atlas = written(atlas_files, tmp_path / "atlas.zarr")
+    atlas, other = (written(one, tmp_path / str(len(one))) for one in (atlas_files, cloud_files))
     assert "this is an atlas" in str(raised_by(lambda: sr.open_cloud(atlas)))
-    assert "an atlas written by build_atlas" in str(raised_by(lambda: open_atlas(cloud)))
+    assert "an atlas written by build_atlas" in str(raised_by(lambda: open_atlas(other)))
 
 
 def test_an_atlas_gives_way_to_a_cloud_only_if_one_says_so(cloud, atlas_files, tmp_path):
@@ -336,29 +329,17 @@ CHANGES: dict[str, Callable[[xr.Dataset], object]] = {
     "another status": lambda cloud: schema.with_status(cloud, np.full(64, 9, np.int8)),
     "complex numbers beside": lambda cloud: cloud.assign(more=("sample", np.ones(64, complex))),
     "no dataset": lambda cloud: cloud.to_dict(),
-    "nothing": lambda _: None,
     "another length": lambda cloud: cloud.assign(tip=cloud.tip.assign_attrs(length=2.0)),
-    **{
-        f"{part} as {kind}": lambda cloud, part=part, kind=kind: cloud.assign(
-            {part: cloud[part].astype(kind)}
-        )
-        for part in ("tip", "activation", "status")
-        for kind in ("complex128", "datetime64[s]", "int64", "float32", "U4", "object")
-    },
-    **{
-        f"{name} = {value!r}"[:40]: lambda cloud, name=name, value=value: cloud.assign_attrs(
-            {name: value}
-        )
-        for name, values in {
-            "design": (None, "[[[", 7, sr.designs.lce_arm().to_toml()),
-            "schema_version": (None, 1, "two"),
-            "softreach_version": (None, [1]),
-            "sampler": (None, True),
-            "seed": ("zero", 0.5),
-            "tol": (None, "small", -1.0, float("nan")),
-        }.items()
-        for value in values
-    },
+    "complex tips": lambda cloud: cloud.assign(tip=cloud.tip.astype(complex)),
+    "activations of texts": lambda cloud: cloud.assign(activation=cloud.activation.astype("U4")),
+    "a status of floats": lambda cloud: cloud.assign(status=cloud.status.astype(np.float32)),
+    "no design": lambda cloud: cloud.assign_attrs(design=None),
+    "another design": lambda cloud: cloud.assign_attrs(design=sr.designs.lce_arm().to_toml()),
+    "another schema": lambda cloud: cloud.assign_attrs(schema_version=1),
+    "no version": lambda cloud: cloud.assign_attrs(softreach_version=None),
+    "a sampler that is none": lambda cloud: cloud.assign_attrs(sampler=True),
+    "a seed of a half": lambda cloud: cloud.assign_attrs(seed=0.5),
+    "a tolerance of NaN": lambda cloud: cloud.assign_attrs(tol=float("nan")),
 }
 
 
@@ -368,28 +349,11 @@ def test_no_cloud_that_cannot_be_opened_is_saved(cloud, tmp_path, change):
     assert list(tmp_path.iterdir()) == []
 
 
-SETTINGS = {
-    "n": ["many", 0, 2.5, None],
-    "seed": ["zero", 0.5, None],
-    "sampler": [7, "none", None],
-    "tol": ["small", None],
-    "keep_clouds": ["yes", None],
-    "metrics": [None, 7, [7], [{}], ["extent"]],
-    "space": [None, 7, {}, {"design": 7}],
-    "stations": [None, 7],
-    "quantiles": [None, 7],
-    "atlas_version": [None, 1],
-}
-
-
-@pytest.mark.parametrize("name", SETTINGS)
-def test_a_command_with_other_settings_is_refused(atlas_files, name):
-    text = json.loads(atlas_files["zarr.json"])["attributes"]["command"]
-    texts = ["{", "[]", "{}", "7"]
-    for value in SETTINGS[name]:
-        settings = json.loads(text) | {name: value}
-        if value is None:
-            del settings[name]
-        texts.append(json.dumps(settings))
-    for other in texts:
-        raised_by(lambda other=other: Command.from_json(other))
+def test_a_command_with_other_settings_is_refused(atlas_files):
+    settings = json.loads(json.loads(atlas_files["zarr.json"])["attributes"]["command"])
+    other = {"n": 2.5, "seed": "zero", "sampler": "none", "tol": "small", "keep_clouds": "yes"}
+    other |= {"metrics": [{}], "space": {"design": 7}, "stations": 7, "quantiles": 7}
+    changed = [settings | {name: value} for name, value in (other | {"atlas_version": 1}).items()]
+    lacking = [{key: settings[key] for key in settings if key != name} for name in other]
+    for text in ("{", "[]", "{}", "7", *map(json.dumps, changed + lacking)):
+        raised_by(lambda text=text: Command.from_json(text))

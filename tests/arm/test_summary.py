@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import cmath
+import itertools
 import math
 
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
 
 import softreach as sr
 import softreach.arm.tables
@@ -21,9 +25,17 @@ from softreach.arm import (
     Tendon,
     designs,
 )
+from softreach.arm.actuators.ring_integrals import ring_integrals
+from softreach.arm.bending import (
+    bending_at,
+    largest_bending,
+    sharpest_bending,
+    smallest_bending,
+)
 from softreach.arm.summary import describe, design_warnings
-from softreach.arm.tables import extension_range, tables
-from tests.laws import arm_of, arms, single
+from softreach.arm.tables import check_extension, extension_range, tables
+from softreach.support.errors import InvalidDesign
+from tests.laws import arm_of, arms, in_box, single
 
 
 def test_the_helical_bundles_of_the_trunk_meet_the_longitudinal_one_at_the_tip(trunk):
@@ -166,3 +178,271 @@ def test_the_summary_of_twice_as_many_bundles_costs_twice_as_much(trunk, monkeyp
 
     ten, twenty, forty = map(calls, (10, 20, 40))
     assert forty - twenty == 2 * (twenty - ten)
+
+
+# Laws of the range of bending: zonogons against all corners, their extremes along the arm
+
+
+def at_corners(arm, stations):
+    """Bending at every corner of the box, shape (station, corner)."""
+    corners = np.array(list(itertools.product(*arm.bounds)))
+    plane = tables(arm, stations).curvature[:, :2]
+    return np.linalg.norm(np.einsum("scb,nb->snc", plane, corners), axis=-1)
+
+
+def least(arm, stations):
+    """Least bending by bounded least squares, for bundles that are free."""
+    plane = tables(arm, stations).curvature[:, :2]
+    bounds, active = tuple(arm.bounds.T), {"method": "bvls", "tol": 1e-15, "max_iter": 100}
+    solved = [lsq_linear(u, [0.0, 0.0], bounds, **active) for u in plane]
+    return np.array([np.linalg.norm(one.fun) for one in solved])
+
+
+@given(arm=arms())
+def test_the_largest_bending_is_that_of_the_farthest_corner(arm):
+    z = np.linspace(0, arm.length, 5)
+    found = bending_at(arm, z)[1]
+    np.testing.assert_allclose(found, at_corners(arm, z).max(axis=1), rtol=1e-12, atol=1e-14)
+
+
+@given(arm=arms(), low=st.floats(-0.8, 0.2), width=st.floats(0.01, 0.5))
+def test_the_least_bending_is_that_of_bounded_least_squares(arm, low, width):
+    arm = arm.with_bounds((low, low + width))
+    z = np.linspace(0, arm.length, 5)
+    found = bending_at(arm, z)[0]
+    np.testing.assert_allclose(found, least(arm, z), rtol=1e-6, atol=1e-6 / arm.length)
+
+
+def test_held_bundles_and_bundles_side_by_side_bend_as_one_corner_says():
+    held = designs.minimal_trunk().with_bounds((-0.4, -0.4))
+    line = single(activation_bounds=(-0.6, -0.2))
+    opposite = arm_of(
+        *(sr.FiberArchitecture(helical_angle=0.0, offset=k, extent=0.5) for k in (0.0, math.pi)),
+        activation_bounds=(-0.6, -0.2),
+    )
+    z = np.linspace(0, 1, 5)
+    for arm in (held, line):
+        corners = at_corners(arm, z)
+        low, high = bending_at(arm, z)
+        np.testing.assert_allclose(low, corners.min(axis=1), rtol=1e-12)
+        np.testing.assert_allclose(high, corners.max(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(bending_at(opposite, z)[0], 0.0, atol=1e-12)
+
+
+def wound(turns: float, **changes: object) -> sr.Manipulator:
+    """A fiber that winds beside a straight one."""
+    fibers = (
+        sr.FiberArchitecture(revolution=2 * math.pi * turns, offset=0.3, extent=0.6),
+        sr.FiberArchitecture(helical_angle=0.0, offset=2.0, extent=0.5),
+    )
+    return arm_of(*fibers, **({"activation_bounds": (-0.7, -0.1)} | changes))
+
+
+@pytest.mark.parametrize("turns", [0.1, 0.7, 3.0, 40.0])
+@pytest.mark.parametrize("taper", [0.0, 0.03, -0.02])
+def test_no_station_bends_more_or_less_than_the_extremes(turns, taper):
+    arm = wound(turns, taper=taper)
+    z = np.linspace(0, 1, 60_001)
+    low, high = bending_at(arm, z)
+    assert largest_bending(arm).value == pytest.approx(high.max(), rel=3e-6)
+    assert largest_bending(arm).value >= high.max() * (1 - 1e-9)
+    assert smallest_bending(arm).value == pytest.approx(low.min(), abs=2e-3 * high.max())
+    assert smallest_bending(arm).value <= low.min() * (1 + 1e-9)
+    assert sharpest_bending(arm).value >= (high * arm.profile.radius(z)).max() * (1 - 1e-9)
+
+
+def test_extremes_are_reached_where_they_are_said_to_be():
+    arm = wound(1.7, taper=0.01)
+    largest, smallest, sharpest = largest_bending(arm), smallest_bending(arm), sharpest_bending(arm)
+    assert bending_at(arm, largest.station)[1] == pytest.approx(largest.value, rel=1e-9)
+    assert bending_at(arm, smallest.station)[0] == pytest.approx(
+        smallest.value, abs=1e-9 * largest.value
+    )
+    relative = bending_at(arm, sharpest.station)[1] * arm.profile.radius(sharpest.station)
+    assert relative == pytest.approx(sharpest.value, rel=1e-9)
+
+
+def test_an_arm_that_bends_alike_everywhere_does_so_from_its_base_on():
+    arm = single(activation_bounds=(-0.6, -0.2))
+    assert largest_bending(arm).station == sharpest_bending(arm).station == 0.0
+    assert smallest_bending(arm).value == pytest.approx(largest_bending(arm).value / 3, rel=1e-12)
+
+
+def test_an_arm_that_is_straight_at_one_station_only_bends_nowhere_less():
+    arm = wound(40.0)
+    assert smallest_bending(arm).value == 0.0
+    assert bending_at(arm, smallest_bending(arm).station)[0] < 1e-9 * largest_bending(arm).value
+
+
+def test_an_arm_that_can_rest_can_be_straight(trunk):
+    assert smallest_bending(trunk) == (0.0, 0.0)
+
+
+# Laws of the tables: the paper's equations of extension and curvature, and their ranges
+
+
+@given(arm=arms())
+def test_the_map_is_the_papers_equations_of_extension_and_curvature(arm):
+    """Section 2: a0, a1, b1 summed over bundles, with δ from the integrals."""
+    z = np.linspace(0, arm.length, 5)
+    gamma = in_box(arm, 1)[0]
+    table = tables(arm, z)
+    radius, ring = arm.profile.radius(z), arm.section.rings[0]
+    nu = ring.material.poisson_ratio
+    zeta, u = np.ones(5), np.zeros((5, 3))
+    bundle = iter(gamma)
+    for fiber in arm.fibers:
+        alpha = fiber.helical_angle_on(arm.profile, arm.section)
+        i0, i1, i3 = ring_integrals(ring.inner_ratio, arm.profile.taper, alpha, nu)
+        d0, d1, d3 = 4 * radius**2 * i0, 6 * radius**3 * i1, 6 * radius**3 * i3
+        turn = math.tan(alpha) * arm.profile.surface_coordinate(z)
+        for j in range(fiber.bundles):
+            g = next(bundle)
+            theta = fiber.offset + 2 * math.pi * j / fiber.bundles
+            a0 = fiber.extent / math.pi * g
+            chord = 2 * math.sin(fiber.extent / 2) / math.pi * g
+            a1, b1 = chord * math.cos(theta), chord * math.sin(theta)
+            size, phase = np.hypot(a1, b1), -np.arctan2(b1, a1)
+            zeta += d0 * a0 / (4 * radius**2)
+            u[:, 0] += -2 / (3 * radius**4) * d1 * size * np.sin(phase - turn)
+            u[:, 1] += -2 / (3 * radius**4) * d1 * size * np.cos(phase - turn)
+            u[:, 2] += 2 * (1 + nu) / (3 * radius**4) * d3 * a0
+    np.testing.assert_allclose(1 + table.extension @ gamma, zeta, rtol=1e-12)
+    np.testing.assert_allclose(table.curvature @ gamma, u, rtol=1e-9, atol=1e-11 / arm.length)
+
+
+@given(arm=arms())
+def test_the_range_of_extension_holds_every_sample(arm):
+    corners = np.array(list(itertools.islice(itertools.product(*arm.bounds), 1024)))
+    gamma = np.concatenate([in_box(arm, 200), corners])
+    table = tables(arm, np.linspace(0.0, arm.length, 101))
+    zeta = 1 + gamma @ table.extension.T
+    low, high = extension_range(arm)
+    assert low - 1e-12 <= zeta.min()
+    assert zeta.max() <= high + 1e-12
+
+
+def test_an_arm_that_an_activation_would_shorten_to_nothing_is_refused(trunk):
+    with pytest.raises(InvalidDesign, match=r"reaches extension ζ = -0.5\d+; must keep ζ > 0"):
+        check_extension(trunk.with_bounds((-9.0, 0.0)))
+    with pytest.raises(InvalidDesign, match="extension"):
+        check_extension(trunk.split("longitudinal", 98))
+
+
+@given(arm=arms())
+def test_stations_do_not_see_each_other(arm):
+    z = np.linspace(0, arm.length, 5)
+    whole, alone = tables(arm, z), tables(arm, z[3])
+    np.testing.assert_array_equal(whole.extension[3], alone.extension[0])
+    np.testing.assert_array_equal(whole.curvature[3], alone.curvature[0])
+
+
+# Laws of the ring integrals: the closed forms of Appendix A, their limits, symmetries
+
+
+def closed_forms(rho, phi, alpha, nu):
+    """δ0, δ1, δ3 of Appendix A at R2 = 1, δ3 without its misprint (the 3 multiplies T alone)."""
+    cp, ca = math.tan(phi), math.tan(alpha)
+    square = cp**2 - ca**2
+    ratio = (1 + rho**2 * cp**2) * (1 + ca**2) / ((1 + cp**2) * (1 + rho**2 * ca**2))
+    d0 = 2 * (rho**2 - 1) * nu - 2 * (1 + nu) / square * math.log(ratio)
+    tans = (math.atan(rho * cp) - math.atan(cp)) * ca
+    rest = 3 * (1 + nu) * (math.atan(rho * ca) - math.atan(ca)) + (rho**3 - 1) * nu * ca**3
+    d1 = 2 / (cp * ca * square) * (3 * (1 + nu) * tans + (rho**3 - 1) * nu * cp**3 * ca - cp * rest)
+
+    def s(r):
+        return cmath.sqrt(square * (1 + cp**2 * r**2))
+
+    def t(r):
+        return cmath.atan((ca + 1j * cp**2 * r) / s(r))
+
+    bracket = 3 * cp**2 * (t(-rho) + t(rho) - t(-1) - t(1)) + 6 * ca * (s(1) - s(rho))
+    d3 = bracket / (cp**2 * ca**2 * cmath.sqrt(square))
+    return d0, d1, d3
+
+
+@given(
+    rho=st.floats(0, 0.95),
+    phi=st.floats(0.02, 0.5),
+    alpha=st.floats(0.6, 1.3),
+    nu=st.floats(0, 0.5),
+)
+def test_the_integrals_are_the_papers_functions(rho, phi, alpha, nu):
+    d0, d1, d3 = closed_forms(rho, phi, alpha, nu)
+    axial, bending, torsion = ring_integrals(rho, phi, alpha, nu)
+    # The printed arctangents may cross their branch cut, which adds to the imaginary part alone.
+    expected = [d0, d1, d3.real]
+    np.testing.assert_allclose(
+        [4 * axial, 6 * bending, 6 * torsion], expected, rtol=1e-9, atol=1e-10
+    )
+
+
+def test_a_longitudinal_fiber_in_a_full_cylinder_has_elementary_integrals():
+    axial, bending, torsion = ring_integrals(0.0, 0.0, 0.0, 0.3)
+    np.testing.assert_allclose([axial, bending, torsion], [1 / 2, 1 / 3, 0], rtol=1e-14)
+
+
+@given(alpha=st.floats(0, 1.4), phi=st.floats(-0.5, 0.5))
+def test_torsion_is_odd_and_the_rest_even_in_the_helical_angle(alpha, phi):
+    plus, minus = (ring_integrals(0.7, phi, sign * alpha, 0.5) for sign in (1, -1))
+    np.testing.assert_array_equal(plus.axial, minus.axial)
+    np.testing.assert_array_equal(plus.bending, minus.bending)
+    np.testing.assert_array_equal(plus.torsion, -minus.torsion)
+
+
+@pytest.mark.parametrize("alpha_deg", [0, 45, 80, 88])
+@pytest.mark.parametrize("rho", [0.01, 0.5, 0.99])
+def test_quadrature_is_converged_to_rounding(rho, alpha_deg):
+    from scipy.integrate import quad
+
+    alpha, phi, nu = math.radians(alpha_deg), 0.1, 0.5
+
+    def k(x):
+        cone, helix = 1 + (x * math.tan(phi)) ** 2, 1 + (x * math.tan(alpha)) ** 2
+        return (1 + nu) / (cone * helix) - nu
+
+    exact = [quad(lambda x, p=p: x**p * k(x), rho, 1, epsabs=1e-14, limit=200)[0] for p in (1, 2)]
+    np.testing.assert_allclose(ring_integrals(rho, phi, alpha, nu)[:2], exact, atol=2e-13)
+
+
+def by_adaptive_quadrature(rho, phi, alpha, nu):
+    """I0, I1, I3 in v = log x, decade by decade: what is near the axis gets as many nodes."""
+    from scipy.integrate import quad
+
+    cp, ca = math.tan(phi), math.tan(alpha)
+
+    def k(x):
+        return 1 / ((1 + (cp * x) ** 2) * (1 + (ca * x) ** 2))
+
+    def t(x):
+        return ca * x / ((1 + (ca * x) ** 2) * math.sqrt(1 + (cp * x) ** 2))
+
+    ends = np.log([max(rho, 1e-17), *(10.0**e for e in range(-16, 0) if 10.0**e > rho), 1.0])
+
+    def over(f):
+        pieces = (
+            quad(lambda v: math.exp(v) * f(math.exp(v)), a, b, epsabs=0, epsrel=1e-13)[0]
+            for a, b in itertools.pairwise(ends)
+        )
+        return math.fsum(pieces)
+
+    axial = (1 + nu) * over(lambda x: x * k(x)) - nu * (1 - rho**2) / 2
+    bending = (1 + nu) * over(lambda x: x**2 * k(x)) - nu * (1 - rho**3) / 3
+    return [axial, bending, over(lambda x: x**2 * t(x))]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.01, 0.049, 0.051, 0.5])
+@pytest.mark.parametrize("nu", [0.0, 0.5])
+@pytest.mark.parametrize("to_circumferential", [0.1, 0.05, 0.01, 1e-3, 1e-6, 1e-8])
+def test_fibers_that_nearly_wind_around_the_axis_keep_all_digits(rho, nu, to_circumferential):
+    alpha = math.pi / 2 - to_circumferential
+    for phi in (0.0, 0.5):
+        found = ring_integrals(rho, phi, alpha, nu)
+        np.testing.assert_allclose(found, by_adaptive_quadrature(rho, phi, alpha, nu), rtol=1e-12)
+
+
+def test_steep_and_shallow_fibers_in_one_array_do_not_see_each_other():
+    alpha = np.array([-1.57, 0.0, 0.4, 1.5, 1.57])
+    together = ring_integrals(0.0, 0.05, alpha, 0.5)
+    alone = [ring_integrals(0.0, 0.05, one, 0.5) for one in alpha]
+    np.testing.assert_array_equal(together, np.transpose(alone))

@@ -2,10 +2,41 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
-from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings, sphere_roots
+from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.geometry.delaunay import Delaunay, delaunay
+from softreach.geometry.hull import convex_hull
+from softreach.geometry.sphere_maps import (
+    icosphere,
+    is_axisymmetric,
+    pole_rings,
+    quartered,
+    sphere_roots,
+)
+from softreach.geometry.surface import unit_scale
+from softreach.kernels.points.bowyer_watson import triangulate
+from softreach.kernels.points.expansions import scratch
+from softreach.kernels.points.predicates import (
+    collinear,
+    insphere,
+    insphere_exact,
+    insphere_filter,
+    orient,
+    orient_exact,
+    orient_filter,
+)
+from softreach.kernels.points.triangulation import FACES, FEW
+from softreach.support.errors import InvalidInput
+from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
+from tests.geometry.exact import exact_insphere, exact_orient, rational
+from tests.oracles import qhull
 
 POLE = np.array([0.0, 0.0, 1.0])
 NOWHERE = np.empty((0, 3))
@@ -98,3 +129,318 @@ def test_rings_are_where_the_meridian_passes_the_pole():
 def test_a_turn_about_the_axis_is_no_symmetry_of_meridians():
     turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
     assert not is_axisymmetric(lambda points: points @ turn, POLE, 1e-3)
+
+
+# Laws of meshes of the sphere
+
+
+def solid_angle(corners):
+    """Signed, of triangles (n, 3, 3) of unit vectors."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    volume = np.einsum("nc,nc->n", a, np.cross(b, c))
+    sides = 1 + (a * b).sum(1) + (b * c).sum(1) + (c * a).sum(1)
+    return 2 * np.arctan2(volume, sides)
+
+
+def test_triangles_cover_the_sphere_once_and_face_outward():
+    for levels in range(4):
+        points, triangles = icosphere(levels)
+        assert triangles.shape == (20 * 4**levels, 3)
+        np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1.0)
+        angles = solid_angle(points[triangles])
+        assert angles.min() > 0
+        np.testing.assert_allclose(angles.sum(), 4 * np.pi)
+
+
+def test_four_parts_cover_what_was_cut():
+    points, triangles = icosphere(1)
+    finer, parts = quartered(points, triangles[:7])
+    np.testing.assert_array_equal(finer[: len(points)], points)
+    whole = solid_angle(points[triangles[:7]]).sum()
+    np.testing.assert_allclose(solid_angle(finer[parts]).sum(), whole)
+
+
+# Every sign equals that of rational arithmetic
+
+
+WORK = scratch()
+
+
+def general(rng: np.random.Generator) -> np.ndarray:
+    return rng.uniform(-1.0, 1.0, (5, 3))
+
+
+def lattice(rng: np.random.Generator) -> np.ndarray:
+    return rng.integers(-3, 4, (5, 3)) / 8.0
+
+
+def rounded(rng: np.random.Generator) -> np.ndarray:
+    return np.round(rng.uniform(-1.0, 1.0, (5, 3)), 1)
+
+
+def almost_coplanar(rng: np.random.Generator) -> np.ndarray:
+    points = rng.uniform(-1.0, 1.0, (5, 3))
+    points[3] = (
+        points[0] + rng.random() * (points[1] - points[0]) + rng.random() * (points[2] - points[0])
+    )
+    return points / 4.0
+
+
+def almost_cospherical(rng: np.random.Generator) -> np.ndarray:
+    x = rng.normal(size=(5, 3))
+    return x / np.linalg.norm(x, axis=1, keepdims=True) / 2.0
+
+
+def almost_equal(rng: np.random.Generator) -> np.ndarray:
+    points = rng.uniform(-1.0, 1.0, (5, 3))
+    points[3:] = points[:2] + 1e-15 * rng.integers(-3, 4, (2, 3))
+    return points
+
+
+def unit_in_the_last_place(rng: np.random.Generator) -> np.ndarray:
+    return 0.5 + rng.integers(-4, 5, (5, 3)) * 2.0**-53
+
+
+def widely_scaled(rng: np.random.Generator) -> np.ndarray:
+    return np.round(rng.uniform(-1, 1, (5, 3)) * 2.0 ** rng.integers(-150, 0, (5, 3)), 60)
+
+
+KINDS = [
+    general,
+    lattice,
+    rounded,
+    almost_coplanar,
+    almost_cospherical,
+    almost_equal,
+    unit_in_the_last_place,
+    widely_scaled,
+]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_signs_equal_those_of_rational_arithmetic(kind, rng):
+    for _ in range(150):
+        points = kind(rng)
+        exact = [rational(p) for p in points]
+        side = exact_orient(*exact[:4])
+        assert orient(points, 0, 1, 2, 3, WORK) == side
+        assert orient_exact(points, 0, 1, 2, 3, WORK) == side
+        inside = exact_insphere(*exact)
+        assert insphere(points, 0, 1, 2, 3, 4, WORK) == inside
+        assert insphere_exact(points, 0, 1, 2, 3, 4, WORK) == inside
+
+
+grid_points = arrays(np.float64, (5, 3), elements=st.integers(-(2**30), 2**30).map(float))
+
+
+@given(grid_points)
+def test_the_filter_never_contradicts_the_exact_sign(points):
+    points = points * 2.0**-30
+    exact = [rational(p) for p in points]
+    assert orient_filter(points, 0, 1, 2, 3) in (0, exact_orient(*exact[:4]))
+    assert insphere_filter(points, 0, 1, 2, 3, 4) in (0, exact_insphere(*exact))
+
+
+@given(grid_points, st.permutations(range(4)))
+def test_exchanging_vertices_changes_the_sign_as_a_permutation_does(points, order):
+    points = points * 2.0**-30
+    parity = np.linalg.det(np.eye(4)[list(order)])
+    assert orient(points, *order, WORK) == parity * orient(points, 0, 1, 2, 3, WORK)
+    turned = insphere(points, *order, 4, WORK)
+    assert turned == parity * insphere(points, 0, 1, 2, 3, 4, WORK)
+
+
+def test_three_points_are_collinear_only_exactly(rng):
+    a, step = rng.integers(-8, 9, (2, 3)) / 16.0
+    step[0] += 1 / 16
+    line = np.stack([a, a + step, a + 3 * step])
+    assert collinear(line, 0, 1, 2, WORK)
+    line[2, 1] = np.nextafter(line[2, 1], 2.0)
+    assert not collinear(line, 0, 1, 2, WORK)
+
+
+# What makes a triangulation Delaunay, checked exactly on clouds of every kind
+
+
+every_degenerate = pytest.mark.parametrize("name", DEGENERATE)
+
+
+def cells_of(mesh: Delaunay) -> set[tuple[int, ...]]:
+    """Cells as sets of vertices."""
+    return set(map(tuple, np.sort(mesh.tetrahedra, axis=1).tolist()))
+
+
+def opposite(mesh: Delaunay, t: int, u: int) -> int:
+    """The vertex of cell u that cell t does not share; asserts that they are neighbors."""
+    (slot,) = np.flatnonzero(mesh.neighbors[u] == t)
+    return int(mesh.tetrahedra[u, slot])
+
+
+def assert_adjacency(mesh: Delaunay) -> None:
+    """Neighbors know each other and share the face opposite the vertex they are named after."""
+    for t, i in np.argwhere(mesh.neighbors >= 0):
+        u = mesh.neighbors[t, i]
+        other = opposite(mesh, t, u)
+        face = set(mesh.tetrahedra[t][FACES[i]])
+        assert face == set(mesh.tetrahedra[u]) - {other}
+
+
+def assert_delaunay(mesh: Delaunay) -> None:
+    """Positive cells, none of whose spheres holds the vertex beyond any of its faces.
+
+    For a triangulation of the convex hull this local law implies the global one (Delaunay 1934).
+    """
+    points, _ = unit_scale(mesh.points)
+    for t, cell in enumerate(mesh.tetrahedra):
+        assert orient(points, *cell, WORK) == 1
+        for u in mesh.neighbors[t]:
+            if u >= 0:
+                assert insphere(points, *cell, opposite(mesh, t, u), WORK) <= 0
+
+
+def six_volumes(mesh: Delaunay) -> Fraction:
+    """Six times the exact sum of the volumes."""
+    exact = [rational(p) for p in mesh.points]
+    total = Fraction(0)
+    for cell in mesh.tetrahedra:
+        a, b, c, d = (exact[v] for v in cell)
+        x, y, z = ([q - p for p, q in zip(a, corner, strict=True)] for corner in (b, c, d))
+        total += sum(x[i] * (y[i - 2] * z[i - 1] - y[i - 1] * z[i - 2]) for i in range(3))
+    return total
+
+
+def six_hull_volumes(mesh: Delaunay) -> Fraction:
+    """Six times the exact volume inside the faces without a neighbor, by the divergence theorem."""
+    exact = [rational(p) for p in mesh.points]
+    total = Fraction(0)
+    for t, i in np.argwhere(mesh.neighbors < 0):
+        x, y, z = (exact[v] for v in mesh.tetrahedra[t][FACES[i]])
+        total += sum(x[i] * (y[i - 2] * z[i - 1] - y[i - 1] * z[i - 2]) for i in range(3))
+    return total
+
+
+@pytest.mark.parametrize("walls", [FEW - 2, FEW, FEW + 2, 4 * FEW])
+def test_the_last_point_inside_a_sphere_of_points_joins_all_faces_of_their_hull(walls):
+    # n points have 2n - 4 faces, all of them walls of one cavity, however its cells are tied
+    sphere = np.random.default_rng(walls).normal(size=((walls + 4) // 2, 3))
+    points = np.vstack([sphere / np.linalg.norm(sphere, axis=1)[:, None], np.zeros(3)])
+    cells, neighbors, same = triangulate(points, lambda: False)
+    mesh = Delaunay(points=points, tetrahedra=cells, neighbors=neighbors, duplicate_of=same)
+    assert len(cells) == walls
+    assert (cells == len(points) - 1).any(axis=1).all()
+    assert_adjacency(mesh)
+    assert_delaunay(mesh)
+
+
+@pytest.mark.parametrize("points", [random_points(400), arc_tips(700)], ids=["cube", "arm"])
+def test_cells_equal_those_of_qhull_where_they_are_unique(points):
+    assert cells_of(delaunay(points)) == cells_of(qhull.delaunay(points))
+
+
+@given(st.integers(5, 60), st.integers(0, 2**32 - 1))
+def test_cells_of_small_random_clouds_equal_those_of_qhull(n, seed):
+    points = random_points(n, seed)
+    assert cells_of(delaunay(points)) == cells_of(qhull.delaunay(points))
+
+
+@every_degenerate
+def test_degenerate_clouds_give_an_exact_delaunay_triangulation(name):
+    mesh = delaunay(DEGENERATE[name])
+    assert_adjacency(mesh)
+    assert_delaunay(mesh)
+
+
+@every_degenerate
+def test_every_distinct_point_is_a_vertex(name):
+    points = DEGENERATE[name]
+    mesh = delaunay(points)
+    assert len(np.unique(mesh.tetrahedra)) == len(np.unique(points, axis=0))
+    assert (points[mesh.duplicate_of] == points).all()
+
+
+@pytest.mark.parametrize("name", ["cube corners", "five points", "four points", "moment curve"])
+def test_no_sphere_holds_any_point_in_rational_arithmetic(name):
+    points = DEGENERATE[name][:20]
+    exact = [rational(p) for p in points]
+    for cell in delaunay(points).tetrahedra:
+        corners = [exact[v] for v in cell]
+        assert exact_orient(*corners) == 1
+        assert all(exact_insphere(*corners, p) <= 0 for p in exact)
+
+
+@every_degenerate
+def test_the_hull_of_the_cells_is_convex_and_filled_once(name):
+    """No point beyond any outer face, and the volumes sum up to what these faces enclose."""
+    mesh = delaunay(DEGENERATE[name])
+    points, _ = unit_scale(mesh.points)
+    for t, i in np.argwhere(mesh.neighbors < 0):
+        a, b, c = mesh.tetrahedra[t][FACES[i]]
+        assert all(orient(points, a, b, c, d, WORK) <= 0 for d in range(len(points)))
+    assert six_volumes(mesh) == six_hull_volumes(mesh) > 0
+
+
+@every_degenerate
+def test_volumes_sum_up_to_that_of_the_convex_hull(name):
+    points = DEGENERATE[name]
+    total = AlphaComplex(triangulation=delaunay(points)).volumes.sum()
+    tolerance = 1e-3 if name == "sheared flat" else 1e-9  # Qhull merges what is nearly flat
+    assert total == pytest.approx(convex_hull(points).volume, rel=tolerance, abs=0)
+
+
+@every_degenerate
+def test_radii_and_volumes_do_not_depend_on_the_order_of_the_points(name):
+    points = DEGENERATE[name]
+    shuffled = points[np.random.default_rng(0).permutation(len(points))]
+    first, second = (AlphaComplex(triangulation=delaunay(p)) for p in (points, shuffled))
+    assert first.volumes.sum() == pytest.approx(second.volumes.sum(), rel=1e-12, abs=0)
+    assert first.critical_alpha() == pytest.approx(second.critical_alpha(), rel=1e-7, abs=0)
+
+
+@given(st.permutations(range(80)))
+def test_cells_do_not_depend_on_the_order_of_the_points(order):
+    points = random_points(80)
+    shuffled = delaunay(points[order])
+    renamed = np.sort(np.array(order)[shuffled.tetrahedra], axis=1)
+    assert set(map(tuple, renamed.tolist())) == cells_of(delaunay(points))
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_flat_clouds_have_no_cells(name):
+    mesh = delaunay(FLAT[name])
+    assert mesh.tetrahedra.shape == mesh.neighbors.shape == (0, 4)
+    assert len(mesh.duplicate_of) == len(FLAT[name])
+
+
+def test_duplicates_are_reported_and_not_inserted():
+    points = random_points(30)
+    mesh = delaunay(np.concatenate([points, points[:7], points[:7]]))
+    assert (mesh.duplicate_of[mesh.duplicate_of] == mesh.duplicate_of).all()
+    assert len(np.unique(mesh.duplicate_of)) == 30
+    original = np.concatenate([np.arange(30), np.arange(7), np.arange(7)])
+    renamed = np.sort(original[mesh.tetrahedra], axis=1)
+    assert set(map(tuple, renamed.tolist())) == cells_of(delaunay(points))
+
+
+def test_a_cloud_far_larger_than_its_first_room_grows():
+    """All of n²/4 cells of two skew lines: the mesh has to be enlarged on the way."""
+    t = np.linspace(0.1, 1.0, 60)
+    zero = np.zeros_like(t)
+    points = np.concatenate([np.stack([t, zero, zero], 1), np.stack([zero, t, zero + 1], 1)])
+    mesh = delaunay(points)
+    assert len(mesh.tetrahedra) == 59 * 59
+    assert_adjacency(mesh)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_rows_that_are_not_finite_are_counted_and_the_first_is_named(bad):
+    points = random_points(20)
+    points[[4, 9], 1] = bad
+    with pytest.raises(
+        InvalidInput, match=r"points\[4\] = .*must be finite numbers; so are 2 rows in all"
+    ):
+        delaunay(points)
+
+
+def test_points_of_another_shape_are_refused():
+    with pytest.raises(InvalidInput, match=r"points.shape = \(5, 2\): must be of shape \(n, 3\)"):
+        delaunay(np.zeros((5, 2)))

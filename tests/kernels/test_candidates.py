@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softreach.inverse.cells import ImageLeaves, image_tree
-from softreach.kernels.branches import candidates
+from softreach.kernels.branches import candidates, folds
 from softreach.kernels.branches.candidates import MOST_STARTS, find_starts
-from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic
+from softreach.kernels.branches.space_tree import SpaceTree, leaf_at
+from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic, sampled
 
 SEEDS = st.integers(0, 2**32 - 1)
 LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
@@ -97,3 +98,97 @@ def test_a_target_out_of_reach_has_no_start():
     f = Quadratic(np.zeros(3), np.eye(3), np.zeros((3, 3, 3)))
     target, _ = starts_of(f, np.array([[1.1, 0.0, 0.0], [0.0, -2.0, 0.0], [9.0, 9.0, 9.0]]), 4)
     assert len(target) == 0
+
+
+# The octree over images: nothing that may cover a place is missing from its list
+
+
+def listed(tree: SpaceTree, point: np.ndarray) -> np.ndarray:
+    """Tetrahedra listed at the leaf that holds a point."""
+    shape = (tree.low, tree.size, tree.child, tree.first, tree.length)
+    begin, end = leaf_at(*shape, tuple(point))
+    return tree.item[begin:end]
+
+
+@given(seed=SEEDS)
+@settings(max_examples=5)
+def test_the_tetrahedron_of_every_activation_is_listed_where_its_tip_is(seed):
+    rng = np.random.default_rng(seed)
+    f = random_quadratic(rng, bend=0.05)
+    mesh = mesh_of(f, 4)
+    tree = image_tree(mesh)
+    assert len(tree.child) > 100  # deep enough to mean something
+    tetrahedron, _, _, gamma = sampled(mesh, 300, rng)
+    for k, tip in zip(tetrahedron, f.values(gamma), strict=True):
+        assert k in listed(tree, tip)
+
+
+@given(seed=SEEDS)
+@settings(max_examples=5)
+def test_every_inflated_image_that_holds_a_place_is_listed_there(seed):
+    rng = np.random.default_rng(seed)
+    mesh = mesh_of(random_quadratic(rng, bend=0.05), 4)
+    tree = image_tree(mesh)
+    images = mesh.tip[np.repeat(mesh.corner, 6, axis=0)]
+    error = np.repeat(mesh.interpolation_error, 6)[:, None]
+    low, high = images.min(axis=1) - error, images.max(axis=1) + error
+    for point in rng.uniform(low.min(axis=0), high.max(axis=0), (100, 3)):
+        covering = (tree.planes[:, :, :3] @ point >= tree.planes[:, :, 3]).all(axis=1)
+        covering &= ((low <= point) & (point <= high)).all(axis=1)
+        assert np.isin(np.flatnonzero(covering), listed(tree, point)).all()
+
+
+def test_outside_the_root_nothing_is_listed(rng):
+    tree = image_tree(mesh_of(random_quadratic(rng), 2))
+    for axis in range(3):
+        for side in (-1e-6, tree.size + 1e-6):
+            point = tree.low + 0.5 * tree.size
+            point[axis] = tree.low[axis] + side
+            assert len(listed(tree, point)) == 0
+    assert len(listed(tree, np.array([np.nan, 0.0, 0.0]))) == 0
+
+
+# The second preimage near a fold, in closed form
+
+
+FAR = np.full(3, 100.0)
+OVERSHOOT = 2.8
+
+
+def second_preimages(mesh, f, gamma, reach, low=-FAR, high=FAR):
+    slope = f.slopes(gamma)
+    smallest = np.linalg.svd(slope, compute_uv=False)[:, 2]
+    start, near = np.full_like(gamma, np.nan), np.zeros(len(gamma), bool)
+    cell = np.zeros(len(gamma), np.int64)
+    bounds = low, high
+    folds.second_preimages(
+        mesh, cell, gamma, slope, smallest, reach, OVERSHOOT, *bounds, start, near
+    )
+    return start, near
+
+
+@given(seed=st.integers(0, 2**32 - 1), kappa=st.floats(0.1, 2.0), side=st.sampled_from([-1, 1]))
+def test_on_a_fold_the_start_lies_beyond_the_mirror_image_by_the_overshoot(seed, kappa, side):
+    rng = np.random.default_rng(seed)
+    fold = random_fold(rng, side * kappa)
+    f, y = fold.quadratic(), rng.uniform(-0.3, 0.3, (40, 3))
+    y[:, 0] = rng.choice([-1, 1], 40) * rng.uniform(1e-4, 5e-3, 40) / kappa  # σ = κ |y0|
+    gamma = y @ fold.r
+    start, near = second_preimages(mesh_of(f, 1), f, gamma, reach=10.0)
+    assert near.all()
+    share = 0.5 * OVERSHOOT
+    assert start == pytest.approx(gamma + share * (fold.mirrored(gamma) - gamma), abs=1e-9)
+
+
+def test_a_second_preimage_out_of_reach_or_far_out_of_bounds_is_left_out(rng):
+    fold = random_fold(rng)._replace(r=np.eye(3))
+    f = fold.quadratic()
+    mesh = mesh_of(f, 1)  # one cell of width 2
+    gamma = np.array([[0.1, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    assert second_preimages(mesh, f, gamma, reach=0.3)[1].tolist() == [True, False]
+    low = np.array([0.4, -1.0, -1.0])
+    start, near = second_preimages(mesh, f, gamma, reach=10.0, low=low)
+    assert near.all()
+    assert (start >= low).all()
+    low[0] = 3.0
+    assert not second_preimages(mesh, f, gamma, reach=10.0, low=low)[1].any()

@@ -10,6 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from softreach import designs
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import extension_range
+from softreach.inverse.cells import activation_cells
+from softreach.inverse.seeds import Seeds
 from softreach.kernels.box.simplices import (
     chains,
     corner_bits,
@@ -18,6 +24,11 @@ from softreach.kernels.box.simplices import (
     strides,
 )
 from softreach.kernels.image import contour, point_cover, raster
+from softreach.kernels.image.activation_mesh import ActivationMesh, face_planes
+from softreach.rod import tip_map, tip_positions
+from tests.inverse.test_many_bundles import six_bundles
+from tests.kernels.maps import Quadratic, mesh_of, random_quadratic, sampled
+from tests.laws import arm_of
 
 UNIT = 64.0
 
@@ -209,3 +220,147 @@ def test_stretches_are_the_determinant_of_a_quadratic_map():
     vertices = np.column_stack([8 * x + 3 * x * x, 5 * y - x, 7 * z - 2 * z * z + y])
     expected = (8 + 6 * x) * 5 * (7 - 4 * z)
     assert contour.stretches(vertices, np.array(cells)) == pytest.approx(8 * expected)
+
+
+# Starts among seeds with tips near a target, against the same choice in NumPy
+
+
+@pytest.fixture(scope="module")
+def seeds() -> Seeds:
+    rod = tip_map(six_bundles(), tol=1e-3)
+    gamma = np.random.default_rng(0).uniform(rod.box.low, rod.box.high, (20_000, rod.box.bundles))
+    return Seeds(gamma, rod.tips(gamma), rod)
+
+
+def reference(seeds, target, near, count, most, least_distance, *, moves):
+    """The choice for one target: from the bins around it, least change first, apart."""
+    columns, _, (corner, width, shape) = seeds._bins
+    m = len(near)
+    gamma, tip, slope, half = np.split(columns.astype(float), [m, m + 3, 4 * m + 3], axis=1)
+    slope, inverse = slope.reshape(-1, 3, m), half[:, [[0, 1, 3], [1, 2, 4], [3, 4, 5]]]
+    target = (target - corner) / width
+    place, goal = (np.clip(x // 1, 0, np.array(shape) - 1) for x in (tip, target))
+    shell = np.abs(place - goal).max(axis=1)
+    looked_at = np.flatnonzero(shell <= max(1, np.sort(shell)[count - 1]))
+    stride = 1 + len(looked_at) // 1024  # of more, some are left out
+    looked_at = looked_at[stride - 1 :: stride]
+    gamma, way, slope = gamma[looked_at], target - tip[looked_at], slope[looked_at]
+    low, high = seeds._coarse.box.low, seeds._coarse.box.high
+    ends, key = gamma, np.zeros(len(gamma))
+    if moves:
+        step = np.einsum("nij,nik,nk->nj", slope, inverse[looked_at], way)
+        ends = np.clip(gamma + seeds.scales * step, low, high)
+        step = (ends - gamma) / seeds.scales
+        left = way - np.einsum("nij,nj->ni", slope, step)
+        missed = (left**2).sum(axis=1) > 0.1 * (way**2).sum(axis=1)
+        key[missed | (np.abs(step).max(axis=1) > 0.4)] = 1e6
+    key += ((ends - near) ** 2).sum(axis=1)
+    chosen = np.empty((0, len(near)))
+    for end in ends[key.argsort()]:
+        apart = (np.abs(chosen - end) / seeds.scales).max(axis=1, initial=0.0) > least_distance
+        if len(chosen) < most and apart.all():
+            chosen = np.concatenate([chosen, end[None]])
+    return chosen
+
+
+def test_starts_are_those_of_the_reference(seeds):
+    rng, box = np.random.default_rng(1), seeds._coarse.box
+    activations, near = rng.uniform(box.low, box.high, (2, 20, box.bundles))
+    targets = seeds._coarse.tips(activations)
+    targets[-1] += 2.0  # beyond all bins
+    owner, starts = seeds.near(targets, near, 200, 7, 0.15)
+    for row, (target, at) in enumerate(zip(targets, near, strict=True)):
+        both = [reference(seeds, target, at, 200, 7, 0.15, moves=moves) for moves in (True, False)]
+        wanted = np.concatenate(both)
+        np.testing.assert_allclose(starts[owner == row], wanted, atol=1e-6)
+
+
+def test_moved_seeds_come_nearer_to_their_targets(seeds):
+    rng, box = np.random.default_rng(2), seeds._coarse.box
+    targets = seeds._coarse.tips(rng.uniform(box.low, box.high, (50, box.bundles)))
+    near = np.zeros((50, box.bundles))
+    owner, starts = seeds.near(targets, near, 200, 3, 0.15)
+    gaps = np.linalg.norm(seeds._coarse.tips(starts) - targets[owner], axis=1).reshape(50, 2, 3)
+    assert gaps[:, 0].mean() < 0.3 * gaps[:, 1].mean()
+
+
+# How far an image may lie from its linear interpolant: what "every branch" rests on
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+CELLS, TOL = 32, 1e-9
+
+
+def random_arm(rng: np.random.Generator) -> Manipulator:
+    """Three bundles of any kind, nearly all with folds."""
+    while True:
+        fibers = (
+            FiberArchitecture(
+                revolution=rng.uniform(-4, 4),
+                offset=rng.uniform(-3, 3),
+                extent=rng.uniform(0.2, 1.0),
+            )
+            for _ in range(3)
+        )
+        taper = rng.uniform(0, 0.8) / 16
+        arm = arm_of(*fibers, taper=taper, activation_bounds=(-5 / 3, 0.0))
+        if extension_range(arm)[0] > 0:
+            return arm
+
+
+def any_arm(name: int | tuple[int, int]) -> Manipulator:
+    if isinstance(name, int):
+        return random_arm(np.random.default_rng(name))
+    return designs.minimal_trunk(*np.radians(name))
+
+
+def planes_of(mesh: ActivationMesh) -> np.ndarray:
+    planes = np.empty((6 * len(mesh.corner), 4, 4))
+    face_planes(mesh, 1e-9, planes)
+    return planes
+
+
+def depth(planes: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """How far inside the inflated images points lie, (n,) for planes (n, 4, 4)."""
+    inside = np.einsum("nij,nj->ni", planes[:, :, :3], points) - planes[:, :, 3]
+    return inside.min(axis=1)
+
+
+@pytest.mark.parametrize("name", [(108, 2), (36, 3), (0, 0), *range(6)])
+def test_no_tip_is_farther_from_its_linear_interpolant_than_estimated(name):
+    arm, rng = any_arm(name), np.random.default_rng(0)
+    mesh, _ = activation_cells(tip_map(arm, TOL), CELLS)
+    tetrahedron, v, weights, gamma = sampled(mesh, 30_000, rng)
+    tip = tip_positions(arm, gamma, TOL)
+    error = np.linalg.norm(tip - np.einsum("ni,nik->nk", weights, mesh.tip[v]), axis=1)
+    share = error / mesh.interpolation_error[tetrahedron // 6]
+    assert share.max() <= 1.0
+    assert share.max() >= 0.4  # nor is the estimate far too large
+    assert depth(planes_of(mesh)[tetrahedron], tip).min() >= 0.0
+
+
+@given(seed=SEEDS)
+def test_for_quadratic_maps_the_estimate_is_a_bound_with_a_quarter_to_spare(seed):
+    rng = np.random.default_rng(seed)
+    f = random_quadratic(rng)
+    mesh = mesh_of(f, 2)
+    tetrahedron, v, weights, gamma = sampled(mesh, 500, rng)
+    tip = f.values(gamma)
+    error = np.linalg.norm(tip - np.einsum("ni,nik->nk", weights, mesh.tip[v]), axis=1)
+    assert (1.25 * error <= mesh.interpolation_error[tetrahedron // 6]).all()
+    assert depth(planes_of(mesh)[tetrahedron], tip).min() >= 0.0
+
+
+@given(seed=SEEDS)
+def test_for_a_parabolic_cylinder_the_largest_error_is_8_15_of_the_estimate(seed):
+    """½ (w·x)² d is off by |d| (w·e)²/8 at the middle of the edge e on which w·x grows most."""
+    rng = np.random.default_rng(seed)
+    w, d = rng.normal(size=(2, 3))
+    f = Quadratic(np.zeros(3), np.zeros((3, 3)), np.einsum("i,j,k->ijk", d, w, w))
+    mesh = mesh_of(f, 1)
+    x = mesh.gamma[mesh.corner[0]]
+    edges = [(a, b) for a in range(8) for b in range(a + 1, 8) if a & b == a]
+    middle = [f.values(0.5 * (x[a] + x[b])[None])[0] for a, b in edges]
+    linear = [0.5 * (f.values(x[[a]])[0] + f.values(x[[b]])[0]) for a, b in edges]
+    largest = np.linalg.norm(np.subtract(middle, linear), axis=1).max()
+    assert largest == pytest.approx(8 / 15 * mesh.interpolation_error[0], abs=1e-8)

@@ -7,11 +7,14 @@ import gc
 import numpy as np
 import pytest
 
-from softreach.arm import designs
+import softreach as sr
+from softreach.arm import Chamber, LinearTaper, Loads, Material, Ring, Section, Tendon, designs
 from softreach.rod import tip_positions
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import tip_map
+from softreach.rod.view import activation_measures, free_bundles, measured_bundles
 from softreach.support.errors import InvalidDesign, InvalidInput
+from tests.laws import in_box
 
 
 def test_an_arm_without_loads_is_a_free_rod(trunk):
@@ -61,3 +64,69 @@ def test_an_arm_beyond_the_theory_is_refused_every_time(trunk):
     for _ in range(2):
         with pytest.raises(InvalidDesign, match="must keep ζ > 0"):
             tip_map(trunk.with_bounds((-9.0, 0.0)))
+
+
+# Activations of different units are compared in their own ranges
+
+
+TENDONS = Tendon(name="tendon", distance_ratio=0.9, bundles=3, activation_bounds=(0, 8))
+CHAMBER = Chamber(name="middle", distance_ratio=0, radius_ratio=0.25, activation_bounds=(0, 5e4))
+
+
+def arm_of(*actuators):
+    ring = Ring(inner_ratio=0.5, material=Material(young_modulus=1e5))
+    return sr.Manipulator(
+        profile=LinearTaper(length=0.2, outer_radius=0.015, taper=0.01),
+        section=Section(rings=(ring,)),
+        actuators=actuators,
+    )
+
+
+def test_strains_count_as_they_are(trunk):
+    np.testing.assert_array_equal(activation_measures(trunk), np.ones(trunk.bundles))
+    assert measured_bundles(tip_map(trunk)) is tip_map(trunk)
+
+
+def test_activations_of_one_unit_keep_their_proportions():
+    arm = arm_of(TENDONS).with_bounds(((0, 8), (0, 4), (0, 2)))
+    np.testing.assert_array_equal(activation_measures(arm), [8, 8, 8])
+
+
+def test_activations_of_different_units_count_in_their_ranges():
+    np.testing.assert_array_equal(activation_measures(arm_of(TENDONS, CHAMBER)), [8, 8, 8, 5e4])
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_held_bundle_has_a_measure_too(held):
+    bounds = ((0, 8), (0, 4), (3, 3) if held else (0, 3), (0, 5e4))
+    assert (activation_measures(arm_of(TENDONS, CHAMBER).with_bounds(bounds)) > 0).all()
+
+
+def test_the_map_is_the_same_in_other_measures():
+    rod = tip_map(arm_of(TENDONS, CHAMBER))
+    other, gamma = measured_bundles(rod), in_box(rod.arm, 20)
+    shares = gamma / activation_measures(rod.arm)
+    np.testing.assert_allclose(other.tips(shares), rod.tips(gamma), atol=1e-14)
+    slopes = rod.tips_and_slopes(gamma)[1] * activation_measures(rod.arm)
+    np.testing.assert_allclose(other.tips_and_slopes(shares)[1], slopes, atol=1e-12)
+    assert (other.box.widths <= 1.0).all()
+
+
+def test_held_and_measured_bundles_of_a_loaded_arm_keep_its_status():
+    arm = arm_of(TENDONS, CHAMBER).with_bounds(((0, 8), (0, 4), (3, 3), (0, 5e4)))
+    whole = tip_map(arm.replace(loads=Loads(gravity=(0, 0, 0), tip_force=(0.02, 0, 0))))
+    restricted = free_bundles(measured_bundles(whole))
+    assert restricted.supports_unstable
+    assert not tip_map(arm).supports_unstable
+    gamma = in_box(arm, 5)
+    shares = (gamma / activation_measures(arm))[:, whole.box.free]
+    np.testing.assert_array_equal(restricted.status(shares), whole.status(gamma))
+    np.testing.assert_allclose(restricted.tips(shares), whole.tips(gamma), atol=1e-12)
+
+
+def test_a_large_unit_does_not_drown_the_others():
+    found = sr.activation_distance(sr.compute_cloud(arm_of(TENDONS, CHAMBER), n=2_000), 0.02)
+    assert found.attrs["units"] == "1"
+    assert 0 < float(found.max()) < np.sqrt(4)  # no farther than corners of the unit cube
+    alike = sr.activation_distance(sr.compute_cloud(arm_of(TENDONS), n=2_000), 0.02)
+    assert alike.attrs["units"] == "N"

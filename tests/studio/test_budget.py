@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import re
 import time
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from softreach.arm.parameters import changed
-from softreach.studio import reach as stages
+from softreach.arm import designs
+from softreach.arm.parameters import changed, parameters
+from softreach.studio import reach as reaching
 from softreach.studio import work as budget
-from softreach.studio.reach import Quality
+from softreach.studio.markup import bar
+from softreach.studio.reach import Quality, Reach, stages
+from softreach.studio.shown_parameters import slider_parameters
+from softreach.studio.slopes import Slope, VolumeSlopes, slope_bars, volume_slopes
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores, level_in_memory
+from softreach.workspace import volume_gradient
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -54,13 +62,13 @@ def test_clouds_fit_into_memory_however_many_bundles_there_are():
 
 def test_a_smaller_cloud_says_what_it_left_out(trunk, monkeypatch):
     monkeypatch.setattr(budget, "free_memory", lambda: 1e6)
-    *_, fine = stages.stages(trunk, 12, SMALL, nothing)
+    *_, fine = reaching.stages(trunk, 12, SMALL, nothing)
     assert fine.samples < fine.wanted == 1 << 12
     assert "1,024 of 4,096 samples" in fine.notes[0]
 
 
 def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk, monkeypatch):
-    exact, calls = stages.reachable_set, []
+    exact, calls = reaching.reachable_set, []
 
     def only_once(*given, **options):
         calls.append(options["accuracy"])
@@ -68,11 +76,11 @@ def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk
             raise OverBudget("more than 30 s")
         return exact(*given, **options)
 
-    monkeypatch.setattr(stages, "reachable_set", only_once)
-    coarse, fine = stages.stages(trunk, 12, SMALL, nothing)
+    monkeypatch.setattr(reaching, "reachable_set", only_once)
+    coarse, fine = reaching.stages(trunk, 12, SMALL, nothing)
     assert fine.exact is coarse.exact is not None
     assert fine.notes == ("exact set coarser than asked: to 5 % it needs more than 30 s",)
-    *_, none = stages.stages(trunk, 12, SMALL, nothing)
+    *_, none = reaching.stages(trunk, 12, SMALL, nothing)
     assert none.exact is None
     assert none.refusal == "to 5 % it needs more than 30 s"
 
@@ -80,16 +88,16 @@ def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk
 def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_given(
     trunk, monkeypatch
 ):
-    exact, given = stages.reachable_set, []
+    exact, given = reaching.reachable_set, []
 
     def noted(*arguments, **options):
         given.append(options["memory"])
         return exact(*arguments, **options)
 
-    monkeypatch.setattr(stages, "reachable_set", noted)
+    monkeypatch.setattr(reaching, "reachable_set", noted)
     monkeypatch.setattr(budget, "free_memory", lambda: 2e9)
     arm = changed(trunk, {"longitudinal.bundles": 3})
-    first, coarse, fine = stages.stages(arm, 12, SMALL, nothing)
+    first, coarse, fine = reaching.stages(arm, 12, SMALL, nothing)
     assert first.exact is None
     assert coarse.volume == pytest.approx(fine.volume, rel=0.1)
     assert set(given) == {0.2 * 2e9}
@@ -97,5 +105,131 @@ def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_g
 
 def test_no_stage_keeps_the_turn_while_its_reach_is_drawn(trunk):
     for arm in (trunk, changed(trunk, {"longitudinal.bundles": 2})):
-        for _ in stages.stages(arm, 10, SMALL, nothing):
+        for _ in reaching.stages(arm, 10, SMALL, nothing):
             assert not all_cores.taken
+
+
+# The bars under the sliders: how the volume changes with each, exactly and on one scale
+
+
+QUALITY = Quality(coarse_level=10, fine_level=10, coarse_accuracy=0.02, fine_accuracy=0.01)
+
+
+def reach_of(arm) -> Reach:
+    return list(stages(arm, 10, QUALITY, nothing))[-1]
+
+
+@pytest.fixture(scope="module")
+def small_arm():
+    """In other units than L = 1 m."""
+    return changed(designs.minimal_trunk(), {"length": 0.3, "outer_radius": 0.02})
+
+
+@pytest.fixture(scope="module")
+def slopes(small_arm) -> VolumeSlopes:
+    return volume_slopes(reach_of(small_arm), QUALITY, nothing)
+
+
+def test_a_slope_is_that_of_the_library_in_units_of_the_slider(small_arm, slopes):
+    theirs = volume_gradient(small_arm, list(slopes.slopes), accuracy=QUALITY.fine_accuracy)
+    sliders = {each.name: each for each in slider_parameters(small_arm)}
+    for name, value, error in zip(
+        theirs.parameters, theirs.volume, theirs.volume_error, strict=True
+    ):
+        scale = sliders[name].scale
+        ours = slopes.slopes[name]
+        assert abs(ours.value - value * scale) <= ours.error + error * scale
+        assert ours.error < 10 * error * scale
+
+
+def test_every_slider_that_moves_continuously_has_a_slope(small_arm, slopes):
+    known = parameters(small_arm)
+    sliders = {each.name for each in slider_parameters(small_arm)}
+    assert {name for name in sliders if known[name].whole} == sliders - set(slopes.slopes) != set()
+
+
+def test_where_there_is_no_volume_there_is_no_slope(trunk):
+    flat = trunk.replace(actuators=trunk.actuators[1:])
+    assert volume_slopes(reach_of(flat), QUALITY, nothing).slopes == {}
+
+
+def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
+    from softreach.studio import slopes as module
+    from softreach.support.errors import InvalidInput
+
+    plain = module.gradient_of
+
+    def without_taper(solid, names, *rest):
+        if "taper" in names:
+            raise InvalidInput("taper", 0.0, "one that holds no bundle")
+        return plain(solid, names, *rest)
+
+    monkeypatch.setattr(module, "gradient_of", without_taper)
+    slopes = volume_slopes(reach_of(trunk), QUALITY, nothing).slopes
+    assert "taper" not in slopes
+    assert len(slopes) > 5
+
+
+def test_a_set_that_loads_tear_has_no_slopes(trunk):
+    reach = reach_of(trunk)
+
+    class Torn(type(reach.exact)):
+        lost_share = 0.1
+
+    torn = object.__new__(Torn)
+    vars(torn).update({k: v for k, v in vars(reach.exact).items() if k != "lost_share"})
+    assert volume_slopes(replace(reach, exact=torn), QUALITY, nothing).slopes == {}
+
+
+def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
+    reach, calls = reach_of(trunk), []
+
+    def check() -> None:
+        calls.append(None)
+        if len(calls) == 5:
+            raise Dropped
+
+    with pytest.raises(Dropped):
+        volume_slopes(reach, QUALITY, check)
+    assert len(calls) == 5
+
+
+def test_what_takes_too_long_is_left_out(trunk):
+    hasty = replace(QUALITY, most_seconds=0.0)
+    assert volume_slopes(reach_of(trunk), hasty, nothing).slopes == {}
+
+
+def share_of(html: str) -> float:
+    """Signed length of a bar over that of half of its track."""
+    side, width = re.search(r"(left|right):50%;width:([\d.]+)%", html).groups()
+    return float(width) / 50 * (1 if side == "left" else -1)
+
+
+def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
+    sliders = {each.name: (each, each.high - each.low) for each in slider_parameters(trunk)}
+    found = VolumeSlopes(
+        trunk, 0.7, {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
+    )
+    bars = slope_bars(found, sliders, old=False)
+    assert list(bars) == [name for name in sliders if name in found.slopes]
+    changes = {name: found.slopes[name].value * sliders[name][1] for name in bars}
+    shares = {name: share_of(html) for name, html in bars.items()}
+    most = max(map(abs, changes.values()))
+    assert max(map(abs, shares.values())) == 1
+    np.testing.assert_allclose(
+        list(shares.values()), [change / most for change in changes.values()], atol=1e-3
+    )
+    assert "\N{MINUS SIGN}1.00 ± 0.01 %" in bars["taper"]  # of V for 0.07 of its 7 degrees
+    assert "∂V/∂(taper) = -0.100 ± 0.001 m³ per deg" in bars["taper"]
+    assert "0.07 deg" in bars["taper"]
+    assert "+1.686 ± 0.001 %" in bars["extent"]
+    old = slope_bars(found, sliders, old=True)["taper"]
+    assert "of the design before" in old
+    assert "opacity:0.4" in old
+
+
+def test_a_bar_never_leaves_its_track_and_its_text_is_no_markup():
+    html = bar(-3.0, "<b>", '"><script>')
+    assert share_of(html) == -1
+    assert "<b>" not in html
+    assert "<script>" not in html

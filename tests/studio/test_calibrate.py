@@ -174,35 +174,6 @@ def test_a_fit_tells_its_steps_and_ends_when_it_is_canceled(session, monkeypatch
     assert session.bench.result is not None
 
 
-def test_what_cannot_be_fitted_is_said_in_one_line_and_nothing_changes(session):
-    panel = loaded(session)
-    for free, words in (("pose, tapper", "tapper"), ("", "none"), ("length, length", "length")):
-        fitted(panel, session, free)
-        assert words in session.note
-        assert "\n" not in session.note
-        assert session.bench.result is None
-
-
-@pytest.mark.parametrize(
-    ("upload", "words"),
-    [
-        (SimpleNamespace(name="a.csv", content=b""), "a.csv"),
-        (SimpleNamespace(name="a.csv", content=b"\x00\xff\xfe,\n1,2"), "must be"),
-        (SimpleNamespace(name="a.csv", content=b"a,b,c\n1,2,3"), "places of markers"),
-        (SimpleNamespace(name="a.parquet", content=b"a,b,c\n1,2,3"), "a.parquet"),
-        (file(markers=("one",)), "markers of the data"),
-    ],
-)
-def test_a_file_of_no_poses_is_refused_in_one_line_and_the_one_before_stays(session, upload, words):
-    panel = loaded(session)
-    before = session.bench
-    with pytest.raises(sr.InvalidInput) as caught:
-        panel._read(upload)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert session.bench is before
-
-
 def test_data_of_another_arm_is_no_longer_shown(session):
     panel = loaded(session)
     session.update(lambda state: state.replace(design=ARM.replace(markers=())))

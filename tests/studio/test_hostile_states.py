@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import io
 import json
 
+import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.studio import StudioState
-from softreach.studio.files import state_from
-from softreach.studio.start import start_on_state
-from softreach.support.errors import SoftreachError
+from softreach.arm.parameters import changed
+from softreach.cloud.clouds import compute_cloud, save_cloud
+from softreach.export import export_cloud
+from softreach.studio import page
+from softreach.studio.captions import size_text
+from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
+from softreach.studio.page import static_page
+from softreach.studio.reach import Quality, cloud_points, stages
+from softreach.studio.scene.camera import in_the_way
+from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.scene.scene import Scene
+from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
+from softreach.studio.state import Camera, Slice, StudioState
+from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
 
@@ -64,3 +76,107 @@ def test_a_large_file_is_refused_before_it_is_read(tmp_path):
         file.truncate(50_000_000)
     with pytest.raises(SoftreachError, match=r"state\.json: must be at most 2 MB"):
         start_on_state(path)
+
+
+# What a tab is opened on and saved as
+
+
+SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
+
+
+@pytest.fixture(scope="module")
+def fine(trunk):
+    *_, last = stages(trunk, 10, SMALL, lambda: None)
+    return last
+
+
+def test_files_are_those_of_the_librarys_own_writers(fine, tmp_path):
+    state = StudioState(design=fine.arm).showing(level=14)
+    export_cloud(fine.cloud, tmp_path / "cloud.ply")
+    assert cloud_file(fine, ".ply") == (tmp_path / "cloud.ply").read_bytes()
+    trimesh = pytest.importorskip("trimesh")
+    saved = trimesh.load(io.BytesIO(surface_file(fine, ".ply")), file_type="ply")
+    assert saved.volume == pytest.approx(fine.exact.surface().volume, rel=1e-6)
+    assert figure_file(fine, state).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
+def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypatch):
+    from softreach import plot
+
+    plotted, views = {}, plot.plot_views
+
+    def watched(cloud, *rest, color):
+        plotted.update(cloud=cloud, color=color, figure=views(cloud, *rest, color=color))
+        return plotted["figure"]
+
+    monkeypatch.setattr(plot, "plot_views", watched)
+    cut = Slice(axis="y", center=0.1, thickness=0.3)
+    figure_file(fine, StudioState(design=fine.arm).showing(level=14, color=color, slice=cut))
+    kept = in_slice(fine.cloud.tip.values / fine.arm.length, cut)
+    np.testing.assert_array_equal(plotted["cloud"].tip, fine.cloud.tip[kept])
+    wanted = sample_values(fine, 14, color)
+    wanted = wanted[kept] if not isinstance(wanted, str | int) else wanted
+    np.testing.assert_array_equal(plotted["color"], wanted)
+    if not isinstance(wanted, str | int):
+        bar = plotted["figure"].axes[-1]
+        assert bar.get_ylabel().startswith(color)
+
+
+def test_a_saved_page_holds_everything_itself(fine):
+    saved = static_page(StudioState(design=fine.arm), fine)
+    assert size_text(fine.size, fine.arm) in saved
+    assert "taper_deg = 2.0" in saved
+    assert '<script src="http' not in saved
+    assert '<link href="http' not in saved
+
+
+def test_a_saved_page_is_cut_free_for_its_camera_as_the_tab_is(fine, monkeypatch):
+    made = []
+    monkeypatch.setattr(page, "Scene", lambda api: made.append(Scene(api)) or made[-1])
+    camera = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
+    state = StudioState(design=fine.arm, camera=camera)
+    points = cloud_points(fine, 12)
+    for cut in "window", "none":
+        static_page(state.showing(cut=cut), fine)
+        viewpoint = made[-1].viewpoint(camera, state)
+        assert len(viewpoint.centers) > 2
+        hidden = in_the_way(points, viewpoint, cut)
+        assert hidden.any() == (cut == "window")
+        np.testing.assert_array_equal(made[-1].clouds.hidden(points), hidden)
+
+
+def test_a_design_file_changes_the_design_alone(trunk):
+    state = StudioState(design=trunk, target=(0.0, 0.1, 0.5))
+    other = changed(trunk, {"taper": 0.01})
+    assert state_from("x.TOML", other.to_toml().encode(), state) == state.replace(design=other)
+    assert state_from("x.json", state.to_json().encode(), StudioState(design=other)) == state
+    with pytest.raises(InvalidInput, match="UTF-8"):
+        state_from("x.toml", b"\xff\xfe", state)
+    tight = trunk.with_bounds((-30.0, 0.0))
+    with pytest.raises(InvalidDesign, match=r"x\.toml: 1 problem\n.*must keep ζ > 0"):
+        state_from("x.toml", tight.to_toml().encode(), state)
+
+
+def test_a_saved_state_is_begun_with(trunk, tmp_path):
+    state = StudioState(design=trunk, activation=(-1.0, 0.0, -0.2)).showing(level=14)
+    (tmp_path / "state.json").write_text(state.to_json(), encoding="utf-8")
+    assert start_on_state(tmp_path / "state.json").state == state
+    with pytest.raises(InvalidInput, match="state file"):
+        start_on_state(tmp_path / "nothing.json")
+
+
+def test_a_cloud_from_a_file_is_shown_as_it_is(trunk, tmp_path):
+    cloud = compute_cloud(trunk, 500)
+    save_cloud(cloud, tmp_path / "cloud.zarr")
+    start = start_on_cloud(tmp_path / "cloud.zarr", SMALL)
+    assert start.reach is not None
+    np.testing.assert_array_equal(start.reach.cloud.tip, cloud.tip)
+    assert start.state.design == trunk
+    with pytest.raises(InvalidInput, match="Zarr store"):
+        start_on_cloud(tmp_path / "nothing.zarr")
+
+
+def test_a_design_starts_at_rest():
+    start = start_on_design(designs.redundant_trunk())
+    assert start.state.activation == (0.0, 0.0, 0.0, 0.0)

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
+
+import pytest
 from hypothesis import given
+from numba import njit
 
 from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
@@ -26,6 +32,7 @@ from softreach.studio.plots import PLOTS
 from softreach.studio.session import what_follows
 from softreach.studio.settings import PlotSettings
 from softreach.studio.state import Camera, Slice, StudioState
+from softreach.studio.work import CompilationWatch, IdleCompiler, Latest
 from tests.studio.test_state import states
 
 _PLOT = {plot.name: job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True)}
@@ -108,3 +115,97 @@ def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
     assert DrawFree not in what_follows(JOBS, light, heavy)
     assert DrawFree in what_follows(JOBS, heavy, bare)
     assert DrawFree not in what_follows(JOBS, bare, bare.replace(design=trunk))
+
+
+# Laws of background work
+
+
+def test_of_waiting_work_only_the_last_is_done():
+    done, started, go = [], threading.Event(), threading.Event()
+    latest = Latest(done.append)
+
+    def first(check):
+        started.set()
+        go.wait(600)
+        done.append("first")
+
+    latest.submit(first)
+    assert started.wait(600)
+    for name in ("second", "third", "fourth"):
+        latest.submit(lambda check, name=name: done.append(name))
+    go.set()
+    assert latest.join(600)
+    assert done == ["first", "fourth"]
+
+
+def test_stale_work_is_dropped_between_its_stages():
+    done, coarse, go = [], threading.Event(), threading.Event()
+    latest = Latest(done.append)
+
+    def staged(check):
+        done.append("coarse")
+        coarse.set()
+        go.wait(600)
+        check()
+        done.append("fine")
+
+    latest.submit(staged)
+    assert coarse.wait(600)
+    latest.submit(lambda check: done.append("newer"))
+    go.set()
+    assert latest.join(600)
+    assert done == ["coarse", "newer"]
+
+
+def test_trouble_is_told_and_the_next_work_is_done():
+    told, done = [], []
+    latest = Latest(told.append)
+    latest.submit(lambda check: 1 / 0)
+    assert latest.join(600)
+    latest.submit(lambda check: done.append("next"))
+    assert latest.join(600)
+    assert isinstance(told[0], ZeroDivisionError)
+    assert done == ["next"]
+
+
+def test_a_closed_worker_does_nothing_more():
+    done = []
+    latest = Latest(done.append)
+    latest.close()
+    latest.submit(lambda check: done.append("late"))
+    assert latest.join(600)
+    assert done == []
+
+
+# Compilation is noticed while it lasts
+
+
+def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
+    told = []
+    watch = CompilationWatch(told.append)
+    inner = njit(lambda x: x + 1)
+    outer = njit(lambda x: 2 * inner(x))
+    assert outer(1) == 4
+    assert told == [True, False]
+    assert outer(2) == 6
+    assert told == [True, False]  # compiled already
+    assert watch.done == 1
+    watch.close()
+    outer(1.5)
+    assert told == [True, False]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="priorities are others")
+def test_what_is_compiled_ahead_waits_for_all_others_and_ends_with_the_studio():
+    compiler = IdleCompiler()
+    compiler.close()
+    compiler.start()
+    assert compiler._process is None
+    compiler = IdleCompiler()
+    compiler.start()
+    process = compiler._process
+    compiler.start()
+    assert compiler._process is process
+    assert os.getpriority(os.PRIO_PROCESS, process.pid) == 19
+    compiler.close()
+    assert process.returncode is not None

@@ -7,9 +7,16 @@ import pytest
 
 import softreach as sr
 from softreach.arm import designs
+from softreach.geometry.surface import plane_cut
+from softreach.inverse import solve_inverse
 from softreach.rod.tip_map import TipStatus
 from softreach.studio import StudioState
 from softreach.studio.captions import size_text
+from softreach.studio.plots.section import enclosed_area, plane_counts, section_curves, within
+from softreach.studio.reach import stages
+from softreach.studio.settings import PlotSettings
+from softreach.studio.state import Slice
+from tests.studio.conftest import SMALL
 
 
 @pytest.fixture
@@ -153,3 +160,138 @@ def test_postures_under_loads_are_told(loads_tab):
     tab.session.update(lambda s: s.replace(activation=()))
     tab.settle()
     assert tab.drawn("/arm/0")
+
+
+# End to end: two places, one of them missed, and a slider that changes that
+
+
+def test_needs_are_seen_met_and_missed_and_follow_a_slider(tab):
+    tab.open("Goals")
+    tab.press("Add to the needs")  # where the tip is
+    tab.page.get_by_text("place 1: reached").wait_for()
+    tab.field("numbers").fill("0.37, 0.15, 0.85")
+    tab.settle()
+    tab.press("Add to the needs")
+    tab.page.get_by_text("place 2: missed by 0.0082").wait_for()
+    tab.wait(lambda: tab.drawn("/needs/missed"), "the place is a cross")
+    assert len(tab.drawn("/needs/reached").points) == 1
+
+    tab.open("Design")
+    tab.page.get_by_text("needs: 1 of 2 met · place 2 missed by").wait_for()
+    tab.drag("taper φ [deg]", -85)
+    tab.wait(lambda: tab.drawn("/needs/missed") is None, "the cross is a ball")
+    tab.page.get_by_text("needs: 2 of 2 met").wait_for()
+    tab.settle()
+    assert len(tab.drawn("/needs/reached").points) == 2
+    tab.open("Goals")
+    tab.page.get_by_text("place 2: reached").wait_for()
+    tab.press("Undo")
+    tab.page.get_by_text("place 2: missed by").wait_for()
+
+
+# End to end: the reachable set in the plane of the slice
+
+
+def test_the_section_is_that_of_the_exact_set(tab):
+    tab.open("Plots")
+    tab.page.get_by_label("section", exact=True).check()
+    tab.page.get_by_text("y = 0 m: ").wait_for()
+    picture = tab.page.locator("img").first
+    assert picture.evaluate("image => image.naturalWidth") > 600
+    reach = tab.session.reach
+    curves = section_curves(reach, Slice())
+    points = np.concatenate(curves)
+    assert np.ptp(points[:, 1]) == 0.0
+    assert all(np.array_equal(curve[0], curve[-1]) for curve in curves)
+    onto = reach.exact.distance(points[::10] * reach.arm.length)
+    assert np.abs(onto).max() < 2 * reach.exact.image.lattice.cell
+
+
+def test_the_picture_of_a_section_is_told_in_words_and_scrolled_by_keys(tab):
+    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
+    picture = tab.page.locator("img:visible").first
+    tab.wait(lambda: "one closed curve" in (picture.get_attribute("alt") or ""), "it has words")
+    area = tab.page.get_by_role("group", name="figures")
+    tab.wait(lambda: area.get_attribute("tabindex") == "0", "keys reach what scrolls")
+    before = tab.session.camera.actual()
+    area.evaluate("area => area.style.height = '200px'")
+    for key in ("ArrowDown", "ArrowLeft"):  # these turn the camera elsewhere
+        area.press(key, delay=200)
+    tab.wait(lambda: area.evaluate("area => area.scrollTop") > 0, "it is scrolled")
+    tab.settle()
+    assert tab.session.camera.actual() == before
+
+
+@pytest.mark.large
+def test_the_section_follows_the_slice_and_the_design(tab):
+    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
+    tab.settle()
+    before = tab.page.locator("img").first.get_attribute("src")
+    cut = Slice(axis="z", center=0.5, thickness=0.1)
+    tab.session.update(lambda s: s.showing(slice=cut))
+    tab.page.get_by_text("z = 0.5 m: ").wait_for()
+    assert tab.page.locator("img").first.get_attribute("src") != before
+    area = enclosed_area(section_curves(tab.session.reach, cut), 2)
+    tab.page.get_by_text(f"{area:.4g} m²").wait_for()
+    tab.open("Design")
+    tab.drag("revolution Ω [deg]", 40)
+    tab.settle()
+    assert tab.session.figures.plots["section"].arm == tab.session.state.design
+    changed = enclosed_area(section_curves(tab.session.reach, cut), 2)
+    assert changed != area
+    tab.page.get_by_text(f"{changed:.4g} m²").wait_for()
+
+
+@pytest.mark.large
+def test_the_section_is_drawn_for_a_dark_page_too(tab):
+    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings(shown=("section",))))
+    tab.settle()
+    light = tab.session.figures.plots["section"].image
+    tab.session.update(lambda s: s.showing(dark=True))
+    tab.settle()
+    dark = tab.session.figures.plots["section"].image
+    assert np.median(light) > 200
+    assert (light.min(axis=-1) < 60).any()
+    assert dark[0].max() < 60
+    assert not (dark == 255).all(axis=-1).any()
+    shown = tab.page.locator("img:visible").first
+    wide = dark.shape[1]
+    tab.wait(lambda: shown.evaluate("image => image.naturalWidth") == wide, "it is shown")
+    tab.session.update(lambda s: s.showing(dark=False, plots=PlotSettings()))
+    tab.settle()
+
+
+@pytest.mark.large
+def test_beside_the_set_nothing_is_reached(tab):
+    cut = Slice(axis="x", center=1.4, thickness=0.1)
+    tab.session.update(lambda s: s.showing(slice=cut, plots=PlotSettings(shown=("section",))))
+    tab.page.get_by_text("Nothing is reached at x = 1.4 m.").wait_for()
+    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings()))
+    tab.settle()
+
+
+@pytest.mark.large
+def test_the_numbers_in_the_plane_are_those_of_the_inverse():
+    arm = designs.minimal_trunk(revolution=np.radians(180), taper=np.radians(2))
+    *_, reach = stages(arm, 14, SMALL, lambda: None)
+    tips = reach.cloud.tip.values[:4000]
+    folded = tips[solve_inverse(arm, tips).counts > 1] / arm.length
+    cut = Slice(axis="x", center=float(np.median(folded[:, 0])))
+    curves = section_curves(reach, cut)
+    counts = plane_counts(reach, curves, 0)["count"].stack(place=("x", "y", "z"))
+    rows = np.flatnonzero(counts.values)[::20]
+    targets = np.array([counts.place.values[row] for row in rows])
+    np.testing.assert_array_equal(counts.values[rows], solve_inverse(arm, targets).counts)
+    assert counts.values.max() > 1  # this arm folds
+    assert within(curves, targets / arm.length, 0).all()
+
+
+@pytest.mark.large
+def test_the_areas_of_sections_sum_up_to_the_volume(tab):
+    reach = tab.session.reach
+    surface, length = reach.exact.surface(), reach.arm.length
+    low, high = surface.vertices[:, 2].min(), surface.vertices[:, 2].max()
+    edges = np.linspace(low, high, 41)
+    middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
+    areas = [enclosed_area(plane_cut(surface, 2, at), 2) for at in middles]
+    assert abs(sum(areas) * width / length**3 - reach.volume) < 0.02 * reach.volume

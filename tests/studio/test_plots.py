@@ -18,9 +18,10 @@ from softreach.studio.plots.plot import Chart, Curve, Figures
 from softreach.studio.plots.sweep import SweepPlot, sweep
 from softreach.studio.reach import Quality
 from softreach.studio.session import what_follows
-from softreach.studio.settings import PlotSettings
+from softreach.studio.settings import MOST_POINTS, PlotSettings, TipPath
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput
 
 STATE = StudioState(design=designs.minimal_trunk())
 MOVED = STATE.replace(activation=(-1.0, 0.0, -0.5))
@@ -108,3 +109,35 @@ def test_a_line_in_a_chart_is_vertical_and_belongs_to_no_curve():
     np.testing.assert_array_equal(curve, [3, np.nan, np.nan, 4])
     np.testing.assert_array_equal(line, [np.nan, 0, 1, np.nan])
     assert options["scales"]["mark"]["range"] == (0, 1)
+
+
+# Paths of the tip as values: kept in a state, refused
+
+
+def test_a_state_keeps_its_path_and_its_plots():
+    path = TipPath.through([[0, 0, 1.0], [0.1, 0, 0.9]], (-0.5, 0.0, 0.0))
+    state = StudioState(design=designs.minimal_trunk(), path=path).showing(
+        plots=PlotSettings(shown=("section",), parameter="taper")
+    )
+    assert StudioState.from_json(state.to_json()) == state
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        [[0, 0, 1]],
+        [[0, 0, 1]] * (MOST_POINTS + 1),
+        [[0, 0, 1], [0, 0, np.inf]],
+        [[0, 0], [1, 1]],
+        [["a", 0, 0], [0, 0, 0]],
+    ],
+)
+def test_a_path_that_cannot_be_followed_is_refused(points):
+    with pytest.raises(InvalidInput, match="path"):
+        TipPath.through(points)
+
+
+@pytest.mark.parametrize("changes", [{"shown": (1,)}, {"parameter": None}])
+def test_plot_settings_of_another_kind_are_refused(changes):
+    with pytest.raises(InvalidInput, match="plots"):
+        PlotSettings(**changes)

@@ -8,8 +8,9 @@ import socket
 import pytest
 
 from softreach.arm import designs
-from softreach.studio import StudioState
-from tests.studio.tab import CHEAP
+from softreach.studio import Start, Studio, StudioState
+from tests.studio.conftest import SMALL
+from tests.studio.tab import CHEAP, Tab
 
 STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
 QUOTED = STRIKE.replace('"', '\\"')
@@ -132,3 +133,21 @@ def test_no_other_page_can_frame_the_studio(browser, studio):
     assert all("softreach" not in frame.content() for frame in page.frames[1:])
     assert not any(frame.locator("#root").count() for frame in page.frames[1:])
     page.close()
+
+
+# A studio that others can reach shows itself only to those who know its token
+
+
+@pytest.fixture
+def guarded():
+    state = StudioState(design=designs.minimal_trunk()).showing(level=12)
+    with Studio(Start(state=state, quality=SMALL), token="secret") as running:
+        yield running
+
+
+@pytest.mark.large
+def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, guarded):
+    tab = Tab(browser, guarded)
+    assert tab.session.reach is not None
+    assert tab.errors == []
+    tab.close()
