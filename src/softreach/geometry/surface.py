@@ -131,6 +131,19 @@ def enclosed_volume(vertices: Points, faces: Faces) -> float:
     return float(np.ldexp(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0, 3 * exponent))
 
 
+def corner_areas(vertices: Points, faces: Faces) -> Points:
+    """∂V/∂r of each vertex of an oriented closed surface [m²]: what it sweeps as it moves, (v, 3).
+
+    The volume is a sum of triple products over 6: linear in each corner. V = Σ r · ∂V/∂r / 3.
+    """
+    area, corners = np.zeros_like(vertices), (vertices - vertices.mean(axis=0))[faces]
+    for k in range(3):
+        share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
+        for axis in range(3):
+            area[:, axis] += np.bincount(faces[:, k], share[:, axis], len(vertices))
+    return area
+
+
 def surface_area(vertices: Points, faces: Faces) -> float:
     """Area of a surface [m²]."""
     scaled, exponent = unit_scale(vertices)  # squares of squares overflow early

@@ -16,7 +16,7 @@ from softreach.support.arguments import as_flag, as_given, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 
-__all__ = ["coarsened", "in_steps", "refined", "tip_map"]
+__all__ = ["coarsened", "effective", "in_steps", "refined", "tip_map"]
 
 
 def tip_map(
@@ -80,6 +80,18 @@ def _to_tolerance(rod: TipMap, tol: float) -> TipMap:
     return _of_arm(rod.arm, tol, frame) if isinstance(rod, ArmRod | PlacedRod) else rod
 
 
+def effective(rod: TipMap) -> TipMap:
+    """The tip map of the same arm in inputs beyond the dead zones of its drives.
+
+    It has the same image and no kinks at dead zones; itself where there are none.
+    """
+    if isinstance(rod, View):
+        return replace(rod, base=effective(rod.base))
+    if isinstance(rod, DrivenRod) and any(drive.dead_zone for drive in rod.outer.drives):
+        return replace(rod, is_effective=True)
+    return rod
+
+
 def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
     """The tip map of an arm in so many steps, which are not checked against its tolerance.
 
@@ -94,7 +106,7 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
     if arm.inner is not arm:
         inner = in_steps(arm.inner, steps, like)
         assert isinstance(inner, ArmRod | PlacedRod)
-        return DrivenRod(inner, arm)
+        return DrivenRod(inner, arm, isinstance(like, DrivenRod) and like.is_effective)
     if like.frame == "world" and not arm.base.is_identity:
         rod = in_steps(arm, steps, _from_base(like))
         assert isinstance(rod, ArmRod)

@@ -11,8 +11,8 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.geometry.hull import convex_faces
-from softreach.geometry.surface import compact_surface, enclosed_volume
-from softreach.rod.rods import refined, tip_map
+from softreach.geometry.surface import compact_surface, corner_areas, enclosed_volume
+from softreach.rod.rods import effective, refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.schema import provenance
@@ -264,7 +264,7 @@ class _Sum(NamedTuple):
 
 def _sum(nodes: BoundarySamples | HullCorners | Flux, tips: TipDerivatives) -> _Sum:
     """Volume swept by nodes with area vectors."""
-    slopes = tips.at(nodes.faces.cube if isinstance(nodes, Flux) else nodes.cube)
+    slopes = tips.at(nodes.cube)
     swept = np.einsum("ni,nip->np", nodes.area, slopes)
     error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())
     if isinstance(nodes, BoundarySamples):
@@ -282,7 +282,7 @@ def _by_differences(
         if arm is solid.arm:
             return solid
         if solid.route != "search":
-            return rasterized_set(tip_map(arm), solid.cells, cell, accuracy)
+            return rasterized_set(effective(tip_map(arm)), solid.cells, cell, accuracy)
         neighbor = reachable_set(arm, accuracy=accuracy, cell=cell)
         assert isinstance(neighbor, ReachableSolid)
         return neighbor
@@ -322,12 +322,7 @@ class HullCorners:
         """Corners of the hull of some tips at places of the cube."""
         every = convex_faces(tips)
         vertices, faces = compact_surface(tips, every)
-        area = np.zeros_like(vertices)
-        corners = (vertices - vertices.mean(axis=0))[faces]
-        for k in range(3):
-            # The volume is a sum of triple products over 6: linear in each corner.
-            share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
-            np.add.at(area, faces[:, k], share)
+        area = corner_areas(vertices, faces)
         return cls(cube[np.unique(every)], area, enclosed_volume(vertices, faces))
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import effective, tip_map
 from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
 from softreach.support.arguments import (
     POSITIVE,
@@ -105,7 +105,7 @@ def reachable_set(
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)
     grid = None if grid is None else as_even_cells("grid", grid)
     memory = None if memory is None else as_number("memory", memory, _SIZES)
-    rod = tip_map(arm, tol, frame=frame)
+    rod = effective(tip_map(arm, tol, frame=frame))
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)

@@ -18,6 +18,7 @@ from scipy.ndimage import maximum_filter
 
 from softreach.geometry.surface import Surface, compact_surface
 from softreach.picture.shading import vertex_normals
+from softreach.rod.driven import DrivenRod
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Faces, Mask
@@ -98,6 +99,7 @@ def box_sheets(rod: TipMap) -> Sheets | None:
 def _sheets(rod: TipMap, cube: Array, faces: Faces) -> Sheets:
     cube, faces = compact_surface(cube, faces)
     activation, lines = rod.box.from_free_cube(cube), _lines(cube, faces)
+    activation = rod.inputs(activation) if isinstance(rod, DrivenRod) else activation
     return Sheets(vertices=_tips(rod, cube), faces=faces, lines=lines, activation=activation)
 
 

@@ -139,8 +139,8 @@ class ReachableSolid(ReachableSet):
 
         Unlike `surface()` it is smooth, ends sharply at rims and where sheets cross, has parts of
         any thinness, and knows its `lines` and activations. It is for pictures: there may be gaps
-        where sheets meet. Of more than three free bundles, and under loads where the set folds, it
-        is `surface()`.
+        where sheets meet. Of more than three free bundles, of maps with kinks, and under loads where
+        the set folds, it is `surface()`.
 
         Raises:
             MissingExtra: scikit-image is not installed.
@@ -233,7 +233,11 @@ class ReachableSolid(ReachableSet):
         sheets = None
         if self.route == "flux" and not self.lost_share:
             sheets = box_sheets(self.tip_map)
-        elif isinstance(self.image, Image) and not self.tip_map.supports_unstable:
+        elif (
+            isinstance(self.image, Image)
+            and self.tip_map.is_smooth
+            and not self.tip_map.supports_unstable
+        ):
             sheets = outer_sheets(self.tip_map, self.image)
         return Sheets.of(self.surface()) if sheets is None else sheets
 

@@ -17,7 +17,7 @@ from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
 from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
-from softreach.workspace.grid import every_second, grid_tips, image_measure
+from softreach.workspace.grid import every_second, grid_ticks, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
 
 __all__ = ["ReachableCurve", "ReachablePoint", "ReachableSurface", "thin_set"]
@@ -52,7 +52,7 @@ class ReachableSurface(ReachableSet):
     def of(cls, rod: TipMap) -> Self:
         """The surface of a tip map with two free bundles."""
         cells = _SURFACE_CELLS
-        tips = grid_tips(rod, cells)
+        tips = _grid_tips(rod, cells)
         left_out = left_out_cells(rod, tips, cells)
         area, error = _measure(rod, tips, left_out)
         base = np.flatnonzero(~left_out)
@@ -123,7 +123,7 @@ class ReachableCurve(ReachableSet):
     @classmethod
     def of(cls, rod: TipMap) -> Self:
         """The curve of a tip map with one free bundle."""
-        path = grid_tips(rod, _CURVE_CELLS)
+        path = _grid_tips(rod, _CURVE_CELLS)
         left_out = left_out_cells(rod, path, _CURVE_CELLS)
         length, error = _measure(rod, path, left_out)
         convex = _convex_volume(path, _CURVE_CELLS, 1)
@@ -212,11 +212,20 @@ def thin_set(rod: TipMap) -> ReachableSet:
     return _KINDS[rod.box.dimension].of(rod)
 
 
+def _grid_tips(rod: TipMap, cells: int) -> Array:
+    """Tips of a grid [m], on whose lines kinks are; even where some tips may be unstable."""
+    return grid_tips(rod, cells, ticks=None if rod.supports_unstable else grid_ticks(rod, cells))
+
+
 def _measure(rod: TipMap, tips: Array, left_out: Mask) -> Estimate:
     """Length or area of the image, and by how much fewer Gauss nodes change it.
 
-    Where cells are left out, it is that of the others and an estimate of the rest.
+    Where cells are left out, it is that of the others and an estimate of the rest. Where the map
+    has kinks it is that of all cells, which err by O(1/n) there: three times the error is stated.
     """
+    if not rod.is_smooth:
+        found = _of_cells(tips, left_out)
+        return found._replace(error=3.0 * found.error)
     if not left_out.any():
         fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
         if np.isfinite([fine, rough]).all():
