@@ -30,7 +30,7 @@ def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0)
 
     By Gauss and Legendre's rule on the faces, where the map is smooth: its error falls faster than
     any power of the number of nodes. They are added until tips are no more exact than the rule. Of
-    maps with kinks it is the volume in mapped triangles, which needs no slopes: see `_of_triangles`.
+    maps with kinks it is the volume in mapped triangles, which needs no slopes.
 
     Args:
         rod: The tip map.
@@ -94,7 +94,7 @@ def _of_triangles(rod: TipMap, enough: float) -> Flux:
 
 
 def _triangle_nodes(rod: TipMap, cells: int) -> Flux:
-    """Vertices of a grid on the faces, kinks along its lines, with the areas that they stand for."""
+    """Vertices of a grid on the faces, with kinks along its lines, and the areas of each."""
     grid, ticks = grid_faces(cells), grid_ticks(rod, cells)
     cube = np.stack(
         [t[np.rint(cells * x).astype(int)] for t, x in zip(ticks, grid.T, strict=True)], axis=1

@@ -17,12 +17,8 @@ from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
-from softreach.workspace.boundary import (
-    ReachedCells,
-    boundary_surface,
-    critical_surface,
-    signed_field,
-)
+from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
+from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
 from softreach.workspace.measure import Estimate
@@ -125,8 +121,9 @@ class ReachableSolid(ReachableSet):
         """The boundary: closed, oriented outwards, without staircase.
 
         For the route "flux" it is the image of the faces of the activation box, on which its
-        vertices lie exactly; otherwise it is found in the raster, in which parts thinner than a
-        cell are lost.
+        vertices lie exactly; for more than three free bundles a surface of tips, which is wrapped
+        around parts of any thinness and leaves corners out by up to half a cell. Otherwise it is
+        found in the raster, in which parts thinner than a cell are lost.
 
         Raises:
             MissingExtra: scikit-image is not installed.
@@ -139,8 +136,8 @@ class ReachableSolid(ReachableSet):
 
         Unlike `surface()` it is smooth, ends sharply at rims and where sheets cross, has parts of
         any thinness, and knows its `lines` and activations. It is for pictures: there may be gaps
-        where sheets meet. Of more than three free bundles, of maps with kinks, and under loads where
-        the set folds, it is `surface()`.
+        where sheets meet. Of more than three free bundles, of maps with kinks, and under loads
+        where the set folds, it is `surface()`.
 
         Raises:
             MissingExtra: scikit-image is not installed.
@@ -151,7 +148,7 @@ class ReachableSolid(ReachableSet):
         """Mask of the points that are reachable: a mapped simplex of the grid covers them.
 
         For more than three free bundles, a search within the bounds ends on them, to a
-        thousandth of a cell.
+        hundredth of a cell.
 
         Args:
             points: Positions [m], shape (n, 3).
@@ -162,10 +159,11 @@ class ReachableSolid(ReachableSet):
         from scipy.ndimage import map_coordinates
 
         positions = as_points("points", points)
-        # A cell's diagonal inside nothing is to be decided; one cell where each place is a search.
-        margin = np.sqrt(3.0) if isinstance(self.image, Image) else 1.0
-        at = self.image.lattice.coordinates(positions)
-        inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
+        if isinstance(self.image, ReachedCells):
+            inside = self.image.are_deep(positions)
+        else:  # a cell's diagonal inside nothing is to be decided
+            at = self.image.lattice.coordinates(positions)
+            inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -np.sqrt(3.0)
         inside[~inside] = self.image.counts_at(positions[~inside]) > 0
         return inside
 
@@ -173,8 +171,8 @@ class ReachableSolid(ReachableSet):
         """Distance to the boundary [m], negative inside.
 
         Outside it is the distance to the image of the grid itself, or for more than three free
-        bundles to the nearest tip that a search finds. Inside it is the distance to
-        the surface found in the raster, in which parts and gaps thinner than a cell are lost.
+        bundles to the nearest tip that a search finds. Inside it is the distance to the surface
+        found in the raster, in which parts and gaps thinner than a cell are lost, or to `surface`.
 
         Args:
             points: Positions [m], shape (n, 3).
@@ -222,10 +220,13 @@ class ReachableSolid(ReachableSet):
 
     @lazy
     def _field(self) -> Array:
+        assert isinstance(self.image, Image)
         return signed_field(self.image)
 
     @lazy
     def _boundary(self) -> Surface:
+        if isinstance(self.image, ReachedCells):
+            return self.image.wrap
         return boundary_surface(self.image, self._field, self.volume)
 
     @lazy
