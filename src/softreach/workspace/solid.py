@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,11 +31,23 @@ __all__ = ["ReachableSolid", "Route"]
 
 Route = Literal["flux", "raster", "search"]
 
+_THIN = 0.01  # of its width, the root of its area, that a shell is thinner than
+_NEVER_THIN = 0.05  # of L³: no sheet within reach is that large and thin
+
 _ROUTES = {
     "flux": "one to one: by flux through the faces of the activation box",
     "raster": "rasterized, as the image folds or overlaps or may do so",
     "search": "searched for in space",
 }
+
+
+class Shell(NamedTuple):
+    """A thin set as a sheet: the area of its middle, half of that of both sides."""
+
+    area: Estimate
+    """[m²]."""
+    thickness: Estimate
+    """Volume over that area [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -116,6 +128,34 @@ class ReachableSolid(ReachableSet):
             "length": self.tip_map.length,
         }
         return xr.Dataset(variables, lattice.centers(), attrs)
+
+    @lazy
+    def shell(self) -> Shell | None:
+        """The sheet that a set thinner than a hundredth of its width is; None for other sets."""
+        if self.volume > _NEVER_THIN * self.tip_map.length**3:
+            return None
+        area = self._boundary_area()
+        half = Estimate(0.5 * area.value, 0.5 * area.error)
+        if not half.value > 0.0 or self.volume > _THIN * half.value**1.5:
+            return None
+        thickness = self.volume / half.value
+        error = self.volume_error / half.value + thickness * half.error / half.value
+        return Shell(half, Estimate(thickness, error))
+
+    def _boundary_area(self) -> Estimate:
+        """Area of both sides of a thin set [m²]."""
+        if self.route == "search":
+            assert isinstance(self.image, ReachedCells)
+            fine, coarse = self.image.wrap.area, self.image.coarse.area
+            return Estimate(fine, abs(fine - coarse))
+        cells = 48 if self.tip_map.supports_unstable else 96
+        faces = [face_image(self.tip_map, count) for count in (cells, cells // 2)]
+        areas = [np.nan if face is None else face.area for face in faces]
+        removed = (areas[0] - areas[1]) / 3.0
+        # What is reached more than once counts once, and may be any part of the faces.
+        several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
+        share = several / self.volume if self.volume > 0.0 else 1.0
+        return Estimate(areas[0] + removed, abs(removed) + share * areas[0])
 
     def surface(self) -> Surface:
         """The boundary: closed, oriented outwards, without staircase.
@@ -257,6 +297,10 @@ class ReachableSolid(ReachableSet):
             f"volume {quantity(self.volume, 'm³', self.volume_error)}",
             f"{self._convex_text()}, of which {quantity(share, '%', error)} are out of reach",
         ]
+        if self.shell is not None:
+            area, thickness = self.shell
+            sheet = f"a shell of area {quantity(area.value, 'm²', area.error)}, "
+            lines.insert(0, f"{sheet}thickness {quantity(thickness.value, 'm', thickness.error)}")
         if self.multiplicity:
             several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
             again = quantity(several, "m³", self.multiplicity_error)
@@ -271,6 +315,11 @@ class ReachableSolid(ReachableSet):
             "volume_error": Number(self.volume_error, "m3", "error of the volume"),
             **self._convex_numbers(),
         }
+        for name, size, unit in (("area", 0, "m2"), ("thickness", 1, "m")):
+            if self.shell is not None:
+                value, error = self.shell[size]
+                numbers[f"shell_{name}"] = Number(value, unit, f"{name} of the thin set")
+                numbers[f"shell_{name}_error"] = Number(error, unit, f"error of the {name}")
         if not self.multiplicity:
             return numbers
         fold = "volume reached with both orientations"
