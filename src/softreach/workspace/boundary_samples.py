@@ -122,10 +122,11 @@ def _along(
 
 
 def _of_cells(cells: ReachedCells) -> BoundarySamples:
-    crossings, rod, wrap = cells.crossings, cells.rod, cells.wrap
-    if crossings is None:
+    rod, wrap = cells.rod, cells.wrap
+    if not cells.is_thick:
         group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
         return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
+    crossings, _ = cells.swept
     edges, lattice = crossings.edges, cells.lattice
     every = np.arange(len(edges.cell))
     index = np.stack(np.unravel_index(edges.cell, lattice.shape), axis=-1)

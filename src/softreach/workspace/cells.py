@@ -14,9 +14,9 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 from softreach.workspace.convex import ConvexHull
-from softreach.workspace.crossings import Crossings
+from softreach.workspace.crossings import Crossings, swept_crossings
 from softreach.workspace.image import Lattice, covered_cubes
-from softreach.workspace.search import nearest_tips
+from softreach.workspace.search import Flood, nearest_tips
 from softreach.workspace.wrap import Wrap
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ __all__ = ["ReachedCells"]
 _STARTS = 6  # tips nearby from which places are searched
 _MORE_STARTS, _NEAR = 24, 0.1  # of places that are nearer than this, in cells, to a tip
 _ON = 1e-2  # cells from a tip, where a place counts as reached
+_THICK = 3.0  # cells, on average
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
 
@@ -35,20 +36,38 @@ _CHUNK = 1 << 16
 class ReachedCells:
     """Counterpart of `Image` for more than three free bundles: asked by search."""
 
-    rod: TipMap
-    lattice: Lattice
-    reached: Mask
-    """True for cells whose centers are reached."""
-    gamma: Array
-    """Activations that reach them, meaningless elsewhere, shape (cells, bundles)."""
+    flood: Flood
     cloud: tuple[Array, Array]
     """Activations on faces of the box, and their tips [m]."""
     wrap: Wrap
     coarse: Wrap
     """The same on cells one and a half times as large."""
-    crossings: Crossings | None
-    """Places where edges between centers are cut; None where the volume is that of `wrap`."""
     hull: ConvexHull
+
+    @property
+    def rod(self) -> TipMap:
+        """The tip map."""
+        return self.flood.rod
+
+    @property
+    def lattice(self) -> Lattice:
+        """The cells."""
+        return self.flood.lattice
+
+    @property
+    def reached(self) -> Mask:
+        """True for cells whose centers are reached."""
+        return self.flood.reached
+
+    @property
+    def is_thick(self) -> bool:
+        """True if lines of sight see enough of the set between its sides."""
+        return 2.0 * self.wrap.tight_volume > _THICK * self.lattice.cell * self.wrap.area
+
+    @lazy
+    def swept(self) -> tuple[Crossings, float]:
+        """Places where edges between centers are cut, and what they may miss [m³]."""
+        return swept_crossings(self.flood)
 
     @property
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -101,9 +120,9 @@ class ReachedCells:
             index = corner.astype(np.int64)
             within = ((index >= 0) & (index < self.lattice.shape)).all(axis=1)
             cells = np.ravel_multi_index(
-                tuple(np.where(within, i, 0) for i in index.T), self.reached.shape
+                tuple(np.where(within, i, 0) for i in index.T), self.lattice.shape
             )
-            yield within & self.reached.ravel()[cells], self.gamma[cells]
+            yield within & (self.flood.gap[cells] == 0.0), self.flood.gamma[cells]
 
     @lazy
     def _tree(self) -> KDTree:

@@ -214,7 +214,7 @@ def _swept(
 def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
     """Derivatives of the volume of more than three bundles."""
     assert isinstance(solid.image, ReachedCells)
-    if solid.image.crossings is None:
+    if not solid.image.is_thick:
         wrap, coarse = (_sum(each, tips) for each in (solid.image.wrap, solid.image.coarse))
         return _Swept(wrap.value, wrap.error + _CHANGES * np.abs(wrap.value - coarse.value))
     swept = _sum(boundary_samples(solid.image), tips)

@@ -16,12 +16,11 @@ import numpy as np
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.convex import ConvexHull, climbed_hull
-from softreach.workspace.crossings import Crossings
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
@@ -44,9 +43,8 @@ _RULE = 2.5  # cells along the mean side of the bounding box, times the root of 
 _FEWEST = 16.0
 _FINER = 1.5
 _SHIFT = (0.31, 0.17, 0.43)  # of a cell: lines on a plane of symmetry would all err alike
-_SWEEPS = 3
-_BEYOND = 0.05  # cells by which a sweep looks beyond a crossing
-_APART = 0.05  # ranges: activations nearer to each other lead to the same end
+_MOST_ALONG = 96.0
+_THINNEST = 128.0  # cells along the mean side: below are no sheets
 _MOST_CELLS = 2.0**26
 
 
@@ -82,7 +80,8 @@ def searched_set(
     smallest = _smallest_cell(rod, sides, memory)
     if cell is not None and not smallest <= cell < np.inf:  # NaN too
         raise InvalidInput("cell", cell, f"at least {smallest:.3g} m for {memory:.2g} bytes")
-    target = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * np.cbrt(np.prod(sides))
+    mean = float(np.cbrt(np.prod(sides)))
+    target = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * mean
     edge = float(max(target, smallest, sides.max() / 1024.0)) if cell is None else cell
 
     def of_cells(edge: float) -> Flood:
@@ -93,11 +92,39 @@ def searched_set(
     hull = climbed_hull(rod, begin.clip(0.0, 1.0), accuracy)
     while True:
         flood = of_cells(edge)
-        found = _found(flood, cloud, coarse, hull, accuracy)
-        is_met = found.volume.error <= accuracy * found.volume.value
-        if is_met or cell is not None or edge / _FINER < smallest:
+        found = _found(flood, cloud, coarse, hull)
+        if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
             return found
         edge, coarse = edge / _FINER, found.cells.wrap
+
+
+def _may_meet(found: Searched, accuracy: float, smallest: float, of_sheets: float) -> bool:
+    """True if an accuracy is not met but may be, by cells that are no smaller than allowed.
+
+    Where nothing is seen between both sides of a sheet, its error falls as the square of the edge,
+    until the sheet is thin enough for its thickness to be found.
+    """
+    (volume, error), cells = found.volume, found.cells
+    edge = cells.lattice.cell
+    if error <= accuracy * volume or edge / _FINER < smallest:
+        return False
+    if cells.is_thick:
+        return True
+    is_sheet = cells.wrap.volume_of_tips != cells.wrap.tight_volume
+    needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(volume, 0.0) / error)
+    return needed >= of_sheets
+
+
+def wrap_of(rod: TipMap, cell: float) -> Wrap:
+    """The surface of tips around the image of a box of any number of free bundles.
+
+    Args:
+        rod: The tip map.
+        cell: Edge of a cell [m]; larger where that takes more than 96 cells along the longest side.
+    """
+    cloud = cloud_on_faces(rod, 0)
+    edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
+    return wrapped(flooded(Flood(rod, _lattice(cloud[1], edge)), *cloud))
 
 
 def _lattice(tips: Array, cell: float) -> Lattice:
@@ -138,24 +165,19 @@ def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
     return high
 
 
-def _found(
-    flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexHull, accuracy: float
-) -> Searched:
+def _found(flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexHull) -> Searched:
     """The set by its wrap; by lines of sight if these tell the volume better, and agree."""
-    rod, edge, wrap, crossings = flood.rod, flood.lattice.cell, wrapped(flood), None
-    slack = ENOUGH * edge + rod.tol * rod.length
-    change = abs(wrap.tight_volume - coarse.tight_volume)
-    volume = Estimate(wrap.tight_volume, change + wrap.area * slack)
-    if volume.error > accuracy * volume.value:
-        lines, missed = _swept(flood)
+    rod, edge, wrap = flood.rod, flood.lattice.cell, wrapped(flood)
+    change = abs(wrap.volume_of_tips - coarse.volume_of_tips)
+    volume = Estimate(wrap.volume_of_tips, change + wrap.error_of_tips)
+    reached = ReachedCells(flood, cloud, wrap, coarse, hull)
+    if reached.is_thick:
+        lines, missed = reached.swept
         area = len(lines.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
         seen = line_volume(lines)
-        error = seen.error + missed + area * slack
+        error = seen.error + missed + area * (ENOUGH * edge + rod.tol * rod.length)
         if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
-            volume, crossings = Estimate(seen.value, error), lines
-    reached = ReachedCells(
-        rod, flood.lattice, flood.reached, flood.gamma, cloud, wrap, coarse, crossings, hull
-    )
+            volume = Estimate(seen.value, error)
     return Searched(reached, volume)
 
 
@@ -191,36 +213,6 @@ def _wider(flood: Flood) -> Flood:
     wide = Flood(flood.rod, larger, flood.progress, is_flat=flood.is_flat)
     wide.add(flood.gamma[known], flood.rod.tips(flood.gamma[known]))
     return wide
-
-
-def _swept(flood: Flood) -> tuple[Crossings, float]:
-    """Crossings that no neighbor's activation leads beyond, and what may still be missed [m³]."""
-    from scipy.spatial import KDTree
-
-    crossings = Crossings.of(flood)
-    volume = flood.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
-    gain = 0.0
-    for sweep in range(1, _SWEEPS + 1):
-        count = len(crossings.edges.cell)
-        if count <= sweep:
-            return crossings, 0.0
-        places = crossings.points(np.arange(count), crossings.place)
-        others = np.asarray(KDTree(places).query(places, k=sweep + 1)[1])[:, sweep]
-        apart = np.abs(crossings.gamma[others] - crossings.gamma) / flood.rod.box.scales
-        which = np.flatnonzero((apart > _APART).any(axis=1))
-        moved = crossings.advance(which, crossings.gamma[others[which]], _BEYOND)
-        gain = float(moved.clip(0.0).sum()) * volume
-        beyond = np.flatnonzero(crossings.low >= 1.0)
-        if len(beyond):
-            _reach_further(flood, crossings, beyond)
-            crossings = Crossings.of(flood)
-    return crossings, gain
-
-
-def _reach_further(flood: Flood, crossings: Crossings, beyond: Index) -> None:
-    """Note that the far ends of edges are reached after all."""
-    gamma = crossings.gamma[beyond]
-    flood.add(gamma, crossings.points(beyond, crossings.low[beyond]))
 
 
 def cloud_on_faces(rod: TipMap, seed: int) -> tuple[Array, Array]:

@@ -177,7 +177,7 @@ def _zeros(rod: TipMap, cube: Array, dets: Array) -> Callable[[NDArray[np.int32]
     def cut(pairs: NDArray[np.int32]) -> Array:
         low, high = np.zeros(len(pairs)), np.ones(len(pairs))
         at_low, at_high = dets[pairs[:, 0]].copy(), dets[pairs[:, 1]].copy()
-        share = at_low / (at_low - at_high)
+        share = _zero(at_low, at_high)
         for _ in range(_SECANTS):
             value = _dets(rod, _between(cube[pairs], share))
             beyond = np.sign(value) == np.sign(at_high)
@@ -187,10 +187,16 @@ def _zeros(rod: TipMap, cube: Array, dets: Array) -> Callable[[NDArray[np.int32]
                 np.where(beyond, at_low / 2, value),
             )
             low = np.where(beyond, low, share)
-            share = low + (high - low) * at_low / (at_low - at_high)
+            share = low + (high - low) * _zero(at_low, at_high)
         return share
 
     return cut
+
+
+def _zero(at_low: Array, at_high: Array) -> Array:
+    """Shares of the way at which what is linear between values is 0; the middle where both are."""
+    change = at_low - at_high
+    return np.divide(at_low, change, out=np.full_like(change, 0.5), where=change != 0.0)
 
 
 def _fold(rod: TipMap) -> tuple[Array, Faces]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.geometry.surface import Surface
+from softreach.geometry.surface import Surface, without_flakes
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
@@ -22,6 +22,7 @@ from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
 from softreach.workspace.measure import Estimate
+from softreach.workspace.redundant import wrap_of
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ __all__ = ["ReachableSolid", "Route"]
 Route = Literal["flux", "raster", "search"]
 
 _THIN = 0.01  # of its width, the root of its area, that a shell is thinner than
+_SEEN = 2.0  # cells of a raster, below which a set is a sheet to it
 _NEVER_THIN = 0.05  # of L³: no sheet within reach is that large and thin
 
 _ROUTES = {
@@ -162,14 +164,16 @@ class ReachableSolid(ReachableSet):
 
         For the route "flux" it is the image of the faces of the activation box, on which its
         vertices lie exactly; for more than three free bundles a surface of tips, which is wrapped
-        around parts of any thinness and leaves corners out by up to half a cell. Otherwise it is
-        found in the raster, in which parts thinner than a cell are lost.
+        around parts of any thinness and leaves corners out by up to half a cell, and so it is for
+        three where the set is thinner than two cells. Otherwise it is found in the raster, which
+        leaves corners out by up to a cell. Parts that add up to less than the error of the volume
+        are left out.
 
         Raises:
             MissingExtra: scikit-image is not installed.
         """
         image = self._face_image if self.route == "flux" and not self.lost_share else None
-        return self._boundary if image is None else image
+        return without_flakes(self._boundary, self.volume_error) if image is None else image
 
     def sheets(self) -> Sheets:
         """The boundary as the sheets it consists of: images of faces of the box, and folds.
@@ -267,7 +271,13 @@ class ReachableSolid(ReachableSet):
     def _boundary(self) -> Surface:
         if isinstance(self.image, ReachedCells):
             return self.image.wrap
-        return boundary_surface(self.image, self._field, self.volume)
+        surface = boundary_surface(self.image, self._field, self.volume)
+        if self.lost_share or self.volume > _NEVER_THIN * self.tip_map.length**3:
+            return surface
+        cell = self.image.lattice.cell
+        if not 2.0 * self.volume > _SEEN * cell * self._boundary_area().value:
+            return wrap_of(self.tip_map, cell)
+        return surface
 
     @lazy
     def _sheets(self) -> Sheets:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.geometry.surface import Surface, corner_areas
+from softreach.rod.activation_box import damped_steps
+from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import MissingExtra
@@ -24,6 +26,12 @@ DISTANCE = 0.75
 """Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
 _CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 _ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
+_SHEET = 2e-3  # of its width, the root of its area, that a sheet is thinner than
+_SHEET_TOL = 1e-9  # in L, as a sheet may be no thicker than tips are exact otherwise
+_WIDEST = 0.99  # of all thicknesses are below the one that the next pushes go beyond
+_STRETCH = 30.0  # times as much as one to the side, a miss along the normal counts
+_PUSHES, _PASSES = 12, 4
+_DAMPING = 1e-8  # of the mean square of the slopes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -33,8 +41,38 @@ class Wrap(Surface):
     rod: TipMap
     gamma: Array
     """Activations that lead to the vertices, shape (v, bundles)."""
+    cell: float
+    """Edge of the cells that it was found with [m]."""
     tight_volume: float
     """Volume inside of the tips themselves [m³]."""
+
+    @property
+    def error_of_tips(self) -> float:
+        """Of this volume, by where tips count as found and by their own errors [m³]."""
+        if self.volume_of_tips != self.tight_volume:
+            return self.area * _SHEET_TOL * self.rod.length
+        return self.area * (ENOUGH * self.cell + self.rod.tol * self.rod.length)
+
+    @lazy
+    def volume_of_tips(self) -> float:
+        """The same; of a sheet that is far thinner than cells, its thickness over its area [m³].
+
+        No search for the nearest tip sees so small a change; so from each vertex the tip is pushed
+        along its normal, to which all columns of ∂r/∂γ are nearly square, to both sides.
+        """
+        half = 0.5 * self.area
+        thickness = self.tight_volume / half if half > 0.0 else np.inf
+        if self.rod.supports_unstable or thickness > _SHEET * np.sqrt(half):
+            return self.tight_volume
+        rod, areas = refined(self.rod, _SHEET_TOL), np.linalg.norm(self.corner_areas, axis=1)
+        tips, slopes = rod.tips_and_slopes(self.gamma)
+        normals = np.linalg.svd(slopes * rod.box.scales)[0][:, :, 2]
+        found = np.zeros(len(tips))
+        for _ in range(_PASSES):
+            ways = (2.0 * thickness * normals, -2.0 * thickness * normals)
+            found = sum(_pushed(rod, self.gamma, tips, way) for way in ways)
+            thickness = float(np.quantile(found, _WIDEST))
+        return 0.5 * float(areas @ found)
 
     @lazy
     def cube(self) -> Array:
@@ -46,6 +84,19 @@ class Wrap(Surface):
     def corner_areas(self) -> Array:
         """Outward area that each vertex stands for [m²], shape (v, 3)."""
         return corner_areas(self.vertices, self.faces)
+
+
+def _pushed(rod: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
+    """How far tips go along a way that is too far, with little to the side [m], shape (n,)."""
+    size = np.linalg.norm(way, axis=1)
+    unit, target = way / size[:, None], tips + way
+    scale = np.eye(3) + (_STRETCH - 1.0) * unit[:, :, None] * unit[:, None, :]
+    for _ in range(_PUSHES):
+        at, slopes = rod.tips_and_slopes(gamma)
+        miss, stretched = scale @ (at - target)[:, :, None], scale @ slopes
+        square = ((stretched * rod.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
+        gamma, _ = damped_steps(rod.box, gamma, miss[:, :, 0], stretched, _DAMPING * square)
+    return ((rod.tips(gamma) - tips) * unit).sum(axis=1)
 
 
 def spread(flood: Flood) -> None:
@@ -134,6 +185,7 @@ def wrapped(flood: Flood) -> Wrap:
         vertices=tips + _ASIDE * cell * away,
         faces=faces,
         rod=flood.rod,
+        cell=cell,
         gamma=gamma,
         tight_volume=tight,
     )
