@@ -95,6 +95,7 @@ def test_tips_lie_in_the_region_and_its_outline_around_them(region):
 def test_two_bundles_have_the_area_that_green_tells():
     arm = planar(pairs=1, chamber=True).with_bounds(((0.0, 8.0), (0.0, 0.0), (0.0, 2e4)))
     found = reachable_set(arm)
+    assert isinstance(found, ReachableRegion)
     rod, edge = tip_map(arm), np.linspace(0.0, 1.0, 4001)
     around = np.concatenate([
         np.stack([edge, 0 * edge], 1), np.stack([1 + 0 * edge, edge], 1),
@@ -115,6 +116,7 @@ def test_any_number_of_bundles_leaves_an_area_wherever_the_base_points(pairs, ch
         accuracy=0.02,
     )
     assert isinstance(upright, ReachableRegion)
+    assert isinstance(leaning, ReachableRegion)
     error = upright.area_error + leaning.area_error
     assert abs(upright.area - leaning.area) < error < 0.04 * upright.area
     assert 0.0 < upright.unreachability < 1.0
@@ -126,14 +128,18 @@ def test_a_sheet_in_space_is_no_plane():
 
 def test_clouds_in_a_plane_have_areas():
     square = np.random.default_rng(0).random((20_000, 2)) @ [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]
-    area, convex = flat_areas(square + 5.0, 0.05)
+    areas = flat_areas(square + 5.0, 0.05)
+    assert areas is not None
+    area, convex = areas
     assert area == pytest.approx(1.0, abs=0.01)
     assert area < convex < 1.0
     assert unreachability(square, 0.05) == pytest.approx(1.0 - area / convex)
     assert flat_areas(np.random.default_rng(0).random((100, 3)), 0.1) is None
     line = np.outer(np.linspace(0, 1, 50), [1.0, 2.0, 3.0])
     assert flat_areas(line, 0.1) == (0.0, 0.0)
-    assert plane_of(square, 1e-9).sides[2] < 1e-12
+    plane = plane_of(square, 1e-9)
+    assert plane is not None
+    assert plane.sides[2] < 1e-12
     ring = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.0]], float)
     triangles, areas = alpha_triangles(ring, 0.6)
     assert (len(triangles), areas.sum()) == (4, pytest.approx(1.0))
@@ -158,5 +164,7 @@ def test_every_command_that_gives_a_volume_gives_the_area(tmp_path, region, caps
     assert known["exact_area"].compute(region) == region.area
     assert known["exact_unreachability"].compute(region) == region.unreachability
     tips = compute_cloud(region.arm, n=4096).tip.values
-    assert known["area"].compute(tips, 0.01) == flat_areas(tips, 0.01)[0]
+    areas = flat_areas(tips, 0.01)
+    assert areas is not None
+    assert known["area"].compute(tips, 0.01) == areas[0]
     assert math.isnan(known["area"].compute(np.random.default_rng(0).random((9, 3)), 0.01))

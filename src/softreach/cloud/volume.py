@@ -137,7 +137,7 @@ def unreachability(
     """
     positions = _positions(points)
     radius = _radius(alpha, points)
-    if (areas := flat_areas(positions, radius)) is not None:
+    if isinstance(radius, float) and (areas := flat_areas(positions, radius)) is not None:
         return 1.0 - areas[0] / areas[1] if areas[1] > 0.0 else np.nan
     with parallel.meanwhile(partial(hulls.convex_hull, positions)) as convex_hull:
         hull, _ = _shape(positions, radius, None, method)

@@ -42,7 +42,7 @@ class ReachedCells:
     wrap: Wrap
     coarse: Wrap
     """The same on cells one and a half times as large."""
-    hull: ConvexHull
+    hull: ConvexHull | None
 
     @property
     def rod(self) -> TipMap:
@@ -78,7 +78,7 @@ class ReachedCells:
         """Mask of points [m] with all centers of the cells around reached, beyond neighbors."""
         from scipy.ndimage import binary_erosion
 
-        cubes = covered_cubes(binary_erosion(self.reached))
+        cubes = covered_cubes(np.asarray(binary_erosion(self.reached), bool))
         index = np.floor(self.lattice.coordinates(points)).astype(np.int64)
         within = ((index >= 0) & (index < cubes.shape)).all(axis=1)
         return within & cubes[tuple(np.where(within, i, 0) for i in index.T)]

@@ -14,7 +14,7 @@ from softreach.geometry.hull import convex_faces
 from softreach.geometry.surface import compact_surface, corner_areas, enclosed_volume
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array, Faces
 from softreach.workspace.measure import Estimate
 
 __all__ = ["ConvexHull", "HullCorners", "climbed_hull"]
@@ -35,7 +35,7 @@ class HullCorners(NamedTuple):
     """In the unit cube of the free bundles, shape (n, dimension)."""
     tips: Array
     """[m], shape (n, 3)."""
-    faces: Index
+    faces: Faces
     """Outwards, shape (f, 3)."""
 
     @classmethod
@@ -44,7 +44,8 @@ class HullCorners(NamedTuple):
         known = np.isfinite(tips[:, 0])
         tips, cube = tips[known], cube[known]
         every = convex_faces(tips)
-        return cls(cube[np.unique(every)], *compact_surface(tips, every))
+        vertices, faces = compact_surface(tips, every)
+        return cls(cube[np.unique(every)], vertices, faces)
 
     @property
     def area(self) -> Array:
@@ -85,6 +86,7 @@ def climbed_hull(
     """
     rod = stable_tips(rod)
     corners = kind.of(rod.tips(rod.box.from_free_cube(cube)), cube)
+    before = corners
     if not len(corners.faces):
         return ConvexHull(Estimate(0.0, 0.0), corners, corners)
     size, error = float(np.ptp(corners.tips, axis=0).max()), np.inf

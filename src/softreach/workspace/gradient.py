@@ -327,7 +327,9 @@ def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
         if solid.cells >= _HULL_CELLS:
             return corners, _corners_of(solid.coarse_image)
         return _finer(corners, rod, solid.cells), corners
-    return solid.image.hull.corners, solid.image.hull.before
+    hull = solid.image.hull
+    assert hull is not None
+    return hull.corners, hull.before
 
 
 def _finer(corners: HullCorners, rod: TipMap, cells: int) -> HullCorners:

@@ -6,15 +6,17 @@ from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softreach.arm.base import Base
 from softreach.geometry.flat import Plane, are_inside, convex_edges, enclosed_area, plane_of
-from softreach.geometry.surface import Surface
+from softreach.geometry.surface import Surface, compact_surface
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import PlacedRod, stable_tips
 from softreach.sampling import cube_blocks
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import MissingExtra
+from softreach.support.lazy import lazy
 from softreach.support.progress import Progress
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number
@@ -64,6 +66,24 @@ class ReachableRegion(ReachableSurface):
             return np.nan
         share = self.area / self.convex_area
         return (self.area_error + share * self.convex_area_error) / self.convex_area
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points to the region [m], never negative."""
+        return np.minimum(
+            super().distance(points), self._curves.distance(as_points("points", points))
+        )
+
+    @lazy
+    def _curves(self) -> Surface:
+        """The outline as triangles that repeat a corner: parts of it may enclose nothing."""
+        starts = np.cumsum([0, *(len(curve) for curve in self.outline)])[:-1]
+        pieces = [
+            start + np.arange(len(curve) - 1)
+            for start, curve in zip(starts, self.outline, strict=True)
+        ]
+        first = np.concatenate(pieces)
+        faces = np.stack([first, first + 1, first + 1], axis=1)
+        return Surface(vertices=np.concatenate(self.outline), faces=faces)
 
     def _lines(self) -> list[str]:
         convex = quantity(self.convex_area, "m²", self.convex_area_error)
@@ -249,4 +269,5 @@ def _mesh(outline: _Outline, plane: Plane) -> Surface:
     points = np.unique(points, axis=0)
     faces = Delaunay(points[:, :2], qhull_options="QJ Pp").simplices
     kept = are_inside(points[faces].mean(axis=1), outline.curves)
-    return Surface(vertices=plane.places(points), faces=faces[kept].astype(np.int32))
+    vertices, faces = compact_surface(plane.places(points), faces[kept].astype(np.int32))
+    return Surface(vertices=vertices, faces=faces)

@@ -267,7 +267,7 @@ def _of_many(
         cells=0,
         volume=search.volume.value,
         volume_error=search.volume.error,
-        measure_hull=partial(_known, search.cells.hull.volume),
+        measure_hull=partial(_known, search.convex_volume),
         lost_share=lost_share(rod),
         route="search",
         rasterize=partial(_known, search.cells),

@@ -57,6 +57,7 @@ class Searched(NamedTuple):
 
     cells: ReachedCells
     volume: Estimate
+    convex_volume: Estimate
 
 
 def searched_set(
@@ -115,8 +116,8 @@ def _may_meet(found: Searched, accuracy: float, smallest: float, of_sheets: floa
     return needed >= of_sheets
 
 
-def wrap_of(rod: TipMap, cell: float) -> Wrap:
-    """The surface of tips around the image of a box of any number of free bundles.
+def cells_of(rod: TipMap, cell: float) -> ReachedCells:
+    """What is reached of the image of a box of any number of free bundles, without its hull.
 
     Args:
         rod: The tip map.
@@ -124,7 +125,9 @@ def wrap_of(rod: TipMap, cell: float) -> Wrap:
     """
     cloud = cloud_on_faces(rod, 0)
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
-    return wrapped(flooded(Flood(rod, _lattice(cloud[1], edge)), *cloud))
+    flood = flooded(Flood(rod, _lattice(cloud[1], edge)), *cloud)
+    wrap = wrapped(flood)
+    return ReachedCells(flood, cloud, wrap, wrap, None)
 
 
 def _lattice(tips: Array, cell: float) -> Lattice:
@@ -178,7 +181,7 @@ def _found(flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexH
         error = seen.error + missed + area * (ENOUGH * edge + rod.tol * rod.length)
         if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
             volume = Estimate(seen.value, error)
-    return Searched(reached, volume)
+    return Searched(reached, volume, hull.volume)
 
 
 def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:

@@ -22,7 +22,7 @@ from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
 from softreach.workspace.measure import Estimate
-from softreach.workspace.redundant import wrap_of
+from softreach.workspace.redundant import cells_of
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
 if TYPE_CHECKING:
@@ -191,8 +191,8 @@ class ReachableSolid(ReachableSet):
     def contains(self, points: ArrayLike) -> Mask:
         """Mask of the points that are reachable: a mapped simplex of the grid covers them.
 
-        For more than three free bundles, a search within the bounds ends on them, to a
-        hundredth of a cell.
+        For more than three free bundles, and of sets thinner than two cells, a search within the
+        bounds ends on them, to a hundredth of a cell.
 
         Args:
             points: Positions [m], shape (n, 3).
@@ -203,12 +203,13 @@ class ReachableSolid(ReachableSet):
         from scipy.ndimage import map_coordinates
 
         positions = as_points("points", points)
-        if isinstance(self.image, ReachedCells):
-            inside = self.image.are_deep(positions)
+        asked = self._searched or self.image
+        if isinstance(asked, ReachedCells):
+            inside = asked.are_deep(positions)
         else:  # a cell's diagonal inside nothing is to be decided
-            at = self.image.lattice.coordinates(positions)
+            at = asked.lattice.coordinates(positions)
             inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -np.sqrt(3.0)
-        inside[~inside] = self.image.counts_at(positions[~inside]) > 0
+        inside[~inside] = asked.counts_at(positions[~inside]) > 0
         return inside
 
     def distance(self, points: ArrayLike) -> Array:
@@ -229,7 +230,7 @@ class ReachableSolid(ReachableSet):
         inside = self.contains(positions)
         out = np.empty(len(positions))
         out[inside] = -self._boundary.distance(positions[inside])
-        outside = self.image if isinstance(self.image, ReachedCells) else self._critical
+        outside = self._searched or self._critical
         out[~inside] = outside.distance(positions[~inside])
         return out
 
@@ -269,15 +270,21 @@ class ReachableSolid(ReachableSet):
 
     @lazy
     def _boundary(self) -> Surface:
+        if self._searched is not None:
+            return self._searched.wrap
+        assert isinstance(self.image, Image)
+        return boundary_surface(self.image, self._field, self.volume)
+
+    @lazy
+    def _searched(self) -> ReachedCells | None:
+        """What is searched for instead of rasterized: more than three bundles, and thin sets."""
         if isinstance(self.image, ReachedCells):
-            return self.image.wrap
-        surface = boundary_surface(self.image, self._field, self.volume)
+            return self.image
         if self.lost_share or self.volume > _NEVER_THIN * self.tip_map.length**3:
-            return surface
+            return None
         cell = self.image.lattice.cell
-        if not 2.0 * self.volume > _SEEN * cell * self._boundary_area().value:
-            return wrap_of(self.tip_map, cell)
-        return surface
+        is_thin = 2.0 * self.volume <= _SEEN * cell * self._boundary_area().value  # not of NaN
+        return cells_of(self.tip_map, cell) if is_thin else None
 
     @lazy
     def _sheets(self) -> Sheets:

@@ -221,23 +221,20 @@ def _measure(rod: TipMap, tips: Array, left_out: Mask) -> Estimate:
     """Length or area of the image, and by how much fewer Gauss nodes change it.
 
     Where cells are left out, it is that of the others and an estimate of the rest. Where the map
-    has kinks it is that of all cells, which err by O(1/n) there: three times the error is stated.
+    has kinks it is that of cells, which err by O(1/n) there: three times what is removed is stated.
     """
-    if not rod.is_smooth:
-        found = _of_cells(tips, left_out)
-        return found._replace(error=3.0 * found.error)
-    if not left_out.any():
+    if rod.is_smooth and not left_out.any():
         fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
         if np.isfinite([fine, rough]).all():
             return Estimate(fine, abs(fine - rough))
-    return _of_cells(tips, left_out)
+    return _of_cells(tips, left_out, 1.0 if rod.is_smooth else 3.0)
 
 
-def _of_cells(tips: Array, left_out: Mask) -> Estimate:
+def _of_cells(tips: Array, left_out: Mask, share: float) -> Estimate:
     """Length or area of the cells of a grid that are not left out, as chords or triangles.
 
     What they err by, O(1/n²), is removed as far as the cells tell that a grid of half as many holds
-    too. A cell that is left out may still reach as much as its largest neighbor, and half of it is
+    too, and a share of it is part of the error. A cell that is left out may still reach as much as its largest neighbor, and half of it is
     taken.
     """
     cells, m = len(left_out), left_out.ndim
@@ -246,7 +243,7 @@ def _of_cells(tips: Array, left_out: Mask) -> Estimate:
     rough = np.where(lost, 0.0, _sizes(every_second(tips, cells, m), cells // 2, m))
     removed = (float(sizes[~finer(lost)].sum()) - float(rough.sum())) / 3.0
     unknown = 0.5 * float(_largest_neighbor(sizes)[left_out].sum())
-    return Estimate(float(sizes.sum()) + removed + unknown, abs(removed) + unknown)
+    return Estimate(float(sizes.sum()) + removed + unknown, share * abs(removed) + unknown)
 
 
 def _sizes(tips: Array, cells: int, m: int) -> Array:
