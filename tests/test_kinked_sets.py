@@ -21,6 +21,7 @@ from softreach.arm import (
 )
 from softreach.arm.actuators import LengthTendon
 from softreach.arm.loads import PointLoad
+from softreach.rod.driven import DrivenRod
 from softreach.rod.rods import effective, tip_map
 from softreach.rod.view import free_bundles, measured_bundles
 from softreach.workspace import (
@@ -156,7 +157,9 @@ def test_a_tip_map_knows_whether_it_is_smooth_through_every_wrapper():
     taut = by_length(3, (0.0, 0.004), tendon_stiffness=500.0, pretension=10.0)
     assert tip_map(taut).is_smooth
     assert effective(plain) is plain
-    inputs = effective(kinked).inputs(np.array([[0.4, -0.3, 1e5], [0.0, 0.0, 0.0]]))
+    beyond = effective(kinked)
+    assert isinstance(beyond, DrivenRod)
+    inputs = beyond.inputs(np.array([[0.4, -0.3, 1e5], [0.0, 0.0, 0.0]]))
     np.testing.assert_allclose(inputs, [[0.5, -0.4, 1e5], [0.0, 0.0, 0.0]])
     np.testing.assert_allclose(
         kinked.tips(inputs), effective(kinked).tips([[0.4, -0.3, 1e5], [0] * 3])
@@ -187,5 +190,7 @@ def test_a_fiber_given_by_its_angle_may_lie_beside_a_tendon_by_length_under_load
     bounds = {"extent": 0.5, "activation_bounds": (-0.1, 0.0)}
     straight = FiberArchitecture(helical_angle=0.0, **bounds)
     turned = FiberArchitecture(revolution=0.0, **bounds)
-    tips = [tip_map(loaded(0.14, each)).tips([[0.02, 0, 0, -0.05]]) for each in (straight, turned)]
-    np.testing.assert_allclose(*tips, atol=1e-9)
+    one, other = (
+        tip_map(loaded(0.14, each)).tips([[0.02, 0, 0, -0.05]]) for each in (straight, turned)
+    )
+    np.testing.assert_allclose(one, other, atol=1e-9)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.support.arrays import Array, Index, Mask, Points
+from softreach.support.arrays import Array, Faces, Index, Mask, Points
 
 __all__ = ["Plane", "alpha_triangles", "are_inside", "convex_edges", "enclosed_area", "plane_of"]
 
@@ -59,7 +59,7 @@ def convex_edges(points: Points) -> Index:
     return np.stack([corners, np.roll(corners, -1)], axis=1).astype(np.intp)
 
 
-def enclosed_area(points: Points, edges: Index) -> float:
+def enclosed_area(points: Points, edges: Faces) -> float:
     """Area inside of closed curves in the plane z = 0 [m²], counterclockwise ones above 0."""
     if not len(edges):
         return 0.0

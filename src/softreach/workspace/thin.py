@@ -234,8 +234,8 @@ def _of_cells(tips: Array, left_out: Mask, share: float) -> Estimate:
     """Length or area of the cells of a grid that are not left out, as chords or triangles.
 
     What they err by, O(1/n²), is removed as far as the cells tell that a grid of half as many holds
-    too, and a share of it is part of the error. A cell that is left out may still reach as much as its largest neighbor, and half of it is
-    taken.
+    too, and a share of it is part of the error. A cell that is left out may still reach as much as
+    its largest neighbor, and half of it is taken.
     """
     cells, m = len(left_out), left_out.ndim
     sizes = np.where(left_out, 0.0, _sizes(tips, cells, m))
