@@ -34,6 +34,7 @@ Route = Literal["flux", "raster", "search"]
 
 _THIN = 0.01  # of its width, the root of its area, that a shell is thinner than
 _SEEN = 2.0  # cells of a raster, below which a set is a sheet to it
+_CHORDS = 10.0  # of L over the square of the cells of a grid, whose chords leave sheets
 _NEVER_THIN = 0.05  # of L³: no sheet within reach is that large and thin
 
 _ROUTES = {
@@ -283,7 +284,8 @@ class ReachableSolid(ReachableSet):
         if self.lost_share or self.volume > _NEVER_THIN * self.tip_map.length**3:
             return None
         cell = self.image.lattice.cell
-        is_thin = 2.0 * self.volume <= _SEEN * cell * self._boundary_area().value  # not of NaN
+        least = max(_SEEN * cell, _CHORDS * self.tip_map.length / self.cells**2)
+        is_thin = 2.0 * self.volume <= least * self._boundary_area().value  # not of NaN
         return cells_of(self.tip_map, cell) if is_thin else None
 
     @lazy
