@@ -157,7 +157,7 @@ def flat_areas(points: np.ndarray, alpha: float) -> tuple[float, float] | None:
         None if they lie in no plane, to 2e-6 of their extent.
     """
     size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
-    plane = plane_of(points, _FLAT * size) if len(points) > 2 else None
+    plane = plane_of(points, _FLAT * size) if len(points) > 3 else None
     if plane is None:
         return None
     flat = plane.coordinates(points)
