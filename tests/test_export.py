@@ -158,11 +158,12 @@ class TestMesh:
         assert mesh.volume == pytest.approx(ball.volume, rel=1e-6)
 
     @pytest.mark.filterwarnings("ignore::softreach.support.errors.SoftreachWarning")
-    def test_an_alpha_shape_that_touches_itself_can_be_printed(self, rng, tmp_path):
+    @pytest.mark.parametrize("suffix", ["ply", "stl", "obj", "glb"])
+    def test_an_alpha_shape_that_touches_itself_can_be_printed(self, suffix, rng, tmp_path):
         hull = sr.concave_hull(rng.random((1500, 3)), alpha=0.09)
         assert not trimesh.Trimesh(hull.vertices, hull.faces).is_watertight
-        export_mesh(hull, tmp_path / "hull.stl")
-        mesh = trimesh.load(tmp_path / "hull.stl")
+        export_mesh(hull, tmp_path / f"hull.{suffix}")
+        mesh = trimesh.load(tmp_path / f"hull.{suffix}", force="mesh")
         assert mesh.is_watertight
         assert mesh.volume == pytest.approx(hull.volume, rel=1e-3)
 

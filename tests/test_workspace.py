@@ -246,10 +246,9 @@ def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
     assert np.isnan([fine.fold_volume, fine.fold_volume_error, fine.multiplicity_error]).all()
 
 
-def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
+def test_a_cloud_of_four_bundles_lies_inside(redundant):
     tips = compute_cloud(redundant.arm, n=100_000).tip.values
-    outside = tips[~redundant.contains(tips)]
-    assert redundant.distance(outside).max() < redundant.grid.attrs["cell"]
+    assert redundant.contains(tips).all()
 
 
 def test_two_free_bundles_sweep_an_area(trunk):

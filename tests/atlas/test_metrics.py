@@ -87,7 +87,7 @@ def test_metrics_of_similar_designs_scale_as_their_units_say(tmp_path):
     atlas = build_atlas(
         similar_designs(*lengths), tmp_path / "a.zarr", 2_000, alpha_over_length=0.3, accuracy=0.1
     )
-    power = {"m": 1, "m3": 3, "1": 0, "1/m": -1}
+    power = {"m": 1, "m2": 2, "m3": 3, "1": 0, "1/m": -1}
     for metric in chosen_metrics(tuple(METRIC_GROUPS)):
         found = atlas[metric.name].values
         for length, value in zip(lengths, found, strict=True):

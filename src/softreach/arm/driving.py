@@ -22,7 +22,15 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["Driving", "InnerActivations", "body_of", "cube_corners", "inner_arm", "pilot"]
+__all__ = [
+    "Driving",
+    "InnerActivations",
+    "body_of",
+    "cube_corners",
+    "inner_arm",
+    "pilot",
+    "without_dead_zones",
+]
 
 Array = NDArray[np.float64]
 
@@ -64,6 +72,31 @@ class Driving:
         is_cut = self._pulls & (self._reached()[:, 0] < 0.0)
         has_dead_zones = any(drive.dead_zone for drive in self.arm.drives)
         return not (self.has_length_tendons or has_dead_zones or is_cut.any())
+
+    @lazy
+    def is_smooth(self) -> bool:
+        """True if γ(x) has no kinks within the bounds: is affine, or all lengths stay taut."""
+        is_cut, law = self._pulls & (self._reached()[:, 0] < 0.0), self.law
+        if is_cut.any() or any(drive.dead_zone for drive in self.arm.drives):
+            return False
+        if not self.has_length_tendons:
+            return True
+        if self.arm.loads is not None or law.has_growth:
+            return False
+        low, high = self.arm.input_bounds.T
+        tensions = law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))
+        return bool(tensions.is_taut.all())
+
+    @lazy
+    def kinks(self) -> list[Array]:
+        """Inputs at which a drive alone lets a tendon go slack, for each input in its unit."""
+        low, high = self.arm.input_bounds.T
+        at_low, kinks = self._offsets + self.gains @ low, list[Array]()
+        free = (self.gains != 0.0) & (low < high)
+        for k in range(self.arm.inputs):
+            alone = np.flatnonzero(self._pulls & free[:, k] & (free.sum(axis=1) == 1))
+            kinks.append(np.unique(low[k] - at_low[alone] / self.gains[alone, k]))
+        return kinks
 
     @lazy
     def ranges(self) -> Array:
@@ -158,6 +191,17 @@ class Driving:
         inner = self.law.inner(bundles, tensions.tension)
         slopes = self.law.slopes(inner, tensions.is_taut, of_strains)
         return InnerActivations(inner, slopes @ of_drives)
+
+
+def without_dead_zones(arm: Manipulator) -> Manipulator:
+    """The arm with inputs that begin beyond the dead zones of its drives: it goes as far."""
+    if not any(drive.dead_zone for drive in arm.drives):
+        return arm
+    drives = []
+    for drive in arm.drives:
+        low, high = drive.effective(np.array(drive.bounds))[0].tolist()
+        drives.append(drive.replace(bounds=(low, high), dead_zone=0.0))
+    return arm.replace(drives=tuple(drives))
 
 
 def inner_arm(arm: Manipulator) -> Manipulator:

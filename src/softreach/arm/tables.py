@@ -218,8 +218,13 @@ def strain_stations(arm: Manipulator) -> Array:
 
 
 def quadrature(arm: Manipulator, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
-    """Gauss nodes between all breakpoints, their weights, and half the gap that each is in [m]."""
-    knots = np.union1d(np.linspace(0.0, arm.length, pieces + 1), arm.breakpoints)
+    """Gauss nodes between all stations where something begins, ends or acts.
+
+    Returns:
+        The nodes, their weights, and half the gap that each is in [m].
+    """
+    points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
+    knots = np.union1d(np.linspace(0.0, arm.length, pieces + 1), [*arm.breakpoints, *points])
     half = np.diff(knots)[:, None] / 2.0
     z = knots[:-1, None] + half * (1.0 + _NODES)
     return z.ravel(), (half * _WEIGHTS).ravel(), np.repeat(half.ravel(), len(_NODES))

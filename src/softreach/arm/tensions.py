@@ -70,6 +70,11 @@ class LengthLaw:
         each = (self.arm.bundle_actuators[k] for k in self.columns)
         return [tendon for tendon in each if isinstance(tendon, LengthTendon)]
 
+    @property
+    def has_growth(self) -> bool:
+        """True if bundles change the length of matter, so that s is not linear in γ."""
+        return len(self._growing) > 0
+
     @lazy
     def _growing(self) -> NDArray[np.intp]:
         """Bundles that change the length of matter at rest."""

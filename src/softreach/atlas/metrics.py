@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.atlas.metric import PROFILE, Metric, Need
 from softreach.cloud.curvature import QUANTITIES
+from softreach.cloud.volume import flat_areas
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.support import plugins
 from softreach.support.arguments import as_given
@@ -114,8 +115,19 @@ def _alpha_volume(shape: AlphaComplex, alpha: float) -> float:
     return float(shape.volume(alpha))
 
 
-def _unreachability(shape: AlphaComplex, alpha: float, convex: float) -> float:
+def _unreachability(shape: AlphaComplex, alpha: float, convex: float, tips: Array) -> float:
+    if (areas := flat_areas(tips, alpha)) is not None:
+        return 1.0 - areas[0] / areas[1] if areas[1] > 0 else math.nan
     return 1.0 - _alpha_volume(shape, alpha) / convex if convex > 0 else math.nan
+
+
+def _flat_area(which: int, tips: Array, alpha: float) -> float:
+    areas = flat_areas(tips, alpha)
+    return math.nan if areas is None else areas[which]
+
+
+def _set_area(name: str, reached: ReachableSet) -> float:
+    return getattr(reached, name, math.nan)
 
 
 def _spacing(shape: AlphaComplex, alpha: float, tips: Array) -> float:
@@ -176,7 +188,11 @@ _ROWS: dict[str, list[tuple[Any, ...]]] = {
         ("volume", "m3", "volume of the cloud's alpha shape",
          _alpha_volume, _ALPHA),
         ("unreachability", "1", "UNR = 1 - volume / convex_volume",
-         _unreachability, (*_ALPHA, Need.CONVEX_VOLUME), "the cloud is flat"),
+         _unreachability, (*_ALPHA, Need.CONVEX_VOLUME, Need.TIPS), "the cloud is on a line"),
+        ("area", "m2", "area of the alpha shape of a cloud in one plane",
+         partial(_flat_area, 0), (Need.TIPS, Need.ALPHA), "the cloud has a volume"),
+        ("convex_area", "m2", "area of the convex hull of a cloud in one plane",
+         partial(_flat_area, 1), (Need.TIPS, Need.ALPHA), "the cloud has a volume"),
         ("regions", "1", "parts of the alpha shape, connected through faces",
          AlphaComplex.regions, _ALPHA),
         ("spacing", "m", "mean distance between neighboring tips, (volume / n)^(1/3)",
@@ -187,10 +203,14 @@ _ROWS: dict[str, list[tuple[Any, ...]]] = {
          attrgetter("volume"), _SET),
         ("exact_volume_error", "m3", "estimated error of exact_volume",
          attrgetter("volume_error"), _SET),
+        ("exact_area", "m2", "area of the reachable set, in one plane or of two bundles",
+         partial(_set_area, "area"), _SET, "the reachable set has a volume"),
+        ("exact_area_error", "m2", "estimated error of exact_area",
+         partial(_set_area, "area_error"), _SET, "the reachable set has a volume"),
         ("exact_convex_volume", "m3", "volume of the reachable set's convex hull",
          attrgetter("convex_volume"), _SET),
         ("exact_unreachability", "1", "UNR = 1 - exact_volume / exact_convex_volume",
-         attrgetter("unreachability"), _SET, "the reachable set is flat"),
+         attrgetter("unreachability"), _SET, "the reachable set is a sheet or a curve"),
         ("exact_lost_share", "1",
          "share of the activation box left out of the reachable set: not stable, or torn",
          attrgetter("lost_share"), _SET),

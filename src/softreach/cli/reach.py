@@ -145,13 +145,26 @@ def _write(
 
 
 def _rows(reached: ReachableSet) -> Rows:
-    from softreach.workspace import ReachableCurve, ReachablePoint, ReachableSolid, ReachableSurface
+    from softreach.workspace import (
+        ReachableCurve,
+        ReachablePoint,
+        ReachableRegion,
+        ReachableSolid,
+        ReachableSurface,
+    )
 
-    convex: Rows = {"convex volume": (reached.convex_volume, "m³")}
+    convex = _size("convex volume", reached.convex_volume, reached.convex_volume_error, "m³")
     match reached:
         case ReachableSolid():
             size = _size("volume", reached.volume, reached.volume_error, "m³")
+            if (shell := reached.shell) is not None:
+                thin = _size("area (middle of the shell)", *shell.area, "m²")
+                size = thin | _size("thickness (mean)", *shell.thickness, "m") | size
             return size | convex | _solid_rows(reached)
+        case ReachableRegion():
+            size = _size("area (in one plane)", reached.area, reached.area_error, "m²")
+            size |= _size("convex area", reached.convex_area, reached.convex_area_error, "m²")
+            return size | {"unreachability": (reached.unreachability, "")}
         case ReachableSurface():
             return _size("area", reached.area, reached.area_error, "m²") | convex
         case ReachableCurve():

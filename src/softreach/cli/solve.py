@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.inverse import Solution
 
+_EXACT = 1e-6  # of L: a nearer tip is at its target, as far as tips are known
+
 
 def solve(
     design: Design,
@@ -32,6 +34,10 @@ def solve(
     ] = None,
     targets: Annotated[
         Path | None, Parameter(help="CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.")
+    ] = None,
+    within: Annotated[
+        str | None,
+        Parameter(help="Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m)."),
     ] = None,
     family: Annotated[
         int | None,
@@ -50,7 +56,7 @@ def solve(
     Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
     """
     from softreach.inverse import solve_inverse
-    from softreach.inverse.request import position_in
+    from softreach.inverse.request import length_in, position_in
 
     if (target is None) == (targets is None):
         raise InvalidInput("target", target, "given, or --targets, and not both")
@@ -64,7 +70,8 @@ def solve(
     else:
         points = points_in("targets", targets, arm)
     count = 1 if family is None else family
-    solutions = solve_inverse(arm, points, family=count)
+    reach = 0.0 if within is None else length_in("within", within, arm.length)
+    solutions = solve_inverse(arm, points, within=reach, family=count)
     if json:
         console.json([_record(one, lengths) for one in solutions])
         return
@@ -93,6 +100,8 @@ def _record(solution: Solution, lengths: Lengths) -> dict[str, object]:
 
 def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
     status = solution.status.name.lower().replace("_", " ")
+    if len(solution) and solution.gap > _EXACT * arm.length:
+        status += f" within {lengths.text(solution.gap, '.4g')}"
     console.line(f"target {lengths.place(solution.target)}: {status}")
     rows = zip(
         solution.activations,

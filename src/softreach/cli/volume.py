@@ -50,7 +50,8 @@ def volume(
 
     Example: softreach volume trunk.zarr --alpha 0.03L --out hull.ply
     """
-    from softreach.cloud.volume import concave_hull, convex_hull
+    from softreach.cloud.volume import concave_hull, convex_hull, flat_areas
+    from softreach.schema import is_stable
 
     check_surface(out, overwrite)
     radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
@@ -58,6 +59,12 @@ def volume(
     bias = cloud.attrs["sampler"] == "uniform"
     concave = concave_hull(cloud.tip, radius_of(alpha, lengths.length), bias=bias)
     rows = volume_rows(concave, convex_hull(cloud.tip))
+    areas = flat_areas(cloud.tip.values[is_stable(cloud.tip)], concave.alpha)
+    if areas is not None:
+        share = 1 - areas[0] / areas[1] if areas[1] else None
+        rows = {name: rows[name] for name in ("points", "alpha")}
+        rows |= {"area (in one plane)": (areas[0], "m²"), "convex area": (areas[1], "m²")}
+        rows["unreachability"] = (share, "")
     console.rows(f"volume of {source}", rows, json, lengths)
     if out is not None:
         from softreach.export import export_mesh

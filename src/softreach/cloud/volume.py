@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
 from softreach.geometry.delaunay import delaunay
+from softreach.geometry.flat import alpha_triangles, convex_edges, enclosed_area, plane_of
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 from softreach.support import parallel
@@ -22,11 +23,19 @@ from softreach.support.errors import InvalidInput, warn
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Hull", "concave_hull", "convex_hull", "unreachability", "volume_curve"]
+__all__ = [
+    "Hull",
+    "concave_hull",
+    "convex_hull",
+    "flat_areas",
+    "unreachability",
+    "volume_curve",
+]
 
 DEFAULT_RADIUS = 0.05  # of the arm's length
 SPACINGS = 3.0  # a smaller ball falls through between the points
 SPARSE = 0.6  # of the spacing that points would have if they filled their convex hull
+_FLAT = 2e-6  # of its extent, that a cloud in one plane is thick: tips err by as much
 QUARTER_SPACINGS = 2.5  # below, V(N/4) leaves the law N^-1/2: design/triangulation.md
 
 
@@ -105,8 +114,8 @@ def unreachability(points: np.ndarray | xr.DataArray, alpha: float | str | None 
 
     Both volumes are smaller than those of infinitely many points,
     the first by more, so that the share is a few percent too large: `concave_hull` estimates the
-    bias of the volume, and `reachable_set` needs no points. NaN for a cloud without volume, as 0/0
-    says nothing.
+    bias of the volume, and `reachable_set` needs no points. Of a cloud in one plane it is the share
+    of the area; NaN for a cloud on a line, as 0/0 says nothing.
 
     Args:
         points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
@@ -121,11 +130,32 @@ def unreachability(points: np.ndarray | xr.DataArray, alpha: float | str | None 
     """
     positions = _positions(points)
     radius = _radius(alpha, points)
+    if isinstance(radius, float) and (areas := flat_areas(positions, radius)) is not None:
+        return 1.0 - areas[0] / areas[1] if areas[1] > 0.0 else np.nan
     with parallel.meanwhile(partial(hulls.convex_hull, positions)) as convex_hull:
         hull, _ = _shape(positions, radius, None)
         convex = convex_hull().volume or alpha_hull(positions, np.inf)[0].volume  # almost flat
     _warn_if_fine(hull, positions)
     return 1.0 - hull.volume / convex if convex > 0 else np.nan  # theory (37)
+
+
+def flat_areas(points: np.ndarray, alpha: float) -> tuple[float, float] | None:
+    """Areas of the alpha shape and of the convex hull of points in one plane [m²].
+
+    Args:
+        points: [m], shape (n, 3).
+        alpha: Radius [m].
+
+    Returns:
+        None if they lie in no plane, to 2e-6 of their extent.
+    """
+    size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
+    plane = plane_of(points, _FLAT * size) if len(points) > 3 else None
+    if plane is None:
+        return None
+    flat = plane.coordinates(points)
+    area = float(alpha_triangles(flat, alpha)[1].sum())
+    return area, enclosed_area(flat, convex_edges(flat))
 
 
 def volume_curve(points: np.ndarray | xr.DataArray, alphas: ArrayLike) -> np.ndarray:

@@ -79,8 +79,8 @@ def export_mesh(
 ) -> None:
     """Write a triangle mesh as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
 
-    A closed surface that touches itself along edges is parted there in STL, by a thousandth of
-    their length, so that it can be printed. STL and GLB keep single precision. glTF has y up: a GLB
+    A closed surface that touches itself along edges is parted there, by a thousandth of their
+    length, so that it can be printed. STL and GLB keep single precision. glTF has y up: a GLB
     holds our coordinates under one node that turns z up into y up. PLY and OBJ say the unit in a
     comment; readers of GLB take all for meters.
 
@@ -120,7 +120,10 @@ def write_parts(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    scaled = [part._replace(vertices=unit.of(part.vertices)) for part in parts]
+    scaled = []
+    for part in parts:
+        vertices, faces = parted(part.vertices, part.faces)
+        scaled.append(part._replace(vertices=unit.of(vertices), faces=faces))
     write_by_suffix(path, SURFACE_FILES, Scene(scaled, unit), overwrite=overwrite)
 
 
@@ -182,10 +185,7 @@ def _write_ply(scene: Scene, file: BufferedWriter) -> None:
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
-    parts = []
-    for part in scene.parts:
-        vertices, faces = parted(part.vertices, part.faces)
-        parts.append(_colored(part._replace(vertices=vertices, faces=faces)))
+    parts = [_colored(part) for part in scene.parts]
     file.write(trimesh.util.concatenate(parts).export(file_type="stl"))
 
 

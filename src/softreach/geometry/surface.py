@@ -89,6 +89,30 @@ def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
     return points[used], number[faces]
 
 
+def without_flakes(surface: Surface, error: float) -> Surface:
+    """A closed surface without its smallest parts, as long as these add up to less than an error.
+
+    Args:
+        surface: Triangles.
+        error: Volume that may be left out [m³]; the largest part always stays.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    vertices, faces = surface.vertices, surface.faces
+    n, starts, ends = len(vertices), faces[:, :2].ravel(), faces[:, 1:].ravel()
+    near = coo_array((np.ones(len(starts), bool), (starts, ends)), shape=(n, n))
+    count, part = connected_components(near, directed=False)
+    if count <= 1:
+        return surface
+    a, b, c = np.moveaxis((vertices - vertices.mean(axis=0))[faces], 1, 0)
+    volumes = np.bincount(part[faces[:, 0]], np.einsum("fi,fi->f", a, np.cross(b, c)) / 6.0, count)
+    order = np.argsort(np.abs(volumes))[:-1]
+    left_out = order[np.cumsum(np.abs(volumes[order])) <= error]
+    vertices, faces = compact_surface(vertices, faces[~np.isin(part[faces[:, 0]], left_out)])
+    return Surface(vertices=vertices, faces=faces)
+
+
 def simplified(vertices: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
     """A coarser surface for pictures: vertices in one cube of a grid become their mean.
 
@@ -129,6 +153,19 @@ def enclosed_volume(vertices: Points, faces: Faces) -> float:
     scaled, exponent = unit_scale(vertices)
     a, b, c = np.moveaxis((scaled - scaled.mean(axis=0))[faces], 1, 0)
     return float(np.ldexp(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0, 3 * exponent))
+
+
+def corner_areas(vertices: Points, faces: Faces) -> Points:
+    """∂V/∂r of each vertex of an oriented closed surface [m²]: what it sweeps as it moves, (v, 3).
+
+    The volume is a sum of triple products over 6: linear in each corner. V = Σ r · ∂V/∂r / 3.
+    """
+    area, corners = np.zeros_like(vertices), (vertices - vertices.mean(axis=0))[faces]
+    for k in range(3):
+        share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
+        for axis in range(3):
+            area[:, axis] += np.bincount(faces[:, k], share[:, axis], len(vertices))
+    return area
 
 
 def surface_area(vertices: Points, faces: Faces) -> float:

@@ -31,8 +31,8 @@ class Request:
     residual: float
     """|tip - target| at which a search has found its target [m]."""
     allowance: float
-    """|tip - target| that the error of the tips leaves open [m], `residual` at least: no target so
-    near to a tip of the arm is out of reach."""
+    """|tip - target| that the error of tips leaves open, or that is asked for [m]; `residual` at
+    least. No target so near to a tip of the arm is out of reach."""
     near: Array
     """Activations of the free bundles to stay near to [-], shape (t, dimension)."""
     direction: Array | None = None
@@ -130,6 +130,23 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
         allowed = f"three comma-separated numbers x,y,z in m, or each with its unit ({units})"
         raise InvalidInput(name, text or "''", allowed)
     return values
+
+
+def length_in(name: str, text: str, length: float) -> float:
+    """One length [m] from what was typed, 0 or more, with its unit or in m.
+
+    Args:
+        name: What errors call it.
+        text: What was typed.
+        length: L [m], for lengths in L.
+
+    Raises:
+        InvalidInput: The text is not such a length.
+    """
+    values = lengths_in(text, 1, length)
+    if values is None or not 0.0 <= values[0] < np.inf:
+        raise InvalidInput(name, text or "''", f"a length in m, or with {TYPED}, L")
+    return values[0]
 
 
 def _header_units(line: str, source: str) -> list[str]:

@@ -27,7 +27,7 @@ class Status(IntEnum):
 
     REACHED = 0
     """Some activation within the bounds puts the tip there, in a stable equilibrium, or as near as
-    `tol`, the error of the tips, can tell; its residual says how near."""
+    `tol`, the error of the tips, can tell, or as `within` asks; its residual says how near."""
     UNREACHABLE = 1
     """None does, which is proved: no tip is nearer than `gap_bound`, which exceeds `tol` L."""
     NOT_FOUND = 2

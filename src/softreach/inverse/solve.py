@@ -48,6 +48,7 @@ def solve_inverse(
     targets: ArrayLike,
     *,
     residual_over_length: float = 1e-10,
+    within: float = 0.0,
     near: ArrayLike | None = None,
     direction: ArrayLike | None = None,
     direction_weight: float = 0.1,
@@ -75,6 +76,8 @@ def solve_inverse(
         residual_over_length: |tip - target| to which a solution is searched, in L. Where the arm
             comes no nearer than to within `tol`, its nearest activations are the solutions: whether
             it reaches such a target is more than its tips can say.
+        within: |tip - target| at which a target counts as reached [m], if no activation does
+            better; the residual says how near the tip comes.
         near: With more than three free bundles: the activation to stay near to [unit of each],
             shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
             each activation counts in its own range.
@@ -104,10 +107,11 @@ def solve_inverse(
     preferred = np.zeros(box.bundles) if near is None else near
     unit = None if direction is None else as_directions("direction", direction, len(points))
     residual = as_residual(residual_over_length) * prepared.whole.length
+    within = as_number("within", within, Range(0.0, unit="m"))
     request = Request(
         targets=points,
         residual=residual,
-        allowance=allowance(prepared.whole, residual),
+        allowance=max(allowance(prepared.whole, residual), within),
         near=as_activations("near", preferred, box, len(points)) / prepared.measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),

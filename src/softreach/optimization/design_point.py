@@ -15,7 +15,7 @@ from softreach.optimization.free_parameters import Values
 from softreach.optimization.objectives import SETS, DesignCase
 from softreach.optimization.problem import Problem
 from softreach.requirements.regions import Region
-from softreach.rod.rods import in_steps, refined, tip_map
+from softreach.rod.rods import effective, in_steps, refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
@@ -123,7 +123,11 @@ class DesignPoint:
             return np.zeros(self.chain.shape[1])
         nodes = boundary_samples(solid.image)
         inside = (region.distance(nodes.places) <= 0.0).astype(float)
-        swept = nodes.derivative(self.derivatives[number].at(nodes.cube), inside)
+        derivatives, rod = self.derivatives[number], effective(self.rods[number])
+        if rod is not self.rods[number]:
+            known = find_parameters(rod.arm, self._paths[0])
+            derivatives = TipDerivatives(rod, [known[name] for name in self._paths[0]])
+        swept = nodes.derivative(derivatives.at(nodes.cube), inside)
         return swept @ self.chain / region.volume
 
     def of_arm(self, name: str) -> float:

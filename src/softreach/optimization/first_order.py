@@ -54,7 +54,8 @@ class FirstOrder:
             if error.name != "loads":
                 raise
             return None, None
-        assert isinstance(solid, ReachableSolid)
+        if not isinstance(solid, ReachableSolid):
+            raise InvalidInput("payloads", f"{payload:g} kg", "such that the set has a volume")
         return solid, MovingBoundary.of(solid, deviations_of(arm, self.sigmas).parameters)
 
     @property

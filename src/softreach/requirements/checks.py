@@ -182,6 +182,7 @@ def _reachable(known: Callable[[], ReachableSet], places: Array, within: float) 
         if error.name != "loads":
             raise
         return np.zeros(len(places), bool)
-    if not isinstance(reached, ReachableSolid):
-        return np.zeros(len(places), bool)  # without a volume
+    if not isinstance(reached, ReachableSolid):  # without a volume
+        rod = reached.tip_map
+        return reached.distance(places) <= max(within, rod.tol * rod.length)
     return reached.distance(places) <= within if within > 0.0 else reached.contains(places)

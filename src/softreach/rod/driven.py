@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.driving import Driving, InnerActivations, pilot
+from softreach.arm.driving import Driving, InnerActivations, pilot, without_dead_zones
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.arm_rod import ArmRod
@@ -47,6 +47,8 @@ class DrivenRod(DerivedMap):
     """The map of the inner arm."""
     outer: Manipulator
     """The arm that is driven."""
+    is_effective: bool = False
+    """True if x are inputs beyond the dead zones of the drives."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -56,15 +58,34 @@ class DrivenRod(DerivedMap):
     def steps(self) -> int:
         return self.base.steps
 
+    @property
+    def is_smooth(self) -> bool:
+        """True if γ(x) has no kinks within the bounds."""
+        return self.driving.is_smooth and self.base.is_smooth
+
+    @property
+    def kinks(self) -> list[Array]:
+        """Values of each x at which a tendon goes slack, whatever the others are."""
+        return self.driving.kinks
+
     @lazy
     def box(self) -> ActivationBox:
         """Bounds of x."""
-        return ActivationBox.between(self.outer.input_bounds, self.outer.input_names)
+        arm = self.driving.arm
+        return ActivationBox.between(arm.input_bounds, arm.input_names)
 
     @lazy
     def driving(self) -> Driving:
         """The map γ(x) of the arm without loads."""
-        return Driving(self.outer)
+        return Driving(without_dead_zones(self.outer) if self.is_effective else self.outer)
+
+    def inputs(self, x: Array) -> Array:
+        """Inputs of the arm at x (n, bundles): with the dead zones that effective ones leave."""
+        if not self.is_effective:
+            return x
+        zones = np.zeros(x.shape[1])
+        zones[: len(self.outer.drives)] = [drive.dead_zone for drive in self.outer.drives]
+        return x + np.sign(x) * zones
 
     @lazy
     def lengths(self) -> LoadedLengths | None:

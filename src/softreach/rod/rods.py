@@ -16,7 +16,7 @@ from softreach.support.arguments import as_flag, as_given, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 
-__all__ = ["coarsened", "in_steps", "refined", "tip_map"]
+__all__ = ["coarsened", "effective", "in_steps", "refined", "tip_map"]
 
 
 def tip_map(
@@ -79,6 +79,18 @@ def _to_tolerance(rod: TipMap, tol: float) -> TipMap:
     return _of_arm(rod.arm, tol, frame) if isinstance(rod, ArmRod | PlacedRod) else rod
 
 
+def effective(rod: TipMap) -> TipMap:
+    """The tip map of the same arm in inputs beyond the dead zones of its drives.
+
+    It has the same image and no kinks at dead zones; itself where there are none.
+    """
+    if isinstance(rod, View):
+        return replace(rod, base=effective(rod.base))
+    if isinstance(rod, DrivenRod) and any(drive.dead_zone for drive in rod.outer.drives):
+        return replace(rod, is_effective=True)
+    return rod
+
+
 def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
     """The tip map of an arm in so many steps, which are not checked against its tolerance.
 
@@ -90,7 +102,8 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
         steps: Along the arm, if nothing breaks it.
         like: A tip map whose tolerance and frame it has.
     """
-    return _new(arm, like.tol, like.frame, steps)
+    rod = _new(arm, like.tol, like.frame, steps)
+    return effective(rod) if isinstance(like, DrivenRod) and like.is_effective else rod
 
 
 @lru_cache(maxsize=64)

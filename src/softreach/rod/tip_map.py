@@ -137,6 +137,16 @@ class TipMap(ABC):
         return False
 
     @property
+    def is_smooth(self) -> bool:
+        """True if tips depend smoothly on activations within the bounds, on each branch."""
+        return True
+
+    @property
+    def kinks(self) -> list[Array]:
+        """Values of each activation at which the map has a kink, whatever the others are."""
+        return [np.empty(0)] * self.box.bundles
+
+    @property
     def steps(self) -> int:
         """Steps that an integrator makes along the arm; 0 for a map that has none of its own."""
         return 0

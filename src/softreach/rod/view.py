@@ -112,6 +112,16 @@ class DerivedMap(TipMap):
     def supports_unstable(self) -> bool:
         return self.base.supports_unstable
 
+    @property
+    def is_smooth(self) -> bool:
+        """True if tips depend smoothly on activations within the bounds, on each branch."""
+        return self.base.is_smooth
+
+    @property
+    def kinks(self) -> list[Array]:
+        """Values of each activation at which the map has a kink, whatever the others are."""
+        return self.base.kinks
+
     @lazy
     def box(self) -> ActivationBox:
         """The activations within bounds."""
@@ -229,6 +239,11 @@ class View(DerivedMap):
     def measures(self) -> Array:
         """Size of one unit of each x in the unit of its activation, shape (bundles,)."""
         return np.array(self.scale, float)[self._columns]
+
+    @property
+    def kinks(self) -> list[Array]:
+        """Values of each x at which the map has a kink, whatever the others are."""
+        return [self.base.kinks[j] / self.scale[j] for j in self.free]
 
     @lazy
     def _columns(self) -> NDArray[np.intp]:

@@ -4,6 +4,7 @@ from .gradient import VolumeGradient as VolumeGradient
 from .gradient import volume_gradient as volume_gradient
 from .image import Image as Image
 from .image import Lattice as Lattice
+from .planar import ReachableRegion as ReachableRegion
 from .reach import reachable_set as reachable_set
 from .sheets import Sheets as Sheets
 from .solid import ReachableSolid as ReachableSolid

@@ -43,7 +43,8 @@ class ReachableSet(ABC):
     """3 for a solid, 2 for a surface, 1 for a curve, 0 for a point."""
 
     tip_map: TipMap
-    """The map whose image this is, with its arm, activation box and tolerance."""
+    """The map whose image this is, with its arm, activation box and tolerance; drives with dead
+    zones by inputs beyond these."""
     cells: int
     """Cells of the activation grid along each axis; 0 where there is none."""
     volume: float

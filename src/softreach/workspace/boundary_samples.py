@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softreach.support.arrays import Array, Index
-from softreach.workspace.boundary import ReachedCells
+from softreach.workspace.cells import ReachedCells
 from softreach.workspace.image import Image, Spans
 
 __all__ = ["BoundarySamples", "boundary_samples", "joined_samples", "overlap_samples"]
@@ -72,7 +72,7 @@ def joined_samples(parts: Sequence[BoundarySamples]) -> BoundarySamples:
 
 
 def boundary_samples(image: Image | ReachedCells) -> BoundarySamples:
-    """Nodes on all of the boundary of an image."""
+    """Nodes on all of the boundary of an image; the vertices of what is wrapped."""
     if isinstance(image, ReachedCells):
         return _of_cells(image)
     return _of_image(image, lambda reached, _: reached)
@@ -122,7 +122,11 @@ def _along(
 
 
 def _of_cells(cells: ReachedCells) -> BoundarySamples:
-    crossings, rod = cells.crossings, cells.rod
+    rod, wrap = cells.rod, cells.wrap
+    if not cells.is_thick:
+        group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
+        return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
+    crossings, _ = cells.swept
     edges, lattice = crossings.edges, cells.lattice
     every = np.arange(len(edges.cell))
     index = np.stack(np.unravel_index(edges.cell, lattice.shape), axis=-1)

@@ -8,24 +8,29 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.geometry.surface import Surface
+from softreach.geometry.surface import Surface, corner_areas
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Index
+from softreach.workspace.grid import grid_ticks
 
 _TOL = 1e-11  # in L: there are few nodes, so that steps may be short
 _ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
+_ROUGH_ENOUGH = 1e-4  # of the volume, under loads in triangles
 _LOADED_TOL = 1e-8  # both, as always under loads: of many breakpoints all count at 1e-9
 _NODES = (8, 12, 16, 24, 32)
+_KINKED = (24, 48, 96)  # cells along each edge of the box, for maps with kinks
+_KINKED_SHARE = 2.0  # of what is removed, as a kink beside a line of the grid hides the half
 _CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
 
 
 def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0) -> Flux:
     """The signed volume of the image of three free bundles.
 
-    By Gauss and Legendre's rule on the faces, as the map is smooth: its error falls faster than any
-    power of the number of nodes. They are added until tips are no more exact than the rule.
+    By Gauss and Legendre's rule on the faces, where the map is smooth: its error falls faster than
+    any power of the number of nodes. They are added until tips are no more exact than the rule. Of
+    maps with kinks it is the volume in mapped triangles, which needs no slopes.
 
     Args:
         rod: The tip map.
@@ -41,6 +46,8 @@ def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0)
         rod = refined(rod, _LOADED_TOL)
     elif not enough:
         rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
+    if not rod.is_smooth:
+        return _of_triangles(rod, enough)
     counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
     flux, change = _flux(rod, counts[0]), np.inf
     for count in counts[1:]:
@@ -58,10 +65,41 @@ class Flux(NamedTuple):
     """Signed volume [m³]: below zero if the map turns the orientation over."""
     error: float
     """Estimated error: from half as many nodes or so, and the error of the tips [m³]."""
-    faces: FaceNodes
-    """Nodes on the faces of the unit cube of the free bundles."""
+    cube: Array
+    """Nodes on the faces of the unit cube of the free bundles, shape (n, 3)."""
     area: Array
     """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
+
+
+def _of_triangles(rod: TipMap, enough: float) -> Flux:
+    """By the mapped triangles of two grids on the faces, whose error O(1/n²) is removed.
+
+    A triangle's volume is linear in each corner, so that both grids together are nodes of one flux.
+    """
+    enough = max(enough, _ROUGH_ENOUGH * rod.supports_unstable)
+    coarse, fine = (_triangle_nodes(rod, cells) for cells in _KINKED[:2])
+    removed = (fine.value - coarse.value) / 3.0
+    for cells in _KINKED[2:]:
+        if not abs(removed) > enough * abs(fine.value):  # NaN too
+            break
+        coarse, fine = fine, _triangle_nodes(rod, cells)
+        removed = (fine.value - coarse.value) / 3.0
+    return Flux(
+        fine.value + removed,
+        _KINKED_SHARE * abs(removed) + fine.error,
+        np.concatenate([fine.cube, coarse.cube]),
+        np.concatenate([4.0 / 3.0 * fine.area, -1.0 / 3.0 * coarse.area]),
+    )
+
+
+def _triangle_nodes(rod: TipMap, cells: int) -> Flux:
+    """Vertices of a grid on the faces, with kinks along its lines, and the areas of each."""
+    grid, ticks = grid_faces(cells), grid_ticks(rod, cells)
+    cube = np.stack(
+        [t[np.rint(cells * x).astype(int)] for t, x in zip(ticks, grid.T, strict=True)], axis=1
+    )
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    return _flux_of(rod, cube, tips, corner_areas(tips, face_triangles(grid, cells)))
 
 
 def flux_tol(rod: TipMap) -> float:
@@ -167,14 +205,18 @@ def _on_faces(ticks: Array, weights: Array) -> FaceNodes:
 
 
 def _flux(rod: TipMap, nodes: int) -> Flux:
-    """By one rule; the error is that of the tips alone."""
+    """By one rule."""
     faces = gauss_faces(nodes)
     tips, slopes = box_slopes(rod, faces.cube)
-    area = faces.area_vectors(slopes)
+    return _flux_of(rod, faces.cube, tips, faces.area_vectors(slopes))
+
+
+def _flux_of(rod: TipMap, cube: Array, tips: Array, area: Array) -> Flux:
+    """Flux of nodes with area vectors; the error is that of the tips alone."""
     # From the middle, where products cancel least. Not BLAS, whose rounding depends on threads.
     value = float(((tips - tips.mean(axis=0)) * area).sum()) / 3.0
     moved = rod.tol * rod.length * float(np.linalg.norm(area, axis=1).sum())
-    return Flux(value, moved, faces, area)
+    return Flux(value, moved, cube, area)
 
 
 def face_triangles(cube: Array, cells: int) -> NDArray[np.int32]:

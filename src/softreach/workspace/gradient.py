@@ -10,9 +10,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
-from softreach.geometry.hull import convex_faces
-from softreach.geometry.surface import compact_surface, enclosed_volume
-from softreach.rod.rods import refined, tip_map
+from softreach.rod.rods import effective, refined, tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.schema import provenance
@@ -27,14 +25,16 @@ from softreach.workspace.boundary_samples import (
     boundary_samples,
     overlap_samples,
 )
+from softreach.workspace.cells import ReachedCells
+from softreach.workspace.convex import HullCorners
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
 from softreach.workspace.image import Image
 from softreach.workspace.measure import FLUX_PART, Estimate, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
-from softreach.workspace.redundant import cloud_on_faces, not_among
 from softreach.workspace.shifts import Shifts, shifts_along
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tip_derivatives import TipDerivatives
+from softreach.workspace.wrap import Wrap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,6 +43,7 @@ _LINES = 2  # times as many lines of sight along each direction as for the volum
 _TOL = 3e-10  # in L, of what the flux alone tells
 _HULL_CELLS = 28  # along each edge of the box, of which corners of a hull are at least
 _MISSING = 0.4  # of the share of the volume that may be missing: of the boundary
+_CHANGES = 3.0  # times the change from larger cells, of what a wrap sweeps
 _AROUND = np.indices((3, 3, 3)).reshape(3, -1).T - 1
 _RASTER_STEP = 2e-2  # of a parameter, where neighbors are rasterized, which is rough
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
@@ -212,6 +213,10 @@ def _swept(
 
 def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
     """Derivatives of the volume of more than three bundles."""
+    assert isinstance(solid.image, ReachedCells)
+    if not solid.image.is_thick:
+        wrap, coarse = (_sum(each, tips) for each in (solid.image.wrap, solid.image.coarse))
+        return _Swept(wrap.value, wrap.error + _CHANGES * np.abs(wrap.value - coarse.value))
     swept = _sum(boundary_samples(solid.image), tips)
     # What no search meets is at rims of either sign.
     missing = _MISSING * solid.volume_error / solid.volume * swept.size
@@ -262,11 +267,12 @@ class _Sum(NamedTuple):
     """By ∂r/∂p, and by where lines of sight lie."""
 
 
-def _sum(nodes: BoundarySamples | HullCorners | Flux, tips: TipDerivatives) -> _Sum:
+def _sum(nodes: BoundarySamples | HullCorners | Flux | Wrap, tips: TipDerivatives) -> _Sum:
     """Volume swept by nodes with area vectors."""
-    slopes = tips.at(nodes.faces.cube if isinstance(nodes, Flux) else nodes.cube)
-    swept = np.einsum("ni,nip->np", nodes.area, slopes)
-    error = tips.error * float(np.linalg.norm(nodes.area, axis=1).sum())
+    slopes = tips.at(nodes.cube)
+    area = nodes.corner_areas if isinstance(nodes, Wrap) else nodes.area
+    swept = np.einsum("ni,nip->np", area, slopes)
+    error = tips.error * float(np.linalg.norm(area, axis=1).sum())
     if isinstance(nodes, BoundarySamples):
         error += nodes.noise(slopes)
     return _Sum(swept.sum(axis=0), np.abs(swept).sum(axis=0), error)
@@ -282,7 +288,7 @@ def _by_differences(
         if arm is solid.arm:
             return solid
         if solid.route != "search":
-            return rasterized_set(tip_map(arm), solid.cells, cell, accuracy)
+            return rasterized_set(effective(tip_map(arm)), solid.cells, cell, accuracy)
         neighbor = reachable_set(arm, accuracy=accuracy, cell=cell)
         assert isinstance(neighbor, ReachableSolid)
         return neighbor
@@ -306,33 +312,8 @@ def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
     return Estimate(value, float(error))
 
 
-@dataclass(frozen=True, eq=False)
-class HullCorners:
-    """Activations whose tips are the corners of a convex hull."""
-
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, dimension)."""
-    area: Array
-    """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
-    volume: float
-    """Of the hull [m³]."""
-
-    @classmethod
-    def of(cls, tips: Array, cube: Array) -> HullCorners:
-        """Corners of the hull of some tips at places of the cube."""
-        every = convex_faces(tips)
-        vertices, faces = compact_surface(tips, every)
-        area = np.zeros_like(vertices)
-        corners = (vertices - vertices.mean(axis=0))[faces]
-        for k in range(3):
-            # The volume is a sum of triple products over 6: linear in each corner.
-            share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
-            np.add.at(area, faces[:, k], share)
-        return cls(cube[np.unique(every)], area, enclosed_volume(vertices, faces))
-
-
 def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
-    """Corners of the hull of a solid, and of that of half as fine a grid or half as many lines."""
+    """Corners of the hull of a solid, and of that of half as fine a grid, or before a climb."""
     rod = solid.tip_map
     if solid.route == "flux":
         cells = 2 * round(solid.cells / 3)
@@ -346,12 +327,9 @@ def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
         if solid.cells >= _HULL_CELLS:
             return corners, _corners_of(solid.coarse_image)
         return _finer(corners, rod, solid.cells), corners
-    cells, box = solid.image, rod.box
-    gamma, tips = cloud_on_faces(rod, 0)
-    gamma = gamma[not_among(cells.reached, cells.lattice, tips)]
-    gamma = np.concatenate([cells.crossings.beyond, gamma])
-    tips, cube = rod.tips(gamma), box.to_cube(gamma)[:, box.free].clip(0.0, 1.0)
-    return HullCorners.of(tips, cube), HullCorners.of(tips[::4], cube[::4])
+    hull = solid.image.hull
+    assert hull is not None
+    return hull.corners, hull.before
 
 
 def _finer(corners: HullCorners, rod: TipMap, cells: int) -> HullCorners:

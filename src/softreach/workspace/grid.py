@@ -17,6 +17,7 @@ __all__ = [
     "cube_grid",
     "every_second",
     "grid_stretches",
+    "grid_ticks",
     "grid_tips",
     "image_measure",
     "least_in_cells",
@@ -31,13 +32,33 @@ _MARGIN = 1.5  # on second differences, for those between the vertices
 _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
 
-def grid_tips(rod: TipMap, cells: int, progress: Progress = silent) -> Array:
+def grid_ticks(rod: TipMap, cells: int) -> list[Array]:
+    """Ticks of a grid along each free bundle in the unit cube, kinks of the map among them.
+
+    Args:
+        rod: The tip map.
+        cells: Along each axis, a multiple of four; so are those between kinks.
+    """
+    box, ticks = rod.box, list[Array]()
+    for k in box.free:
+        places = np.unique((rod.kinks[k] - box.low[k]) / box.widths[k])
+        knots = np.array([0.0, *places[(places > 1e-6) & (places < 1.0 - 1e-6)], 1.0])
+        counts = 4 * np.maximum(np.rint(np.diff(knots) * cells / 4).astype(int), 1)
+        counts[counts.argmax()] += cells - counts.sum()
+        ticks.append(np.interp(np.arange(cells + 1), np.cumsum([0, *counts]), knots))
+    return ticks
+
+
+def grid_tips(
+    rod: TipMap, cells: int, progress: Progress = silent, ticks: list[Array] | None = None
+) -> Array:
     """Tips [m] of the grid of cells^m boxes over the free bundles, in C order.
 
     Args:
         rod: The tip map.
         cells: Along each axis.
         progress: Called with 0 now and then, so that it can raise.
+        ticks: Along each axis, if they are not even.
 
     Returns:
         Shape ((cells + 1)^m, 3), the last free bundle varying fastest; NaN where there is no stable
@@ -46,8 +67,8 @@ def grid_tips(rod: TipMap, cells: int, progress: Progress = silent) -> Array:
     Raises:
         InvalidInput: There is none anywhere.
     """
-    ticks = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
-    places, stable = _product(ticks), stable_tips(rod)
+    even = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
+    places, stable = _product(ticks or even), stable_tips(rod)
     tips = np.empty((len(places), 3))
     for rows in blocks(len(places), _BLOCK):
         tips[rows] = stable.tips(rod.box.from_free_cube(places[rows]))
@@ -61,7 +82,7 @@ def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: Mask) -> Arra
     """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
 
     From differences of the tips, and by J itself where these might have the wrong sign, as well as
-    at the corners of cells that are left out.
+    at the corners of cells that are left out, and everywhere if the map has kinks.
 
     Args:
         rod: The tip map.
@@ -76,7 +97,8 @@ def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: Mask) -> Arra
     determinants *= cells**3 / (8.0 * rod.box.volume)
     unsure = corners_of(left_out).ravel()
     largest = _largest(rod, np.abs(determinants[~unsure]))
-    small = np.flatnonzero(unsure | (np.abs(determinants) <= _DIFFERENCES / cells**2 * largest))
+    unsure |= np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
+    small = np.flatnonzero(unsure | (not rod.is_smooth))
     small = small[np.isfinite(tips[small, 0])]
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
     determinants[small] = _stretch(rod, rod.box.from_free_cube(places))

@@ -45,9 +45,9 @@ def is_injective(rod: TipMap) -> bool:
     """True if the map of a box of three free bundles is found to be one to one.
 
     False means that it is not or that this is not clear. Arms that may lose their stability are not
-    judged: what is stable between samples is not known.
+    judged: what is stable between samples is not known. Nor are maps with kinks.
     """
-    if rod.supports_unstable or rod.box.dimension != 3:
+    if rod.supports_unstable or not rod.is_smooth or rod.box.dimension != 3:
         return False
     for cells in _CELLS:
         tips, slopes = box_slopes(rod, cube_grid(cells))

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import effective, tip_map
 from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
 from softreach.support.arguments import (
     POSITIVE,
@@ -25,6 +25,7 @@ from softreach.workspace.discontinuities import coarser, finer, left_out_cells, 
 from softreach.workspace.grid import corners_of, every_second, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.injective import MappedFaces, is_injective, solid_by_flux
+from softreach.workspace.planar import planar_set, plane_of_tips
 from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import thin_set
@@ -61,13 +62,15 @@ def reachable_set(
     the six faces of the box gives the volume to nine digits or so, the hull of their images the
     convex volume, and nothing is rasterized until a question needs it.
 
-    More free bundles: simplices would be too many, so the image is searched for in space. Centers
-    of cells are reached if a search within the bounds ends on them, from tips of a cloud and from
-    neighbors; where the boundary cuts the edges between reached and other centers is found to 1 %
-    of h, and lines of sight through all centers add up to the volume. h begins at √ε / 2.5 of the
-    mean side of the bounding box, 1/16 of it at most, and shrinks until the estimated error is
-    within ε. Each place that counts has an activation that reaches it; parts thinner than h, or
-    that no search meets, may be missing.
+    More free bundles: simplices would be too many, so the image is searched for in space, from tips
+    of a cloud and from neighbors: how far is the center of each cell from the nearest tip? A closed
+    surface of tips is wrapped around all that is nearer than 0.75 h, of whatever thinness; its
+    volume changes with h by more than it errs. Where lines of sight through all centers that are
+    reached tell the volume better, theirs is taken: where the boundary cuts edges between centers
+    is found to 1 % of h. h begins at √ε / 2.5 of the mean side of the bounding box, 1/16 of it at
+    most, and shrinks until the estimated error is within ε. Each place that counts has an
+    activation that reaches it; parts that no search meets may be missing, gaps below 1.5 h are
+    filled. The convex volume lies between the hull of tips and the planes that none goes beyond.
 
     Under loads only stable equilibria count as reached. Where the activation box has none, or the
     arm snaps from one to another, cells are left out and never bridged: `lost_share` tells their
@@ -87,7 +90,8 @@ def reachable_set(
 
     Returns:
         `ReachableSolid`, `ReachableSurface`, `ReachableCurve` or `ReachablePoint`, for three free
-        bundles or more, two, one or none.
+        bundles or more, two, one or none; `ReachableRegion` for two or more that move the tip in
+        one plane.
 
     Raises:
         InvalidInput: An argument out of range, or loads under which no activation is stable.
@@ -98,8 +102,10 @@ def reachable_set(
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)
     memory = None if memory is None else as_number("memory", memory, _SIZES)
-    rod = tip_map(arm, tol, frame=frame)
+    rod = effective(tip_map(arm, tol, frame=frame))
     m = rod.box.dimension
+    if m > 1 and (plane := plane_of_tips(rod)) is not None:
+        return planar_set(rod, plane, accuracy, progress)
     if m < 3:
         return thin_set(rod)
     if m == 3:

@@ -1,37 +1,36 @@
 """Reach of the tip with four free bundles or more, by search instead of by simplices.
 
 The box of m activations has m! simplices to a cell of its grid, its image has one boundary. So the
-image is found in space: which centers of a lattice are reached, and where the boundary cuts the
-edges between those that are and those that are not. Each place that counts as reached has an
-activation that proves it; what searches miss is missing from the volume.
+image is found in space: a lattice tells how far its centers are from the nearest tip, and a surface
+of tips is wrapped around. Where this leaves a larger error, lines of sight through the centers that
+are reached add up to the volume. Each place that counts as reached has an activation that proves
+it; what searches miss is missing from the volume.
 """
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
-from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress
-from softreach.workspace.boundary import ReachedCells
-from softreach.workspace.crossings import Crossings
-from softreach.workspace.image import Lattice, covered_cubes
+from softreach.workspace.cells import ReachedCells
+from softreach.workspace.convex import ConvexHull, climbed_hull
+from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
+from softreach.workspace.wrap import DISTANCE, Wrap, fits, spread, wrapped
 
 __all__ = [
     "Searched",
     "cloud_on_faces",
+    "flooded",
     "lost_share",
-    "not_among",
     "searched_set",
     "smallest_memory",
 ]
@@ -44,10 +43,13 @@ _RULE = 2.5  # cells along the mean side of the bounding box, times the root of 
 _FEWEST = 16.0
 _FINER = 1.5
 _SHIFT = (0.31, 0.17, 0.43)  # of a cell: lines on a plane of symmetry would all err alike
-_SWEEPS = 3
-_BEYOND = 0.05  # cells by which a sweep looks beyond a crossing
-_APART = 0.05  # ranges: activations nearer to each other lead to the same end
+_MOST_ALONG = 96.0
+_THINNEST = 128.0  # cells along the mean side: below are no sheets
 _MOST_CELLS = 2.0**26
+
+
+CLIMBERS = 1024
+"""Of these, for the convex hull beside tips on the boundary: more make countless facets."""
 
 
 class Searched(NamedTuple):
@@ -74,20 +76,58 @@ def searched_set(
     Raises:
         InvalidInput: No activation has a stable equilibrium, or cells are too small for the memory.
     """
-    gamma, tips = cloud_on_faces(rod, 0)
+    cloud = gamma, tips = cloud_on_faces(rod, 0)
     sides = np.ptp(tips, axis=0)
     smallest = _smallest_cell(rod, sides, memory)
-    if cell is not None:
-        if not smallest <= cell < np.inf:  # NaN too
-            raise InvalidInput("cell", cell, f"at least {smallest:.3g} m for {memory:.2g} bytes")
-        return _search(rod, _lattice(tips, cell), gamma, tips, progress)
-    target = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * np.cbrt(np.prod(sides))
-    edge = float(max(target, smallest, sides.max() / 1024.0))
-    result = _search(rod, _lattice(tips, edge), gamma, tips, progress)
-    while result.volume.error > accuracy * result.volume.value and edge / _FINER >= smallest:
-        edge /= _FINER
-        result = _search(rod, _lattice(tips, edge), gamma, tips, progress)
-    return result
+    if cell is not None and not smallest <= cell < np.inf:  # NaN too
+        raise InvalidInput("cell", cell, f"at least {smallest:.3g} m for {memory:.2g} bytes")
+    mean = float(np.cbrt(np.prod(sides)))
+    target = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * mean
+    edge = float(max(target, smallest, sides.max() / 1024.0)) if cell is None else cell
+
+    def of_cells(edge: float) -> Flood:
+        return flooded(Flood(rod, _lattice(tips, edge), progress), *cloud)
+
+    coarse = wrapped(of_cells(_FINER * edge))
+    begin = rod.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))[:, rod.box.free]
+    hull = climbed_hull(rod, begin.clip(0.0, 1.0), accuracy)
+    while True:
+        flood = of_cells(edge)
+        found = _found(flood, cloud, coarse, hull)
+        if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
+            return found
+        edge, coarse = edge / _FINER, found.cells.wrap
+
+
+def _may_meet(found: Searched, accuracy: float, smallest: float, of_sheets: float) -> bool:
+    """True if an accuracy is not met but may be, by cells that are no smaller than allowed.
+
+    Where nothing is seen between both sides of a sheet, its error falls as the square of the edge,
+    until the sheet is thin enough for its thickness to be found.
+    """
+    (volume, error), cells = found.volume, found.cells
+    edge = cells.lattice.cell
+    if error <= accuracy * volume or edge / _FINER < smallest:
+        return False
+    if cells.is_thick:
+        return True
+    is_sheet = cells.wrap.volume_of_tips != cells.wrap.tight_volume
+    needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(volume, 0.0) / error)
+    return needed >= of_sheets
+
+
+def cells_of(rod: TipMap, cell: float) -> ReachedCells:
+    """What is reached of the image of a box of any number of free bundles, without its hull.
+
+    Args:
+        rod: The tip map.
+        cell: Edge of a cell [m]; larger where that takes more than 96 cells along the longest side.
+    """
+    cloud = cloud_on_faces(rod, 0)
+    edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
+    flood = flooded(Flood(rod, _lattice(cloud[1], edge)), *cloud)
+    wrap = wrapped(flood)
+    return ReachedCells(flood, cloud, wrap, wrap, None)
 
 
 def _lattice(tips: Array, cell: float) -> Lattice:
@@ -128,27 +168,27 @@ def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
     return high
 
 
-def _search(
-    rod: TipMap, lattice: Lattice, gamma: Array, tips: Array, progress: Progress
-) -> Searched:
-    flood = _flooded(Flood(rod, lattice, progress), gamma, tips)
-    crossings, missed = _swept(flood)
-    cells = ReachedCells(rod, flood.lattice, flood.reached, flood.gamma, crossings)
-    if not len(crossings.edges.cell):
-        convex = _convex_volume(tips, tips[::2])
-        return Searched(cells, Estimate(0.0, convex.value + convex.error), convex)
-    volume = line_volume(crossings)
-    edge = flood.lattice.cell
-    area = len(crossings.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
-    slack = area * (ENOUGH * edge + rod.tol * rod.length)
-    convex = _hull(crossings, tips[not_among(flood.reached, flood.lattice, tips)])
-    noise = volume.error if np.isfinite(volume.error) else convex.value + convex.error
-    error = noise + missed + slack
-    return Searched(cells, Estimate(volume.value, error), convex)
+def _found(flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexHull) -> Searched:
+    """The set by its wrap; by lines of sight if these tell the volume better, and agree."""
+    rod, edge, wrap = flood.rod, flood.lattice.cell, wrapped(flood)
+    change = abs(wrap.volume_of_tips - coarse.volume_of_tips)
+    volume = Estimate(wrap.volume_of_tips, change + wrap.error_of_tips)
+    reached = ReachedCells(flood, cloud, wrap, coarse, hull)
+    if reached.is_thick:
+        lines, missed = reached.swept
+        area = len(lines.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
+        seen = line_volume(lines)
+        error = seen.error + missed + area * (ENOUGH * edge + rod.tol * rod.length)
+        if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
+            volume = Estimate(seen.value, error)
+    return Searched(reached, volume, hull.volume)
 
 
-def _flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
-    """All centers that searches find, from one cloud after the other until one finds no more."""
+def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
+    """All centers that searches find, from one cloud after the other until one finds no more.
+
+    And the distances of those around to the nearest tips.
+    """
     flood.add(gamma, tips)
     for number in range(1, _CLOUDS):
         while not flood.is_bounded:
@@ -157,82 +197,25 @@ def _flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
         flood.add(*cloud_on_faces(flood.rod, number))
         if flood.is_bounded and np.count_nonzero(flood.gap == 0.0) == before:
             break
+    spread(flood)
+    while not fits(flood):
+        flood = _wider(flood)
+        spread(flood)
     return flood
 
 
 def _wider(flood: Flood) -> Flood:
     """The same on a lattice with room around what is reached."""
     lattice = flood.lattice
-    known = np.flatnonzero(flood.gap == 0.0)
-    room = 4 + max(lattice.shape) // 8
-    larger = Lattice(
-        lattice.origin - room * lattice.cell,
-        lattice.cell,
-        (lattice.shape[0] + 2 * room, lattice.shape[1] + 2 * room, lattice.shape[2] + 2 * room),
-    )
-    wide = Flood(flood.rod, larger, flood.progress)
-    wide.add(flood.gamma[known], flood.centers(known))
+    known = np.flatnonzero((flood.gap >= 0.0) & (flood.gap < DISTANCE))
+    room = np.full(3, 4 + max(lattice.shape) // 8)
+    room[2] *= not flood.is_flat
+    nx, ny, nz = np.array(lattice.shape) + 2 * room
+    origin = lattice.origin - room * lattice.cell
+    larger = Lattice(origin, lattice.cell, (int(nx), int(ny), int(nz)))
+    wide = Flood(flood.rod, larger, flood.progress, is_flat=flood.is_flat)
+    wide.add(flood.gamma[known], flood.rod.tips(flood.gamma[known]))
     return wide
-
-
-def _swept(flood: Flood) -> tuple[Crossings, float]:
-    """Crossings that no neighbor's activation leads beyond, and what may still be missed [m³]."""
-    from scipy.spatial import KDTree
-
-    crossings = Crossings.of(flood)
-    volume = flood.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
-    gain = 0.0
-    for sweep in range(1, _SWEEPS + 1):
-        count = len(crossings.edges.cell)
-        if count <= sweep:
-            return crossings, 0.0
-        places = crossings.points(np.arange(count), crossings.place)
-        others = np.asarray(KDTree(places).query(places, k=sweep + 1)[1])[:, sweep]
-        apart = np.abs(crossings.gamma[others] - crossings.gamma) / flood.rod.box.scales
-        which = np.flatnonzero((apart > _APART).any(axis=1))
-        moved = crossings.advance(which, crossings.gamma[others[which]], _BEYOND)
-        gain = float(moved.clip(0.0).sum()) * volume
-        beyond = np.flatnonzero(crossings.low >= 1.0)
-        if len(beyond):
-            _reach_further(flood, crossings, beyond)
-            crossings = Crossings.of(flood)
-    return crossings, gain
-
-
-def _reach_further(flood: Flood, crossings: Crossings, beyond: Index) -> None:
-    """Note that the far ends of edges are reached after all."""
-    gamma = crossings.gamma[beyond]
-    flood.add(gamma, crossings.points(beyond, crossings.low[beyond]))
-
-
-def _hull(crossings: Crossings, tips: Array) -> Estimate:
-    """Volume of the convex hull [m³] from points of the boundary, and from every fourth line."""
-    every = np.arange(len(crossings.edges.cell))
-    index = np.stack(np.unravel_index(crossings.edges.cell, crossings.lattice.shape), axis=-1)
-    index[every, crossings.edges.axis] = 0
-    even = (index % 2 == 0).all(axis=1)
-    points = crossings.points(every, crossings.place)
-    nearest = crossings.rod.tips(crossings.beyond)
-    return _convex_volume(
-        np.concatenate([points, nearest, tips]), np.concatenate([points[even], nearest[even]])
-    )
-
-
-def not_among(reached: Mask, lattice: Lattice, tips: Array) -> Mask:
-    """Mask of tips not between eight centers that are reached, where no hull has a corner."""
-    cubes = covered_cubes(reached)
-    index = np.floor(lattice.coordinates(tips)).astype(np.int64)
-    inside = np.all((index >= 0) & (index < cubes.shape), axis=1)
-    x, y, z = (index * inside[:, None]).T
-    return ~(inside & cubes[x, y, z])
-
-
-def _convex_volume(points: Array, fewer: Array) -> Estimate:
-    """Limit of the hulls of ever more boundary points, as far as two of them tell."""
-    hulls = parallel.in_order(partial(convex_hull, places) for places in (points, fewer))
-    value, rough = (hull.volume for hull in hulls)
-    missing = max(value - rough, 0.0) / 3.0
-    return Estimate(value + 0.5 * missing, missing)
 
 
 def cloud_on_faces(rod: TipMap, seed: int) -> tuple[Array, Array]:

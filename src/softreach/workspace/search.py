@@ -30,6 +30,7 @@ ENOUGH = 1e-3
 """Distance at which a place counts as reached, in cells."""
 
 _CHUNK = 1 << 16  # places searched for at a time
+_FAR = 3.0  # cells, from which on distances are not told apart
 _CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 
 
@@ -53,11 +54,14 @@ class Flood:
 
     A center is reached if a search that starts at a neighbor's activation, or at that of a tip
     nearby, ends on it. Centers that are not have the distance to the nearest tip found, and its
-    activation: a tip that comes closer starts another search.
+    activation: a tip that comes closer starts another search. Of a flat set, whose plane is the
+    third of five layers of the lattice, only centers in the plane are searched.
     """
 
-    def __init__(self, rod: TipMap, lattice: Lattice, progress: Progress = silent) -> None:
-        self.rod, self.lattice, self.progress = rod, lattice, progress
+    def __init__(
+        self, rod: TipMap, lattice: Lattice, progress: Progress = silent, *, is_flat: bool = False
+    ) -> None:
+        self.rod, self.lattice, self.progress, self.is_flat = rod, lattice, progress, is_flat
         size = int(np.prod(lattice.shape))
         self.gap = np.full(size, np.inf)
         """Distance from a center to the nearest tip found, in cells; 0 where reached; -1 at the
@@ -66,7 +70,8 @@ class Flood:
         """Its activation, meaningless where `gap` is infinite."""
         _, ny, nz = lattice.shape
         sides = np.ones(lattice.shape, bool)
-        sides[1:-1, 1:-1, 1:-1] = False
+        inner = slice(2, -2) if is_flat else slice(1, -1)  # of five layers in a plane one
+        sides[1:-1, 1:-1, inner] = False
         self.gap[sides.ravel()] = -1.0
         self.steps = np.array([ny * nz, nz, 1])
 
@@ -74,6 +79,12 @@ class Flood:
     def reached(self) -> Mask:
         """Of the lattice's shape."""
         return (self.gap == 0.0).reshape(self.lattice.shape)
+
+    @property
+    def distances(self) -> Array:
+        """From centers to the nearest tips in cells, 3 at most, of the lattice's shape."""
+        known = np.where(self.gap < 0.0, _FAR, self.gap)
+        return np.minimum(known, _FAR).reshape(self.lattice.shape)
 
     @property
     def is_bounded(self) -> bool:
@@ -89,7 +100,7 @@ class Flood:
     def add(self, gamma: Array, tips: Array) -> None:
         """Search around tips that come closer to a center than all before."""
         cells, starts = self._improved(gamma, tips)
-        self._search(cells, starts)
+        self.search(cells, starts)
         self.grow(cells[self.gap[cells] == 0.0])
 
     def _improved(self, gamma: Array, tips: Array) -> tuple[Index, Array]:
@@ -108,7 +119,7 @@ class Flood:
             for neighbors, sources in self._frontier(cells):
                 known = self.gap[neighbors] > 0
                 neighbors, sources = neighbors[known], sources[known]
-                self._search(neighbors, self.gamma[sources])
+                self.search(neighbors, self.gamma[sources])
                 fresh.append(neighbors[self.gap[neighbors] == 0.0])
             cells = np.unique(np.concatenate(fresh)) if fresh else cells[:0]
 
@@ -121,7 +132,7 @@ class Flood:
                 part = open_[first : first + _CHUNK]
                 yield neighbors[part], cells[part]
 
-    def _search(self, cells: Index, starts: Array) -> None:
+    def search(self, cells: Index, starts: Array) -> None:
         """Search for centers, and keep what comes closer."""
         cell = self.lattice.cell
         for first in range(0, len(cells), _CHUNK):

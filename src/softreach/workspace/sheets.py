@@ -18,6 +18,7 @@ from scipy.ndimage import maximum_filter
 
 from softreach.geometry.surface import Surface, compact_surface
 from softreach.picture.shading import vertex_normals
+from softreach.rod.driven import DrivenRod
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Faces, Mask
@@ -98,6 +99,7 @@ def box_sheets(rod: TipMap) -> Sheets | None:
 def _sheets(rod: TipMap, cube: Array, faces: Faces) -> Sheets:
     cube, faces = compact_surface(cube, faces)
     activation, lines = rod.box.from_free_cube(cube), _lines(cube, faces)
+    activation = rod.inputs(activation) if isinstance(rod, DrivenRod) else activation
     return Sheets(vertices=_tips(rod, cube), faces=faces, lines=lines, activation=activation)
 
 
@@ -175,7 +177,7 @@ def _zeros(rod: TipMap, cube: Array, dets: Array) -> Callable[[NDArray[np.int32]
     def cut(pairs: NDArray[np.int32]) -> Array:
         low, high = np.zeros(len(pairs)), np.ones(len(pairs))
         at_low, at_high = dets[pairs[:, 0]].copy(), dets[pairs[:, 1]].copy()
-        share = at_low / (at_low - at_high)
+        share = _zero(at_low, at_high)
         for _ in range(_SECANTS):
             value = _dets(rod, _between(cube[pairs], share))
             beyond = np.sign(value) == np.sign(at_high)
@@ -185,10 +187,16 @@ def _zeros(rod: TipMap, cube: Array, dets: Array) -> Callable[[NDArray[np.int32]
                 np.where(beyond, at_low / 2, value),
             )
             low = np.where(beyond, low, share)
-            share = low + (high - low) * at_low / (at_low - at_high)
+            share = low + (high - low) * _zero(at_low, at_high)
         return share
 
     return cut
+
+
+def _zero(at_low: Array, at_high: Array) -> Array:
+    """Shares of the way at which what is linear between values is 0; the middle where both are."""
+    change = at_low - at_high
+    return np.divide(at_low, change, out=np.full_like(change, 0.5), where=change != 0.0)
 
 
 def _fold(rod: TipMap) -> tuple[Array, Faces]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.geometry.surface import Surface
+from softreach.geometry.surface import Surface, without_flakes
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
@@ -17,15 +17,12 @@ from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
-from softreach.workspace.boundary import (
-    ReachedCells,
-    boundary_surface,
-    critical_surface,
-    signed_field,
-)
+from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
+from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
 from softreach.workspace.measure import Estimate
+from softreach.workspace.redundant import cells_of
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
 if TYPE_CHECKING:
@@ -35,11 +32,25 @@ __all__ = ["ReachableSolid", "Route"]
 
 Route = Literal["flux", "raster", "search"]
 
+_THIN = 0.01  # of its width, the root of its area, that a shell is thinner than
+_SEEN = 2.0  # cells of a raster, below which a set is a sheet to it
+_CHORDS = 10.0  # of L over the square of the cells of a grid, whose chords leave sheets
+_NEVER_THIN = 0.05  # of L³: no sheet within reach is that large and thin
+
 _ROUTES = {
     "flux": "one to one: by flux through the faces of the activation box",
     "raster": "rasterized, as the image folds or overlaps or may do so",
     "search": "searched for in space",
 }
+
+
+class Shell(NamedTuple):
+    """A thin set as a sheet: the area of its middle, half of that of both sides."""
+
+    area: Estimate
+    """[m²]."""
+    thickness: Estimate
+    """Volume over that area [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -121,26 +132,57 @@ class ReachableSolid(ReachableSet):
         }
         return xr.Dataset(variables, lattice.centers(), attrs)
 
+    @lazy
+    def shell(self) -> Shell | None:
+        """The sheet that a set thinner than a hundredth of its width is; None for other sets."""
+        if self.volume > _NEVER_THIN * self.tip_map.length**3:
+            return None
+        area = self._boundary_area()
+        half = Estimate(0.5 * area.value, 0.5 * area.error)
+        if not half.value > 0.0 or self.volume > _THIN * half.value**1.5:
+            return None
+        thickness = self.volume / half.value
+        error = self.volume_error / half.value + thickness * half.error / half.value
+        return Shell(half, Estimate(thickness, error))
+
+    def _boundary_area(self) -> Estimate:
+        """Area of both sides of a thin set [m²]."""
+        if self.route == "search":
+            assert isinstance(self.image, ReachedCells)
+            fine, coarse = self.image.wrap.area, self.image.coarse.area
+            return Estimate(fine, abs(fine - coarse))
+        cells = 48 if self.tip_map.supports_unstable else 96
+        faces = [face_image(self.tip_map, count) for count in (cells, cells // 2)]
+        areas = [np.nan if face is None else face.area for face in faces]
+        removed = (areas[0] - areas[1]) / 3.0
+        # What is reached more than once counts once, and may be any part of the faces.
+        several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
+        share = several / self.volume if self.volume > 0.0 else 1.0
+        return Estimate(areas[0] + removed, abs(removed) + share * areas[0])
+
     def surface(self) -> Surface:
         """The boundary: closed, oriented outwards, without staircase.
 
         For the route "flux" it is the image of the faces of the activation box, on which its
-        vertices lie exactly; otherwise it is found in the raster, in which parts thinner than a
-        cell are lost.
+        vertices lie exactly; for more than three free bundles a surface of tips, which is wrapped
+        around parts of any thinness and leaves corners out by up to half a cell, and so it is for
+        three where the set is thinner than two cells. Otherwise it is found in the raster, which
+        leaves corners out by up to a cell. Parts that add up to less than the error of the volume
+        are left out.
 
         Raises:
             MissingExtra: scikit-image is not installed.
         """
         image = self._face_image if self.route == "flux" and not self.lost_share else None
-        return self._boundary if image is None else image
+        return without_flakes(self._boundary, self.volume_error) if image is None else image
 
     def sheets(self) -> Sheets:
         """The boundary as the sheets it consists of: images of faces of the box, and folds.
 
         Unlike `surface()` it is smooth, ends sharply at rims and where sheets cross, has parts of
         any thinness, and knows its `lines` and activations. It is for pictures: there may be gaps
-        where sheets meet. Of more than three free bundles, and under loads where the set folds, it
-        is `surface()`.
+        where sheets meet. Of more than three free bundles, of maps with kinks, and under loads
+        where the set folds, it is `surface()`.
 
         Raises:
             MissingExtra: scikit-image is not installed.
@@ -150,8 +192,8 @@ class ReachableSolid(ReachableSet):
     def contains(self, points: ArrayLike) -> Mask:
         """Mask of the points that are reachable: a mapped simplex of the grid covers them.
 
-        For more than three free bundles, a search within the bounds ends on them, to a
-        thousandth of a cell.
+        For more than three free bundles, and of sets thinner than two cells, a search within the
+        bounds ends on them, to a hundredth of a cell.
 
         Args:
             points: Positions [m], shape (n, 3).
@@ -162,19 +204,21 @@ class ReachableSolid(ReachableSet):
         from scipy.ndimage import map_coordinates
 
         positions = as_points("points", points)
-        # A cell's diagonal inside nothing is to be decided; one cell where each place is a search.
-        margin = np.sqrt(3.0) if isinstance(self.image, Image) else 1.0
-        at = self.image.lattice.coordinates(positions)
-        inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
-        inside[~inside] = self.image.counts_at(positions[~inside]) > 0
+        asked = self._searched or self.image
+        if isinstance(asked, ReachedCells):
+            inside = asked.are_deep(positions)
+        else:  # a cell's diagonal inside nothing is to be decided
+            at = asked.lattice.coordinates(positions)
+            inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -np.sqrt(3.0)
+        inside[~inside] = asked.counts_at(positions[~inside]) > 0
         return inside
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance to the boundary [m], negative inside.
 
         Outside it is the distance to the image of the grid itself, or for more than three free
-        bundles to the nearest tip that a search finds. Inside it is the distance to
-        the surface found in the raster, in which parts and gaps thinner than a cell are lost.
+        bundles to the nearest tip that a search finds. Inside it is the distance to the surface
+        found in the raster, in which parts and gaps thinner than a cell are lost, or to `surface`.
 
         Args:
             points: Positions [m], shape (n, 3).
@@ -187,7 +231,7 @@ class ReachableSolid(ReachableSet):
         inside = self.contains(positions)
         out = np.empty(len(positions))
         out[inside] = -self._boundary.distance(positions[inside])
-        outside = self.image if isinstance(self.image, ReachedCells) else self._critical
+        outside = self._searched or self._critical
         out[~inside] = outside.distance(positions[~inside])
         return out
 
@@ -222,18 +266,38 @@ class ReachableSolid(ReachableSet):
 
     @lazy
     def _field(self) -> Array:
+        assert isinstance(self.image, Image)
         return signed_field(self.image)
 
     @lazy
     def _boundary(self) -> Surface:
+        if self._searched is not None:
+            return self._searched.wrap
+        assert isinstance(self.image, Image)
         return boundary_surface(self.image, self._field, self.volume)
+
+    @lazy
+    def _searched(self) -> ReachedCells | None:
+        """What is searched for instead of rasterized: more than three bundles, and thin sets."""
+        if isinstance(self.image, ReachedCells):
+            return self.image
+        if self.lost_share or self.volume > _NEVER_THIN * self.tip_map.length**3:
+            return None
+        cell = self.image.lattice.cell
+        least = max(_SEEN * cell, _CHORDS * self.tip_map.length / self.cells**2)
+        is_thin = 2.0 * self.volume <= least * self._boundary_area().value  # not of NaN
+        return cells_of(self.tip_map, cell) if is_thin else None
 
     @lazy
     def _sheets(self) -> Sheets:
         sheets = None
         if self.route == "flux" and not self.lost_share:
             sheets = box_sheets(self.tip_map)
-        elif isinstance(self.image, Image) and not self.tip_map.supports_unstable:
+        elif (
+            isinstance(self.image, Image)
+            and self.tip_map.is_smooth
+            and not self.tip_map.supports_unstable
+        ):
             sheets = outer_sheets(self.tip_map, self.image)
         return Sheets.of(self.surface()) if sheets is None else sheets
 
@@ -252,6 +316,10 @@ class ReachableSolid(ReachableSet):
             f"volume {quantity(self.volume, 'm³', self.volume_error)}",
             f"{self._convex_text()}, of which {quantity(share, '%', error)} are out of reach",
         ]
+        if self.shell is not None:
+            area, thickness = self.shell
+            sheet = f"a shell of area {quantity(area.value, 'm²', area.error)}, "
+            lines.insert(0, f"{sheet}thickness {quantity(thickness.value, 'm', thickness.error)}")
         if self.multiplicity:
             several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
             again = quantity(several, "m³", self.multiplicity_error)
@@ -266,6 +334,11 @@ class ReachableSolid(ReachableSet):
             "volume_error": Number(self.volume_error, "m3", "error of the volume"),
             **self._convex_numbers(),
         }
+        for name, size, unit in (("area", 0, "m2"), ("thickness", 1, "m")):
+            if self.shell is not None:
+                value, error = self.shell[size]
+                numbers[f"shell_{name}"] = Number(value, unit, f"{name} of the thin set")
+                numbers[f"shell_{name}_error"] = Number(error, unit, f"error of the {name}")
         if not self.multiplicity:
             return numbers
         fold = "volume reached with both orientations"

@@ -17,7 +17,7 @@ from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
 from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
-from softreach.workspace.grid import every_second, grid_tips, image_measure
+from softreach.workspace.grid import every_second, grid_ticks, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
 
 __all__ = ["ReachableCurve", "ReachablePoint", "ReachableSurface", "thin_set"]
@@ -52,7 +52,7 @@ class ReachableSurface(ReachableSet):
     def of(cls, rod: TipMap) -> Self:
         """The surface of a tip map with two free bundles."""
         cells = _SURFACE_CELLS
-        tips = grid_tips(rod, cells)
+        tips = _grid_tips(rod, cells)
         left_out = left_out_cells(rod, tips, cells)
         area, error = _measure(rod, tips, left_out)
         base = np.flatnonzero(~left_out)
@@ -123,7 +123,7 @@ class ReachableCurve(ReachableSet):
     @classmethod
     def of(cls, rod: TipMap) -> Self:
         """The curve of a tip map with one free bundle."""
-        path = grid_tips(rod, _CURVE_CELLS)
+        path = _grid_tips(rod, _CURVE_CELLS)
         left_out = left_out_cells(rod, path, _CURVE_CELLS)
         length, error = _measure(rod, path, left_out)
         convex = _convex_volume(path, _CURVE_CELLS, 1)
@@ -212,24 +212,30 @@ def thin_set(rod: TipMap) -> ReachableSet:
     return _KINDS[rod.box.dimension].of(rod)
 
 
+def _grid_tips(rod: TipMap, cells: int) -> Array:
+    """Tips of a grid [m], on whose lines kinks are; even where some tips may be unstable."""
+    return grid_tips(rod, cells, ticks=None if rod.supports_unstable else grid_ticks(rod, cells))
+
+
 def _measure(rod: TipMap, tips: Array, left_out: Mask) -> Estimate:
     """Length or area of the image, and by how much fewer Gauss nodes change it.
 
-    Where cells are left out, it is that of the others and an estimate of the rest.
+    Where cells are left out, it is that of the others and an estimate of the rest. Where the map
+    has kinks it is that of cells, which err by O(1/n) there: three times what is removed is stated.
     """
-    if not left_out.any():
+    if rod.is_smooth and not left_out.any():
         fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
         if np.isfinite([fine, rough]).all():
             return Estimate(fine, abs(fine - rough))
-    return _of_cells(tips, left_out)
+    return _of_cells(tips, left_out, 1.0 if rod.is_smooth else 3.0)
 
 
-def _of_cells(tips: Array, left_out: Mask) -> Estimate:
+def _of_cells(tips: Array, left_out: Mask, share: float) -> Estimate:
     """Length or area of the cells of a grid that are not left out, as chords or triangles.
 
     What they err by, O(1/n²), is removed as far as the cells tell that a grid of half as many holds
-    too. A cell that is left out may still reach as much as its largest neighbor, and half of it is
-    taken.
+    too, and a share of it is part of the error. A cell that is left out may still reach as much as
+    its largest neighbor, and half of it is taken.
     """
     cells, m = len(left_out), left_out.ndim
     sizes = np.where(left_out, 0.0, _sizes(tips, cells, m))
@@ -237,7 +243,7 @@ def _of_cells(tips: Array, left_out: Mask) -> Estimate:
     rough = np.where(lost, 0.0, _sizes(every_second(tips, cells, m), cells // 2, m))
     removed = (float(sizes[~finer(lost)].sum()) - float(rough.sum())) / 3.0
     unknown = 0.5 * float(_largest_neighbor(sizes)[left_out].sum())
-    return Estimate(float(sizes.sum()) + removed + unknown, abs(removed) + unknown)
+    return Estimate(float(sizes.sum()) + removed + unknown, share * abs(removed) + unknown)
 
 
 def _sizes(tips: Array, cells: int, m: int) -> Array:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.number import fields_of
 from softreach.arm.tables import quadrature
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.rod.arm_rod import ArmRod
@@ -60,8 +61,13 @@ class LoadedLengths:
     @lazy
     def shortening(self) -> Callable[[Array], Array]:
         """s [m] as a function of activations with tensions; NaN without an equilibrium."""
-        turns = [abs(getattr(each, "revolution", 0.0)) for each in self.law.arm.actuators]
-        z, weights, _ = quadrature(self.law.arm, _PIECES + int(max(turns)))
+        arm = self.law.arm
+        turns = [
+            abs(each.value_on("revolution", arm.profile, arm.section))
+            for each in arm.actuators
+            if "revolution" in fields_of(type(each))
+        ]
+        z, weights, _ = quadrature(arm, _PIECES + int(max(turns, default=0.0)))
         force, moment = self.law.loads_at(z, weights)
         moment, at_rest = moment.reshape(-1, len(self.law.columns)), self.law.at_rest
         strains_at = self.rod.strains_at(z)

@@ -1,0 +1,104 @@
+"""Points in one plane: the plane, convex hulls, α-shapes and areas inside of closed curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.support.arrays import Array, Faces, Index, Mask, Points
+
+__all__ = ["Plane", "alpha_triangles", "are_inside", "convex_edges", "enclosed_area", "plane_of"]
+
+
+class Plane(NamedTuple):
+    """A plane in space with axes of its own: x and y in it, z its normal."""
+
+    origin: Array
+    """[m], shape (3,)."""
+    rotation: Array
+    """Its axes as rows, a rotation, shape (3, 3)."""
+    sides: Array
+    """Extents of the points along its axes [m], shape (3,)."""
+
+    def coordinates(self, points: Points) -> Points:
+        """Points [m] in these axes, shape (n, 3)."""
+        return (points - self.origin) @ self.rotation.T
+
+    def places(self, coordinates: Points) -> Points:
+        """The points back in space [m], shape (n, 3)."""
+        return self.origin + coordinates @ self.rotation
+
+
+def plane_of(points: Points, thickness: float) -> Plane | None:
+    """The plane that points lie in, by their principal axes; the first is that of the largest.
+
+    Args:
+        points: [m], shape (n, 3).
+        thickness: Extent along its normal up to which they do [m].
+
+    Returns:
+        None if they lie in none.
+    """
+    origin = points.mean(axis=0)
+    rotation = np.linalg.svd(points - origin, full_matrices=len(points) < 3)[2]
+    rotation[2] *= np.sign(np.linalg.det(rotation))
+    sides = np.ptp((points - origin) @ rotation.T, axis=0)
+    return Plane(origin, rotation, sides) if sides[2] <= thickness else None
+
+
+def convex_edges(points: Points) -> Index:
+    """Edges of the convex hull of points in the plane z = 0, counterclockwise, shape (e, 2)."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        corners = ConvexHull(points[:, :2]).vertices
+    except (QhullError, ValueError):  # on one line, or too few
+        return np.empty((0, 2), np.intp)
+    return np.stack([corners, np.roll(corners, -1)], axis=1).astype(np.intp)
+
+
+def enclosed_area(points: Points, edges: Faces) -> float:
+    """Area inside of closed curves in the plane z = 0 [m²], counterclockwise ones above 0."""
+    if not len(edges):
+        return 0.0
+    a, b = np.moveaxis((points - points.mean(axis=0))[edges], 1, 0)
+    return 0.5 * float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+def are_inside(points: Points, curves: Sequence[Points]) -> Mask:
+    """Mask of points inside of closed curves in the plane z = 0, by an odd number of crossings."""
+    odd = np.zeros(len(points), bool)
+    for curve in curves:
+        for (x, y), (u, v) in zip(curve[:-1, :2], curve[1:, :2], strict=True):
+            if y != v:
+                crossed = (points[:, 1] < y) != (points[:, 1] < v)
+                odd[crossed] ^= points[crossed, 0] < x + (points[crossed, 1] - y) / (v - y) * (
+                    u - x
+                )
+    return odd
+
+
+def alpha_triangles(points: Points, alpha: float) -> tuple[Index, Array]:
+    """Delaunay triangles of points in the plane z = 0 with a circumradius below α, and their areas.
+
+    Args:
+        points: [m], shape (n, 3).
+        alpha: Radius [m].
+
+    Returns:
+        Shapes (t, 3) and (t,).
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    try:
+        triangles = Delaunay(points[:, :2]).simplices
+    except (QhullError, ValueError):  # on one line, or too few
+        return np.empty((0, 3), np.intp), np.empty(0)
+    a, b, c = np.moveaxis(points[triangles][..., :2], 1, 0)
+    (x, y), (u, v) = (b - a).T, (c - a).T
+    area = 0.5 * np.abs(x * v - y * u)
+    sides = np.prod([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    kept = sides < 4.0 * alpha * area
+    return triangles[kept].astype(np.intp), area[kept]

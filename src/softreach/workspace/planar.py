@@ -1,0 +1,273 @@
+"""What arms that move in one plane reach: a region with an area, of any number of bundles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.arm.base import Base
+from softreach.geometry.flat import Plane, are_inside, convex_edges, enclosed_area, plane_of
+from softreach.geometry.surface import Surface, compact_surface
+from softreach.rod.tip_map import TipMap
+from softreach.rod.view import PlacedRod, stable_tips
+from softreach.sampling import cube_blocks
+from softreach.support.arrays import Array, Index, as_points
+from softreach.support.errors import MissingExtra
+from softreach.support.lazy import lazy
+from softreach.support.progress import Progress
+from softreach.support.quantity import quantity
+from softreach.workspace.abstract_set import Number
+from softreach.workspace.convex import HullCorners, climbed_hull
+from softreach.workspace.flux import box_slopes
+from softreach.workspace.grid import cube_grid, image_measure
+from softreach.workspace.image import Lattice
+from softreach.workspace.measure import Estimate
+from softreach.workspace.redundant import CLIMBERS, cloud_on_faces, flooded, lost_share
+from softreach.workspace.search import ENOUGH, Flood
+from softreach.workspace.thin import ReachableSurface
+from softreach.workspace.wrap import DISTANCE, drawn_tight
+
+__all__ = ["ReachableRegion", "planar_set", "plane_of_tips"]
+
+_SAMPLES = 256  # of the box, that tell whether all tips lie in one plane
+_FLAT = 4.0  # tolerances of a tip: what is no thicker is flat
+_RULE = 2.5  # cells along the mean side, times the root of the accuracy
+_FEWEST = 24.0
+_MOST = 1024.0  # cells along the longer side
+_FINER = 1.5
+_SHIFT = np.array([0.31, 0.17, 0.0])  # of a cell, so that no tips lie on lines of the lattice
+_NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
+_SIGNS = 16  # cells of the grid that tells whether two bundles fold
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ReachableRegion(ReachableSurface):
+    """A region of a plane, which has an area, each place counted once, and no volume."""
+
+    convex_area: float
+    """Area of the convex hull [m²]."""
+    convex_area_error: float
+    """Half of what is between two bounds [m²]."""
+    outline: tuple[Array, ...] = field(repr=False)
+    """Closed curves of tips around the region and its holes [m], shape (n, 3) each."""
+
+    @property
+    def unreachability(self) -> float:
+        """The part of the convex hull that is out of reach, 1 - A / A_convex [-]; NaN for 0/0."""
+        return 1.0 - self.area / self.convex_area if self.convex_area > 0 else np.nan
+
+    @property
+    def unreachability_error(self) -> float:
+        """Error of `unreachability` by those of both areas [-]; NaN for 0/0."""
+        if not self.convex_area > 0:
+            return np.nan
+        share = self.area / self.convex_area
+        return (self.area_error + share * self.convex_area_error) / self.convex_area
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points to the region [m], never negative."""
+        return np.minimum(
+            super().distance(points), self._curves.distance(as_points("points", points))
+        )
+
+    @lazy
+    def _curves(self) -> Surface:
+        """The outline as triangles that repeat a corner: parts of it may enclose nothing."""
+        starts = np.cumsum([0, *(len(curve) for curve in self.outline)])[:-1]
+        pieces = [
+            start + np.arange(len(curve) - 1)
+            for start, curve in zip(starts, self.outline, strict=True)
+        ]
+        first = np.concatenate(pieces)
+        faces = np.stack([first, first + 1, first + 1], axis=1)
+        return Surface(vertices=np.concatenate(self.outline), faces=faces)
+
+    def _lines(self) -> list[str]:
+        convex = quantity(self.convex_area, "m²", self.convex_area_error)
+        share = quantity(100 * self.unreachability, "%", 100 * self.unreachability_error)
+        return [
+            f"area {quantity(self.area, 'm²', self.area_error)} in one plane",
+            f"convex hull {convex}, of which {share} are out of reach",
+        ]
+
+    def _numbers(self) -> dict[str, Number]:
+        return {
+            **super()._numbers(),
+            "convex_area": Number(self.convex_area, "m2", "convex hull's area"),
+            "convex_area_error": Number(
+                self.convex_area_error, "m2", "error of the convex hull's area"
+            ),
+        }
+
+
+@dataclass(frozen=True, repr=False)
+class _InPlane(PlacedRod):
+    """A tip map in the axes of the plane that its tips lie in."""
+
+    base: TipMap  # pyright: ignore[reportIncompatibleVariableOverride]
+    turned: Base
+
+    @property
+    def pose(self) -> Base:
+        return self.turned
+
+
+class _FlatCorners(HullCorners):
+    """Corners of a convex hull in the plane z = 0, with edges for faces and an area for volume."""
+
+    __slots__ = ()
+
+    @classmethod
+    def of(cls, tips: Array, cube: Array) -> Self:
+        known = np.isfinite(tips[:, 0])
+        tips, cube = tips[known], cube[known]
+        edges = convex_edges(tips)
+        used = edges[:, 0]
+        row = np.arange(len(used))
+        return cls(cube[used], tips[used], np.stack([row, np.roll(row, -1)], axis=1))
+
+    @property
+    def facets(self) -> Array:
+        a, b = np.moveaxis(self.tips[self.faces], 1, 0)
+        x, y = (b - a)[:, :2].T
+        return np.stack([y, -x, np.zeros_like(x)], axis=1)
+
+    @property
+    def volume(self) -> float:
+        return enclosed_area(self.tips, self.faces)
+
+
+def plane_of_tips(rod: TipMap) -> Plane | None:
+    """The plane in which all tips lie to their tolerance; None if there is none."""
+    (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.dimension, 0, _SAMPLES)
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(np.concatenate([cube, np.rint(cube)])))
+    tips = tips[np.isfinite(tips[:, 0])]
+    return plane_of(tips, _FLAT * rod.tol * rod.length) if len(tips) > 2 else None
+
+
+def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -> ReachableRegion:
+    """The region that a tip map reaches in a plane, as `searched_set` finds volumes in space.
+
+    Args:
+        rod: The tip map, of two free bundles or more.
+        plane: The plane in which its tips lie.
+        accuracy: Relative error asked of the area.
+        progress: Called with the number of centers searched since its last call.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    turned = Base(
+        points=tuple(map(tuple, plane.rotation.tolist())),  # pyright: ignore[reportArgumentType]
+        position=tuple((-plane.rotation @ plane.origin).tolist()),  # pyright: ignore[reportArgumentType]
+    )
+    flat = _InPlane(rod, turned)
+    cloud = gamma, tips = cloud_on_faces(flat, 0)
+    sides = np.ptp(tips[:, :2], axis=0)
+    mean = float(np.sqrt(np.prod(sides)))
+    edge = max(min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * mean, float(sides.max()) / _MOST)
+
+    def outline(edge: float) -> _Outline:
+        flood = Flood(flat, _lattice(tips, edge), progress, is_flat=True)
+        return _outline(flooded(flood, *cloud))
+
+    coarse = outline(_FINER * edge)
+    while True:
+        found = outline(edge)
+        slack = found.length * (ENOUGH * edge + rod.tol * rod.length)
+        area = Estimate(found.area, abs(found.area - coarse.area) + slack)
+        if area.error <= accuracy * area.value or edge / _FINER < sides.max() / _MOST:
+            break
+        edge, coarse = edge / _FINER, found
+    area = _smooth(rod, flat, area)
+    cube = rod.box.to_cube(np.concatenate([gamma[:CLIMBERS], *found.gamma]))[:, rod.box.free]
+    convex = climbed_hull(flat, cube, accuracy, _FlatCorners).volume
+    return ReachableRegion(
+        tip_map=rod,
+        cells=0,
+        area=area.value,
+        area_error=area.error,
+        convex_area=convex.value,
+        convex_area_error=convex.error,
+        convex_volume=0.0,
+        convex_volume_error=0.0,
+        lost_share=lost_share(rod),
+        outline=tuple(plane.places(curve) for curve in found.curves),
+        mapped_grid=_mesh(found, plane),
+    )
+
+
+def _lattice(tips: Array, cell: float) -> Lattice:
+    """Five layers of cells, the third in the plane."""
+    lattice = Lattice.around(tips * [1.0, 1.0, 0.0], cell)
+    origin = lattice.origin + cell * _SHIFT
+    origin[2] = -2.0 * cell
+    return Lattice(origin, cell, (*lattice.shape[:2], 5))
+
+
+@dataclass(frozen=True)
+class _Outline:
+    """Closed curves of tips around a region."""
+
+    curves: list[Array]
+    gamma: list[Array]
+    """Activations that lead to them, shape (n, bundles) each."""
+    centers: Array
+    """Of cells that are reached [m], shape (n, 3)."""
+
+    @property
+    def area(self) -> float:
+        return sum(enclosed_area(each, _edges(each)) for each in self.curves)
+
+    @property
+    def length(self) -> float:
+        return sum(
+            float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in self.curves
+        )
+
+
+def _edges(curve: Array) -> Index:
+    row = np.arange(len(curve) - 1)
+    return np.stack([row, row + 1], axis=1)
+
+
+def _outline(flood: Flood) -> _Outline:
+    try:
+        from skimage.measure import find_contours
+    except ImportError as error:
+        raise MissingExtra(("scikit-image", "surface")) from error
+    curves, gamma = list[Array](), list[Array]()
+    for at in find_contours(flood.distances[:, :, 2], DISTANCE, positive_orientation="low"):
+        layer = np.full(len(at), 2.0)
+        drawn = drawn_tight(flood, np.column_stack([at, layer]))
+        curves.append(drawn.tips)
+        gamma.append(drawn.gamma)
+    return _Outline(curves, gamma, flood.centers(np.flatnonzero(flood.gap == 0.0)))
+
+
+def _smooth(rod: TipMap, flat: TipMap, area: Estimate) -> Estimate:
+    """The area of two bundles that do not fold by Gauss nodes, as far as the outline agrees."""
+    if rod.box.dimension != 2 or rod.supports_unstable or not rod.is_smooth:
+        return area
+    grid = cube_grid(_SIGNS)[:, :2]
+    sign = np.linalg.det(box_slopes(flat, grid)[1][:, :2])
+    fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
+    folds = sign.min() * sign.max() <= 0.0 or abs(fine - area.value) > area.error
+    return area if folds else Estimate(fine, abs(fine - rough))
+
+
+def _mesh(outline: _Outline, plane: Plane) -> Surface:
+    """Triangles of the region: those of its outline and of centers inside."""
+    from scipy.spatial import Delaunay
+
+    points = np.concatenate([*outline.curves, outline.centers])
+    if len(points) < 3 or not outline.area > 0.0:
+        return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
+    points = np.unique(points, axis=0)
+    faces = Delaunay(points[:, :2], qhull_options="QJ Pp").simplices
+    kept = are_inside(points[faces].mean(axis=1), outline.curves)
+    vertices, faces = compact_surface(plane.places(points), faces[kept].astype(np.int32))
+    return Surface(vertices=vertices, faces=faces)

@@ -1,0 +1,191 @@
+"""A closed surface of tips around what is reached, of whatever thinness: wrapped and drawn tight.
+
+Distances from the centers of a lattice to the nearest tips have a level set that goes around both
+sides of a sheet and its rim. Each of its vertices is drawn to the nearest tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.geometry.surface import Surface, corner_areas
+from softreach.rod.activation_box import damped_steps
+from softreach.rod.rods import refined
+from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, Mask
+from softreach.support.errors import MissingExtra
+from softreach.support.lazy import lazy
+from softreach.workspace.search import ENOUGH, Flood, nearest_tips
+
+__all__ = ["DISTANCE", "Wrap", "drawn_tight", "fits", "spread", "wrapped"]
+
+DISTANCE = 0.75
+"""Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
+_CLEARLY = 0.02  # cells by which a tip must be closer to start another search
+_ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
+_SHEET = 2e-3  # of its width, the root of its area, that a sheet is thinner than
+_SHEET_TOL = 1e-9  # in L, as a sheet may be no thicker than tips are exact otherwise
+_WIDEST = 0.99  # of all thicknesses are below the one that the next pushes go beyond
+_STRETCH = 30.0  # times as much as one to the side, a miss along the normal counts
+_PUSHES, _PASSES = 12, 4
+_DAMPING = 1e-8  # of the mean square of the slopes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Wrap(Surface):
+    """The surface, closed and outwards, a ten-thousandth of a cell outside of its tips."""
+
+    rod: TipMap
+    gamma: Array
+    """Activations that lead to the vertices, shape (v, bundles)."""
+    cell: float
+    """Edge of the cells that it was found with [m]."""
+    tight_volume: float
+    """Volume inside of the tips themselves [m³]."""
+
+    @property
+    def error_of_tips(self) -> float:
+        """Of this volume, by where tips count as found and by their own errors [m³]."""
+        if self.volume_of_tips != self.tight_volume:
+            return self.area * _SHEET_TOL * self.rod.length
+        return self.area * (ENOUGH * self.cell + self.rod.tol * self.rod.length)
+
+    @lazy
+    def volume_of_tips(self) -> float:
+        """The same; of a sheet that is far thinner than cells, its thickness over its area [m³].
+
+        No search for the nearest tip sees so small a change; so from each vertex the tip is pushed
+        along its normal, to which all columns of ∂r/∂γ are nearly square, to both sides.
+        """
+        half = 0.5 * self.area
+        thickness = self.tight_volume / half if half > 0.0 else np.inf
+        if self.rod.supports_unstable or thickness > _SHEET * np.sqrt(half):
+            return self.tight_volume
+        rod, areas = refined(self.rod, _SHEET_TOL), np.linalg.norm(self.corner_areas, axis=1)
+        tips, slopes = rod.tips_and_slopes(self.gamma)
+        normals = np.linalg.svd(slopes * rod.box.scales)[0][:, :, 2]
+        found = np.zeros(len(tips))
+        for _ in range(_PASSES):
+            ways = (2.0 * thickness * normals, -2.0 * thickness * normals)
+            found = sum(_pushed(rod, self.gamma, tips, way) for way in ways)
+            thickness = float(np.quantile(found, _WIDEST))
+        return 0.5 * float(areas @ found)
+
+    @lazy
+    def cube(self) -> Array:
+        """Places of the vertices in the unit cube of the free bundles, shape (v, dimension)."""
+        box = self.rod.box
+        return box.to_cube(self.gamma)[:, box.free].clip(0.0, 1.0)
+
+    @lazy
+    def corner_areas(self) -> Array:
+        """Outward area that each vertex stands for [m²], shape (v, 3)."""
+        return corner_areas(self.vertices, self.faces)
+
+
+def _pushed(rod: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
+    """How far tips go along a way that is too far, with little to the side [m], shape (n,)."""
+    size = np.linalg.norm(way, axis=1)
+    unit, target = way / size[:, None], tips + way
+    scale = np.eye(3) + (_STRETCH - 1.0) * unit[:, :, None] * unit[:, None, :]
+    for _ in range(_PUSHES):
+        at, slopes = rod.tips_and_slopes(gamma)
+        miss, stretched = scale @ (at - target)[:, :, None], scale @ slopes
+        square = ((stretched * rod.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
+        gamma, _ = damped_steps(rod.box, gamma, miss[:, :, 0], stretched, _DAMPING * square)
+    return ((rod.tips(gamma) - tips) * unit).sum(axis=1)
+
+
+def spread(flood: Flood) -> None:
+    """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
+    offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ flood.steps
+    offsets = offsets[offsets != 0]
+    front = np.flatnonzero((flood.gap < DISTANCE) & (flood.gap > 0.0))
+    front = np.concatenate([front, _rim(flood, offsets)])
+    while len(front):
+        tips = flood.rod.tips(flood.gamma[front])
+        sources = np.repeat(np.arange(len(front)), len(offsets))
+        cells = (front[:, None] + offsets).ravel()
+        sources, cells = sources[flood.gap[cells] > 0.0], cells[flood.gap[cells] > 0.0]
+        away = np.linalg.norm(flood.centers(cells) - tips[sources], axis=1) / flood.lattice.cell
+        order = np.lexsort((away, cells))
+        order = order[away[order] < flood.gap[cells[order]] - _CLEARLY]
+        order = order[np.diff(cells[order], prepend=-1) > 0]
+        cells, sources = cells[order], front[sources[order]]
+        before = flood.gap[cells]
+        flood.search(cells, flood.gamma[sources])
+        front = cells[(flood.gap[cells] < before) & (flood.gap[cells] < DISTANCE)]
+
+
+def _rim(flood: Flood, offsets: Index) -> Index:
+    """Centers that are reached beside some that are not."""
+    reached = np.flatnonzero(flood.gap == 0.0)
+    return reached[(flood.gap[reached[:, None] + offsets] > 0.0).any(axis=1)]
+
+
+def fits(flood: Flood) -> Mask:
+    """True if the level set ends within the lattice."""
+    near = ((flood.gap >= 0.0) & (flood.gap < DISTANCE)).reshape(flood.lattice.shape)
+    return np.count_nonzero(near) == np.count_nonzero(near[2:-2, 2:-2, 2:-2])
+
+
+class Drawn(NamedTuple):
+    """Places of the level set that are drawn to the nearest tips."""
+
+    places: Array
+    """[m], shape (n, 3)."""
+    tips: Array
+    """[m], shape (n, 3)."""
+    gamma: Array
+    """Activations that lead to them, shape (n, bundles)."""
+
+
+def drawn_tight(flood: Flood, at: Array) -> Drawn:
+    """The nearest tips of places on edges of the lattice, from the tips at both ends.
+
+    Args:
+        flood: What was found.
+        at: Coordinates of the places in cells, shape (n, 3).
+    """
+    lattice = flood.lattice
+    places = lattice.origin + lattice.cell * at
+    tips, distance = np.full_like(places, np.nan), np.full(len(places), np.inf)
+    gamma = np.zeros((len(places), flood.gamma.shape[1]))
+    for end in (np.floor(at), np.ceil(at)):
+        cells = end.astype(np.int64) @ flood.steps
+        found = nearest_tips(flood.rod, flood.gamma[cells], places, ENOUGH * lattice.cell)
+        closer = found.distance < distance
+        tips[closer], distance[closer] = found.tips[closer], found.distance[closer]
+        gamma[closer] = found.gamma[closer]
+    return Drawn(places, tips, gamma)
+
+
+def wrapped(flood: Flood) -> Wrap:
+    """The surface around what was found.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError as error:
+        raise MissingExtra(("scikit-image", "surface")) from error
+    at, faces, _, _ = marching_cubes(
+        flood.distances, DISTANCE, gradient_direction="descent", allow_degenerate=False
+    )
+    drawn = drawn_tight(flood, at.astype(float))
+    places, tips, gamma = drawn.places, drawn.tips, drawn.gamma
+    tight = Surface(vertices=tips, faces=faces).volume
+    cell, away = flood.lattice.cell, places - tips
+    away /= np.linalg.norm(away, axis=1).clip(1e-9 * cell)[:, None]
+    return Wrap(
+        vertices=tips + _ASIDE * cell * away,
+        faces=faces,
+        rod=flood.rod,
+        cell=cell,
+        gamma=gamma,
+        tight_volume=tight,
+    )

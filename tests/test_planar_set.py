@@ -1,0 +1,170 @@
+"""Regions that arms reach in one plane, by Green's theorem, by pixels and by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from softreach.arm import (
+    Chamber,
+    LinearTaper,
+    Manipulator,
+    Material,
+    Ring,
+    Section,
+    Tendon,
+    designs,
+)
+from softreach.atlas.metrics import chosen_metrics
+from softreach.cli.app import run
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.volume import flat_areas, unreachability
+from softreach.geometry.flat import alpha_triangles, convex_edges, enclosed_area, plane_of
+from softreach.rod.rods import tip_map
+from softreach.workspace import ReachableRegion, ReachableSolid, reachable_set
+
+SOFT = Material(young_modulus=2e5, poisson_ratio=0.45)
+
+
+def planar(*, pairs: int = 2, chamber: bool = False, **base) -> Manipulator:
+    """Tendons on both sides in one plane, for each of the segments."""
+    tendons = [
+        Tendon(
+            name=f"{side} {k}", distance=0.018, offset=angle, end_over_length=(k + 1) / pairs,
+            activation_bounds=(0.0, 8.0 / (k + 1)),
+        )
+        for k in range(pairs)
+        for side, angle in (("right", 0.4), ("left", 0.4 + math.pi))
+    ]  # fmt: skip
+    axial = [Chamber(name="c", distance=0.0, radius=0.004, activation_bounds=(0.0, 2e4))]
+    arm = Manipulator(
+        profile=LinearTaper(length=0.2, outer_radius=0.02),
+        section=Section(rings=(Ring(inner_ratio=0.0, material=SOFT),)),
+        actuators=tuple(tendons + axial * chamber),
+    )
+    return arm.replace(base=arm.base.replace(**base)) if base else arm
+
+
+@pytest.fixture(scope="module")
+def region() -> ReachableRegion:
+    found = reachable_set(planar())
+    assert isinstance(found, ReachableRegion)
+    return found
+
+
+def test_four_bundles_reach_as_much_as_pixels_count(region):
+    rod = region.tip_map
+    rng = np.random.default_rng(0)
+    cube = rng.random((2_000_000, 4))
+    bound = rng.random(cube.shape) < 0.4
+    cube[bound] = rng.integers(0, 2, int(bound.sum()))
+    tips = rod.tips(rod.box.from_cube(cube))
+    flat = tips @ np.array([[math.cos(0.4), 0.0], [math.sin(0.4), 0.0], [0.0, 1.0]])
+    counts = []
+    for pixels in (
+        150,
+        300,
+    ):  # each pixel that is touched counts in full, which the limit takes off
+        side = np.ptp(flat[:, 0]) / pixels
+        touched = np.unique(np.floor(flat / side).astype(int), axis=0)
+        counts.append(len(touched) * side**2)
+    assert 2.0 * counts[1] - counts[0] == pytest.approx(region.area, rel=0.03)
+    assert region.area_error < 3e-3 * region.area
+    hull = enclosed_area(padded := np.column_stack([flat, 0.0 * flat[:, 0]]), convex_edges(padded))
+    assert hull < region.convex_area + region.convex_area_error
+    assert hull == pytest.approx(region.convex_area, rel=2e-2)
+    assert region.unreachability == pytest.approx(1.0 - region.area / region.convex_area)
+    assert region.unreachability_error < 1e-2
+
+
+def test_tips_lie_in_the_region_and_its_outline_around_them(region):
+    rod = region.tip_map
+    tips = rod.tips(rod.box.from_cube(np.random.default_rng(1).random((2000, 4))))
+    assert region.distance(tips).max() < 2e-4
+    outline = np.concatenate(region.outline)
+    assert region.distance(outline).max() < 1e-9
+    assert region.distance(outline + [0.0, 0.0, 1.0]).min() > 0.5
+    mesh = region.surface()
+    assert mesh.area == pytest.approx(region.area, rel=1e-3)
+    assert region.volume == region.convex_volume == 0.0
+
+
+def test_two_bundles_have_the_area_that_green_tells():
+    arm = planar(pairs=1, chamber=True).with_bounds(((0.0, 8.0), (0.0, 0.0), (0.0, 2e4)))
+    found = reachable_set(arm)
+    assert isinstance(found, ReachableRegion)
+    rod, edge = tip_map(arm), np.linspace(0.0, 1.0, 4001)
+    around = np.concatenate([
+        np.stack([edge, 0 * edge], 1), np.stack([1 + 0 * edge, edge], 1),
+        np.stack([edge[::-1], 1 + 0 * edge], 1), np.stack([0 * edge, edge[::-1]], 1),
+    ])  # fmt: skip
+    x, y, z = rod.tips(rod.box.from_free_cube(around)).T
+    s = x * math.cos(0.4) + y * math.sin(0.4)
+    green = 0.5 * abs(float((s[:-1] * z[1:] - s[1:] * z[:-1]).sum()))
+    assert found.area == pytest.approx(green, rel=1e-6)
+    assert abs(found.area - green) < found.area_error + 1e-6 * green
+
+
+@pytest.mark.parametrize(("pairs", "chamber"), [(1, True), (2, True), (3, False)])
+def test_any_number_of_bundles_leaves_an_area_wherever_the_base_points(pairs, chamber):
+    upright = reachable_set(planar(pairs=pairs, chamber=chamber), accuracy=0.02)
+    leaning = reachable_set(
+        planar(pairs=pairs, chamber=chamber, points="-x", turn=0.3, position=(1.0, 2.0, 3.0)),
+        accuracy=0.02,
+    )
+    assert isinstance(upright, ReachableRegion)
+    assert isinstance(leaning, ReachableRegion)
+    error = upright.area_error + leaning.area_error
+    assert abs(upright.area - leaning.area) < error < 0.04 * upright.area
+    assert 0.0 < upright.unreachability < 1.0
+
+
+def test_a_sheet_in_space_is_no_plane():
+    assert isinstance(reachable_set(designs.three_tendon_robot(), accuracy=0.1), ReachableSolid)
+
+
+def test_clouds_in_a_plane_have_areas():
+    square = np.random.default_rng(0).random((20_000, 2)) @ [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]
+    areas = flat_areas(square + 5.0, 0.05)
+    assert areas is not None
+    area, convex = areas
+    assert area == pytest.approx(1.0, abs=0.01)
+    assert area < convex < 1.0
+    assert unreachability(square, 0.05) == pytest.approx(1.0 - area / convex)
+    assert flat_areas(np.random.default_rng(0).random((100, 3)), 0.1) is None
+    line = np.outer(np.linspace(0, 1, 50), [1.0, 2.0, 3.0])
+    assert flat_areas(line, 0.1) == (0.0, 0.0)
+    plane = plane_of(square, 1e-9)
+    assert plane is not None
+    assert plane.sides[2] < 1e-12
+    ring = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.0]], float)
+    triangles, areas = alpha_triangles(ring, 0.6)
+    assert (len(triangles), areas.sum()) == (4, pytest.approx(1.0))
+
+
+def printed_json(capsys, *arguments):
+    assert run([*map(str, arguments), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_every_command_that_gives_a_volume_gives_the_area(tmp_path, region, capsys):
+    region.arm.save(path := tmp_path / "planar.toml")
+    mesh = tmp_path / "region.stl"
+    shown = printed_json(capsys, "reach", path, "--out", mesh)
+    assert mesh.stat().st_size > 1000
+    assert shown["unreachability"] == pytest.approx(region.unreachability)
+    assert region.area == pytest.approx(shown["area_in_one_plane_m2"])
+    shown = printed_json(capsys, "volume", path, "--n", 4096, "--alpha", "10mm")
+    assert 0.0 < shown["unreachability"] < 1.0
+    assert shown["area_in_one_plane_m2"] < shown["convex_area_m2"]
+    known = {metric.name: metric for metric in chosen_metrics(["exact", "concave", "convex"])}
+    assert known["exact_area"].compute(region) == region.area
+    assert known["exact_unreachability"].compute(region) == region.unreachability
+    tips = compute_cloud(region.arm, n=4096).tip.values
+    areas = flat_areas(tips, 0.01)
+    assert areas is not None
+    assert known["area"].compute(tips, 0.01) == areas[0]
+    assert math.isnan(known["area"].compute(np.random.default_rng(0).random((9, 3)), 0.01))
