@@ -305,7 +305,8 @@ def test_stores_of_other_programs_and_of_another_kind_are_refused(
     for place in sorted(tmp_path.iterdir()):
         for ask in (sr.open_cloud, open_atlas, verify_atlas):
             assert str(place) in str(raised_by(lambda place=place, ask=ask: ask(place)))
-    atlas, other = (written(one, tmp_path / str(len(one))) for one in (atlas_files, cloud_files))
+    atlas = written(atlas_files, tmp_path / "atlas.zarr")
+    other = written(cloud_files, tmp_path / "cloud.zarr")
     assert "this is an atlas" in str(raised_by(lambda: sr.open_cloud(atlas)))
     assert "an atlas written by build_atlas" in str(raised_by(lambda: open_atlas(other)))
 

@@ -289,7 +289,7 @@ def test_a_store_is_read_without_the_functions_of_its_metrics(tmp_path):
     convex, height = AtlasStore.open(store).command.metrics
     assert convex is METRIC_GROUPS["convex"][0]
     assert height.to_dict() == MEAN_HEIGHT.to_dict()
-    with pytest.raises(MetricFailed, match=r"test_own_metrics:mean_height .*pass the metric"):
+    with pytest.raises(MetricFailed, match=r"test_metrics:mean_height .*pass the metric"):
         height.value({Need.TIPS: np.zeros((1, 3))}, {})
 
 
