@@ -158,8 +158,8 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
         raise InvalidInput("free", f"{len(free)} numbers", allowed)
     if values[-1] > _SAME * values[0]:
         return
-    shares = zip(free.names, np.abs(axes[-1]), strict=True)
-    trading = [name for name, share in shares if share > 0.05]
+    moves = np.abs(axes[-1]) * sizes
+    trading = [free.names[k] for k in np.flatnonzero(moves > 0.05 * moves.max())]
     allowed = (
         "numbers that the data can tell apart: these change together without moving any marker, "
         f"as only their ratio or their sum shows; leave out one, such as {trading[-1]}, or give "
