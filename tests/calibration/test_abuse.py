@@ -151,7 +151,7 @@ def test_an_outlier_of_a_meter_is_named_and_hardly_moves_the_numbers(good):
 
 
 def test_fewer_samples_than_would_tell_are_said_to_be_few(good):
-    result = sr.calibrate(ARM, good[:2], free=FREE)
+    result = sr.calibrate(ARM, good[:4], free=FREE)
     assert result.verdict.limit == "data"
     assert "too few samples" in str(result)
 

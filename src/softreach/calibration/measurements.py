@@ -293,7 +293,7 @@ def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]
     row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
     name, others = columns[marker][axis], f", as {far - 1} others" if far > 1 else ""
     allowed = (
-        f"within {1e3 * reach:.4g} mm of the middle, as the arm has {1e3 * arm.length:.4g} mm: look "
+        f"within {1e3 * reach:.4g} mm of the middle, for an arm of {1e3 * arm.length:.4g} mm: look "
         "at the unit of the column, and leave a cell empty where the marker was not seen"
     )
     given = f"{1e3 * places[row, marker, axis]:.4g} mm{others}"
