@@ -18,7 +18,7 @@ _FEWEST_RUNS = 8
 """Runs from which they are the clusters; with fewer, samples are."""
 _SEEN = 0.1
 """Least share of a variance that the residuals would show if they were plain noise."""
-_VAGUE = 100.0
+_VAGUE = 30.0
 """Standard deviation, in changes that matter, from which the data does not tell a number."""
 
 
