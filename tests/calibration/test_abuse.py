@@ -8,8 +8,17 @@ import pytest
 
 import softreach as sr
 from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section
+from softreach.calibration.free_numbers import free_numbers
 from softreach.support.errors import InvalidInput, SoftreachWarning, no_warnings
-from tests.calibration.arms import MODULUS, hanging_tentacle, measured, on_the_bench
+from tests.calibration.arms import (
+    MODULUS,
+    hanging_tentacle,
+    measured,
+    on_the_bench,
+    pulled_wire,
+    random_inputs,
+    table,
+)
 
 ARM = hanging_tentacle()
 FREE = [MODULUS, "pose"]
@@ -31,6 +40,13 @@ def refusal(data, free=FREE, arm=ARM, **options):
     return text
 
 
+def with_cell(data, row, column, value):
+    """The table with another value in a cell."""
+    data = data.astype(float)
+    data.loc[row, column] = value
+    return data
+
+
 TABLES = {
     "tensions in mm": (lambda d: d.rename(columns={"t 1_N": "t 1_mm"}), "column t 1_mm = in m"),
     "no unit": (lambda d: d.rename(columns={"t 1_N": "t 1"}), "such as t 1_N"),
@@ -49,6 +65,16 @@ TABLES = {
     "mm called m": (lambda d: d.rename(columns=lambda c: c.replace("mm", "m")), "look at the unit"),
     "one sample": (lambda d: d[:1], "at most 6 numbers, as many as the data has"),
     "mirrored": (lambda d: d.assign(half_x_mm=-d.half_x_mm, tool_x_mm=-d.tool_x_mm), "right-hand"),
+    "exchanged": (
+        lambda d: d.rename(columns={"t 2_N": "t 3_N", "t 3_N": "t 2_N"}),
+        "or exchange the inputs t 2 and t 3",
+    ),
+    "pushes": (lambda d: with_cell(d, 4, "t 2_N", -3), "t 2_N in row 4 = -3 N: must be at least 0"),
+    "huge": (lambda d: with_cell(d, 3, "t 1_N", 1e300), "t 1_N in row 3 = 1e+300 N: must be near"),
+    "kN": (lambda d: d.rename(columns=lambda c: c.replace("_N", "_kN")), "_kN in row"),
+    "inf": (lambda d: with_cell(d, 5, "tool_x_mm", np.inf), "tool_x_mm in row 5 = inf"),
+    "far": (lambda d: with_cell(d, 6, "tool_y_mm", 1e300), "tool_y_mm in row 6 = 1e+300 mm"),
+    "one header in m": (lambda d: d.rename(columns={"tool_z_mm": "tool_z_m"}), "tool_z_m in row"),
     "number": (lambda d: 3, "a path, a DataFrame"),
     "ragged": (lambda d: {"a": [1], "b": [1, 2]}, "columns of one length"),
 }
@@ -73,6 +99,25 @@ def test_a_file_that_is_no_table_is_refused_in_one_line(content, said, tmp_path)
     path = tmp_path / "poses.csv"
     path.write_bytes(content)
     assert said in refusal(path)
+
+
+@pytest.mark.parametrize("kind", ["gz", "bz2", "xz", "zip", "zst"])
+def test_a_compressed_table_that_was_cut_is_refused_in_one_line(kind, good, tmp_path):
+    path = tmp_path / f"poses.csv.{kind}"
+    if kind == "zst":
+        path.write_bytes(b"\x28\xb5\x2f\xfd" + bytes(range(100)))
+    else:
+        good.to_csv(path, index=False)
+        path.write_bytes(path.read_bytes()[:-20])
+    assert "a table in CSV or Parquet" in refusal(path)
+
+
+def test_a_row_that_was_cut_short_is_refused(good, tmp_path):
+    path = tmp_path / "poses.csv"
+    lines = good.to_csv(index=False).splitlines()
+    lines[4] = lines[4].rpartition(",")[0]
+    path.write_text("\n".join(lines))
+    assert "row 3 of the data = 8 cells" in refusal(path)
 
 
 def test_a_header_that_names_a_column_twice_is_refused(good, tmp_path):
@@ -101,6 +146,8 @@ OPTIONS = {
     "none": (dict(free=[]), "the name of one or more"),
     "a count": (dict(free=["t.bundles"]), "this one counts"),
     "does nothing": (dict(free=[MODULUS, "rings[0].material.density"]), "leave out what does noth"),
+    "base": (dict(free=["base.turn"]), "the base is free by pose"),
+    "any number": (dict(free=["*"]), "leave out what does nothing"),
     "two units": (dict(free=["t.distance = t.offset"]), "of the same unit"),
 }
 
@@ -150,8 +197,41 @@ def test_an_outlier_of_a_meter_is_named_and_hardly_moves_the_numbers(good):
     assert result.values[MODULUS] == pytest.approx(3.3e5, rel=0.03)
 
 
+def test_a_wildcard_takes_one_name_of_each_number():
+    free = free_numbers(ARM, ["markers.half.*", "t.*distance*"]).names
+    assert free[0] == "markers.half.station_over_length"
+    assert free[1:4] == tuple(f"markers.half.offset[{k}]" for k in range(3))
+    assert free[4:] == ("t.distance",)
+
+
+def test_one_sample_says_nothing_of_how_sure_a_number_is(good):
+    with pytest.warns(SoftreachWarning, match="does not tell rings"):
+        result = sr.calibrate(ARM, good[:1], free=[MODULUS], rivals=False)
+    assert result.sigma[MODULUS] == np.inf
+    assert "which the data does not tell" in str(result)
+
+
+def test_a_number_that_ran_away_is_warned_of_and_has_no_error():
+    """Tendons that do not stretch, fitted by their stiffness."""
+    stiff = pulled_wire()
+    stiff = stiff.replace(
+        actuators=tuple(each.replace(tendon_stiffness=None) for each in stiff.actuators)
+    )
+    x = 0.3 * random_inputs(stiff, 30)
+    places = sr.tip_positions(stiff, x, 1e-9)[:, None]
+    places = places + 2e-3 * np.random.default_rng(0).standard_normal(places.shape)
+    data = table(places, x, stiff.input_names, ["tip"], "mm")
+    name = "s1.tendon_stiffness = s2.tendon_stiffness"
+    with pytest.warns(SoftreachWarning) as caught:
+        result = sr.calibrate(pulled_wire(), data, free=[name], rivals=False)
+    texts = [str(each.message) for each in caught]
+    assert any(re.search(r"became \S+ times what the design says", text) for text in texts)
+    assert any(f"does not tell {name}" in text for text in texts)
+    assert result.sigma[name] == np.inf
+
+
 def test_fewer_samples_than_would_tell_are_said_to_be_few(good):
-    result = sr.calibrate(ARM, good[:2], free=FREE)
+    result = sr.calibrate(ARM, good[:4], free=FREE)
     assert result.verdict.limit == "data"
     assert "too few samples" in str(result)
 

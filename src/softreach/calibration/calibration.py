@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.summary import design_warnings
 from softreach.calibration.baselines import constant_curvature, quadratic
 from softreach.calibration.errors import (
     Misses,
@@ -23,6 +25,7 @@ from softreach.calibration.errors import (
     misses,
     repeatability,
 )
+from softreach.calibration.exchanged import Exchange, exchanged_columns
 from softreach.calibration.fit import Fit, fitted, robust_width, started
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
@@ -44,6 +47,10 @@ Array = NDArray[np.float64]
 _OUTLIER = 5.0
 """Robust widths from which a sample is listed."""
 _CORRELATED = 0.95
+_LEAVES = 3.0
+"""Factor by which a number has left its design."""
+_POOR = 0.1
+"""Error over the motion of the markers from which columns may be exchanged."""
 
 
 class Rival(NamedTuple):
@@ -131,10 +138,44 @@ def calibrate(
         fit=fit,
         uncertainty=uncertainty(fit, train, noise),
         rivals=(),
+        exchange=None,
         seconds=perf_counter() - begin,
         date=dt.datetime.now(dt.UTC).date().isoformat(),
     )
+    _warn_of_numbers(result)
+    spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
+    if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
+        found = exchanged_columns(
+            fit, model, train.places, robust=robust, noise=noise, progress=progress
+        )
+        result = replace(result, exchange=found)
     return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+
+
+def _left(ratio: float) -> bool:
+    """True of a number that left the design."""
+    return not 1.0 / _LEAVES < ratio < _LEAVES
+
+
+def _warn_of_numbers(result: Calibration) -> None:
+    """Warn of numbers that left the design, or are not told, and of what the new design is."""
+    own = [n.name for n in result.fit.free.numbers if n.prior is not None]
+    for name, ratio in result.ratios.items():
+        if _left(ratio) and name not in own:
+            warn(
+                f"{name} became {ratio:.3g} times what the design says: hold it, give it a prior, "
+                "and look whether the inputs are in their order"
+            )
+    told = result.uncertainty.told | result.fit.at_bound
+    if vague := [name for name, is_told in zip(result.names, told, strict=True) if not is_told]:
+        warn(
+            f"the data does not tell {', '.join(vague)}: its standard deviation is infinite; hold "
+            "it, give it a prior, or measure more"
+        )
+    before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}
+    for text in design_warnings(result.arm):
+        if re.sub(r"[\d.]+", "", text) not in before:
+            warn(f"the calibrated arm: {text}")
 
 
 def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
@@ -184,6 +225,8 @@ class Calibration:
     uncertainty: Uncertainty
     rivals: tuple[Rival, ...]
     """Other laws on the same samples."""
+    exchange: Exchange | None
+    """Columns by whose exchange the same numbers would fit far better."""
     seconds: float
     date: str
 
@@ -239,16 +282,24 @@ class Calibration:
     @cached_property
     def repeatability(self) -> Repeatability:
         """By how much the data repeats itself."""
-        return repeatability(self.data)
+        return repeatability(self.data, self.residuals)
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Limitation of the fit; samples far off are left out."""
+        """Limitation of the fit; samples far off are left out if they are few."""
         held = bool(self.held.any())
         rows, name = (self.held, "held-out") if held else (~self.held, "fitted")
-        near = rows & ~np.isin(self.data.rows, self.outliers)
-        error = misses(self.residuals[near if near.any() else rows]).rms
-        return judged(self.data, self.residuals, error, self.repeatability, f"{name} error")
+        far = np.isin(self.data.rows, self.outliers)
+        said = ""
+        if self.exchange is not None:
+            less = 1e3 * misses(self.exchange.fit.residuals).rms
+            said = (
+                f"{self.exchange.columns} seem to be exchanged, or counted the other way round: "
+                f"the same numbers then fit to "
+                f"{less:.3g} mm rms instead of {1e3 * self.train.rms:.3g} mm"
+            )
+        repeated = self.repeatability
+        return judged(self.data, self.residuals, repeated, f"{name} error", rows, far, said)
 
     @property
     def outliers(self) -> NDArray[np.intp]:
@@ -257,6 +308,12 @@ class Calibration:
         widths = [robust_width(self.residuals[:, k]) for k in range(self.data.markers)]
         far = np.nanmax(distance / widths, axis=1, initial=0.0) > _OUTLIER * 1.7
         return self.data.rows[far]
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """Fitted numbers over those of the design, of all that cannot be below 0 and are not."""
+        numbers = zip(self.fit.free.numbers, self.fit.values.tolist(), strict=True)
+        return {n.name: v / n.start for n, v in numbers if n.range.low >= 0 and n.start > 0}
 
     @property
     def correlated(self) -> list[tuple[str, str, float]]:
@@ -297,7 +354,10 @@ class Calibration:
         return prediction.places, np.sqrt(np.maximum(square, 0.0))
 
     def draws(self, count: int = 32, seed: int = 0) -> list[Manipulator]:
-        """Arms as likely as the data leaves them, for bands of whatever is computed from an arm."""
+        """Arms as likely as the data leaves them, for bands of whatever is computed from an arm.
+
+        Numbers that the data does not tell stay as they are.
+        """
         rng = np.random.default_rng(as_integer("seed", seed))
         root = np.linalg.svd(self.uncertainty.covariance, hermitian=True)
         factor = root[0] * np.sqrt(root[1])

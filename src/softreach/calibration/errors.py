@@ -14,13 +14,23 @@ __all__ = ["Misses", "Repeatability", "Verdict", "judged", "misses", "repeatabil
 
 Array = NDArray[np.float64]
 
-_NEAR = 0.05
-"""Distance of inputs, over their ranges, within which two samples count as repeated."""
+_NEAR = (0.05, 0.1)
+"""Distances of inputs, over their ranges, within which two samples count as repeated."""
 _FEW = 8
 _NOISE = 1.5
 """Held-out error over what the data repeats, up to which noise is all."""
 _MEMORY = 0.05
-"""Share of the squared residuals that the last command must explain."""
+"""Share of the squared residuals that the last command must explain, beyond all laws of inputs."""
+_LAW = 0.2
+"""Share of the squared residuals that a law of the inputs explains where noise is not all."""
+_SURE = 2.5
+"""Gain in a tenth of the samples, over its standard error, that is not chance."""
+_WIDTHS = (0.5, 0.25)
+"""Of the bells in laws of the inputs, over their ranges."""
+_BELLS = 80
+_PENALTIES = np.logspace(-7, 1, 9)
+_SLIPS = 0.03
+"""Share of samples far off that may be slips."""
 
 
 class Misses(NamedTuple):
@@ -67,10 +77,15 @@ class Repeatability(NamedTuple):
     """True if their inputs are equal, else near."""
 
 
-def repeatability(data: Measurements) -> Repeatability:
-    """From pairs of samples with the same inputs, or the nearest ones within 5 % of their ranges.
+def repeatability(data: Measurements, residuals: Array) -> Repeatability:
+    """From pairs of samples with the same inputs, or near ones: within 5 % of their ranges, or 10 %.
 
-    Of near inputs it is an upper bound: places differ by what the inputs do, too.
+    Residuals are compared and not places, so that the arm's own motion between near inputs does not
+    count.
+
+    Args:
+        data: All samples.
+        residuals: Predicted minus measured places, NaN where unknown, (n, marker, 3) [m].
     """
     spans = np.ptp(data.inputs, axis=0)
     moving = spans > 0
@@ -79,15 +94,15 @@ def repeatability(data: Measurements) -> Repeatability:
     from scipy.spatial import KDTree
 
     scaled = data.inputs[:, moving] / spans[moving]
-    near = KDTree(scaled).query(scaled, k=2)
-    distance, partner = (np.asarray(values)[:, 1] for values in near)
-    for limit, exact in ((1e-9, True), (_NEAR, False)):
+    distances, near = (np.asarray(values) for values in KDTree(scaled).query(scaled, k=2))
+    itself = near[:, 0] == np.arange(len(data))  # of two copies either may come first
+    distance, partner = distances[:, 1], np.where(itself, near[:, 1], near[:, 0])
+    for limit in (1e-9, *_NEAR):
         rows = np.flatnonzero(distance <= limit)
-        apart = (data.places[rows] - data.places[partner[rows]])[..., :]
-        square = (apart**2).sum(axis=2)
+        square = ((residuals[rows] - residuals[partner[rows]]) ** 2).sum(axis=2)
         square = square[np.isfinite(square)]
         if len(square) >= _FEW:
-            return Repeatability(float(np.sqrt(0.5 * square.mean())), len(rows), exact)
+            return Repeatability(float(np.sqrt(0.5 * square.mean())), len(rows), limit < _NEAR[0])
     return Repeatability(np.nan, 0, False)
 
 
@@ -96,79 +111,139 @@ class Verdict:
     """Limitation of a fit."""
 
     limit: str
-    """"noise", "memory" or "physics"; "data" where there is too little to tell."""
+    """"noise", "memory", "physics" or "columns"; "data" where there is too little to tell."""
     sentence: str
     memory: float
-    """Share of the squared residuals that the last command explains, by cross-validation [-]."""
+    """Share of the squared residuals that the last command explains beyond every law of the inputs,
+    by cross-validation [-]."""
 
 
 def judged(
-    data: Measurements, residuals: Array, error: float, repeated: Repeatability, name: str
+    data: Measurements,
+    residuals: Array,
+    repeated: Repeatability,
+    name: str,
+    rows: NDArray[np.bool_],
+    far: NDArray[np.bool_],
+    exchanged: str = "",
 ) -> Verdict:
     """Limitation of a fit, from its residuals in the order in which samples were taken.
 
     Args:
         data: All samples.
         residuals: Predicted minus measured places, NaN where unknown, (n, marker, 3) [m].
-        error: Error that is judged, rms [m].
         repeated: What the data repeats.
         name: "held-out error" or "fitted error".
+        rows: Samples whose error is judged, shape (n,).
+        far: Samples far off, which are slips if they are few and of different inputs, shape (n,).
+        exchanged: What is said of columns that seem exchanged.
     """
-    share = _memory(data, residuals)
-    text = f"{name} {1e3 * error:.3g} mm rms"
-    known = np.isfinite(repeated.rms)
+    finding = _finding(data, far)
+    error = whole = misses(residuals[rows]).rms
+    text = f"{name} {1e3 * whole:.3g} mm rms"
+    if not finding and (rows & far).any() and (rows & ~far).any():
+        error = misses(residuals[rows & ~far]).rms
+        text += f", {1e3 * error:.3g} mm without the rows far off"
+        residuals = np.where(far[:, None, None], np.nan, residuals)
+    known = bool(np.isfinite(repeated.rms))
     if known:
         text += f", repeated inputs differ by {1e3 * repeated.rms:.3g} mm"
-    if share > _MEMORY:
+    text = f"({text}){finding and '; '}{finding}"
+    law, share = _explained(data, residuals)
+    if exchanged:
+        return Verdict("columns", f"{exchanged} {text}", share)
+    if share > _MEMORY and not finding:
         said = (
             f"limited by memory: the commands before explain {100 * share:.0f} % of what is left "
-            "(friction, creep or slack of the drives); no law of the inputs alone can do better"
+            "(friction, creep or slack of the drives), which no law of the inputs alone does"
         )
-        return Verdict("memory", f"{said} ({text})", share)
-    if known and error <= _NOISE * repeated.rms:
+        return Verdict("memory", f"{said} {text}", share)
+    if known and error <= _NOISE * repeated.rms and law < _LAW and not finding:
         said = "limited by noise: the error is that of the data itself"
-        return Verdict("noise", f"{said} ({text})", share)
+        return Verdict("noise", f"{said} {text}", share)
     if len(data) < _FEW:
-        return Verdict("data", f"too few samples to say what limits the fit ({text})", share)
-    said = (
-        "limited by missing physics: the error is beyond what the data repeats"
-        if known
-        else "limited by missing physics, or by noise: no inputs are repeated, so nothing tells"
-    )
-    return Verdict("physics" if known else "data", f"{said} ({text})", share)
+        return Verdict("data", f"too few samples to say what limits the fit {text}", share)
+    if law >= _LAW:
+        said = f"a law of the inputs explains {100 * law:.0f} % of what is left, such as another "
+        said += "geometry or inputs that saturate"
+    elif known:
+        said = "the error is beyond what the data repeats"
+    elif not finding:
+        said = "limited by missing physics, or by noise: no inputs are repeated, so nothing tells"
+        return Verdict("data", f"{said} {text}", share)
+    else:
+        said = "samples far off are no slips"
+    return Verdict("physics", f"limited by missing physics: {said} {text}", share)
 
 
-def _memory(data: Measurements, residuals: Array) -> float:
-    """Share of squared residuals that earlier commands explain, cross-validated by blocks.
+def _finding(data: Measurements, far: NDArray[np.bool_]) -> str:
+    """What samples far off have in common, or that they are too many for slips; else ""."""
+    size = np.maximum(np.abs(data.inputs).max(axis=0), 1e-300)
+    moved = np.abs(data.inputs) > 0.02 * size
+    for cells in (moved, np.round(data.inputs / size / _NEAR[0])):
+        _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        total, hit = (np.bincount(cell.ravel()[k], minlength=len(first)) for k in (..., far))
+        k = int(hit.argmax())
+        if hit[k] > max(1, 0.5 * total[k], 0.8 * far.sum() - 1) and total[k] < 0.5 * len(data):
+            names = zip(data.input_names, data.inputs[first[k]], moved[first[k]], strict=True)
+            like = ", ".join(f"{name} {value:.3g}" for name, value, on in names if on)
+            return f"{hit[k]} of {total[k]} rows with inputs such as {like or 'none'} are far off"
+    if far.sum() > max(2, _SLIPS * len(data)):
+        return f"{far.sum()} of {len(data)} rows are far off, more than slips would be"
+    return ""
 
-    A ridge on the change from the last command, its sign, and the residual's own inputs; what the
-    inputs alone explain does not count.
+
+def _explained(data: Measurements, residuals: Array) -> tuple[float, float]:
+    """Shares of squared residuals that the inputs explain, and the last command beyond these.
+
+    Both are cross-validated. Laws of the inputs are quadratic, and with bells of several widths;
+    to each the change from the last command and its sign are added. A gain counts if it is the
+    same all over the samples.
     """
     order = data.order
     flat = residuals.reshape(len(residuals), -1)[order]
     moving = np.ptp(data.inputs, axis=0) > 0
-    inputs, runs = data.inputs[order][:, moving], data.runs[order]
-    follows = np.append(False, runs[1:] == runs[:-1])
-    known = np.isfinite(flat).all(axis=1) & follows
-    if known.sum() < 10 * (1 + 3 * inputs.shape[1]):
-        return 0.0
-    scale = np.ptp(inputs, axis=0)
-    inputs = (inputs - inputs.mean(axis=0)) / scale
-    change = np.zeros_like(inputs)
-    change[1:] = inputs[:-1] - inputs[1:]
-    wide = np.concatenate([inputs, change, np.tanh(change / 0.1)], axis=1)[known]
-    target = flat[known]
-    alone = _left(inputs[known], target)
-    return float(max(0.0, 1.0 - _left(wide, target) / alone)) if alone > 0 else 0.0
+    x, runs = data.inputs[order][:, moving], data.runs[order]
+    known = np.isfinite(flat).all(axis=1) & np.append(False, runs[1:] == runs[:-1])
+    if known.sum() < 10 * (1 + 3 * x.shape[1]):
+        return 0.0, 0.0
+    x = (x - x.mean(axis=0)) / np.ptp(x, axis=0)
+    change = -np.diff(x, axis=0, prepend=x[:1])
+    before = np.concatenate([change, np.tanh(change / 0.1)], axis=1)[known]
+    x, target = x[known], flat[known]
+    j, k = np.triu_indices(x.shape[1])
+    plain = np.concatenate([x, x[:, j] * x[:, k]], axis=1)
+    some = np.random.default_rng(0).permutation(len(x))[:_BELLS]
+    square = ((x[:, None] - x[some]) ** 2).mean(axis=2)
+    laws = [plain, *(np.concatenate([plain, np.exp(-0.5 * square / w**2)], 1) for w in _WIDTHS)]
+    alone = min((_left(law, target) for law in laws), key=np.sum)
+    wide = min((_left(np.concatenate([law, before], 1), target) for law in laws), key=np.sum)
+    total = float(((target - target.mean(axis=0)) ** 2).sum())
+
+    def share(less: Array, more: Array) -> float:
+        gain = more - less
+        sure = gain.mean() > _SURE * gain.std(ddof=1) / np.sqrt(len(gain))
+        return min(1.0, float(gain.sum()) / total) if sure and total > 0 else 0.0
+
+    return share(alone, _left(np.zeros((len(x), 1)), target)), share(wide, alone)
 
 
-def _left(features: Array, target: Array) -> float:
-    """Squares that a ridge leaves, each tenth of the samples in a row predicted from the others."""
-    from softreach.calibration.baselines import ridge
+def _left(features: Array, target: Array) -> Array:
+    """Squares that a ridge leaves in each tenth of the samples in a row, by all others, (10,).
 
-    total = 0.0
-    for rows in np.array_split(np.arange(len(target)), 10):
-        rest = np.setdiff1d(np.arange(len(target)), rows)
-        predict = ridge(features[rest], target[rest])
-        total += float(((predict(features[rows]) - target[rows]) ** 2).sum())
-    return total
+    The residuals of rows that are left out are (1 - H)^-1 times those of the fit to all.
+    """
+    size = features.std(axis=0)
+    scaled = (features - features.mean(axis=0)) / np.where(size > 0, size, 1.0)
+    axes, values, _ = np.linalg.svd(scaled, full_matrices=False)
+    target, n = target - target.mean(axis=0), len(target)
+    tenths = np.array_split(np.arange(n), 10)
+
+    def left(penalty: float) -> Array:
+        keep = values**2 / (values**2 + n * penalty)
+        miss = target - axes @ (keep[:, None] * (axes.T @ target))
+        hats = [np.eye(len(k)) - (axes[k] * keep) @ axes[k].T - 1.0 / n for k in tenths]
+        each = zip(hats, tenths, strict=True)
+        return np.array([(np.linalg.solve(hat, miss[k]) ** 2).sum() for hat, k in each])
+
+    return min(map(left, _PENALTIES), key=np.sum)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any
 
@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.calibration.free_numbers import POSE, FreeNumbers
-from softreach.calibration.model import MarkerModel, Prediction
+from softreach.calibration.model import MarkerModel, Prediction, exchanged_inputs
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.progress import Progress
 
-__all__ = ["Fit", "fitted", "identifiable", "robust_width", "started"]
+__all__ = ["SAME", "Fit", "fitted", "identifiable", "moved_miss", "robust_width", "started"]
 
 Array = NDArray[np.float64]
 
-_SAME = 1e-7
+SAME = 1e-7
 """Smallest singular value over the largest, in scales of the numbers, that data can tell."""
 _IDLE = 1e-9
 """Motion of markers in L, or over that of the other numbers, that is rounding."""
@@ -73,7 +73,7 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
         moved = zip(POSE[:3], start + shift, strict=True)
         return free.started_at({name: place for name, place in moved if name in moving})
     rotation, shift = _kabsch(predicted, measured)
-    _refuse_mirror(predicted, measured)
+    _refuse_mirror(model, places, predicted, measured)
     _refuse_exchanged(each, places, model.names)
     vector = _rotation_vector(rotation)
     place = rotation @ start + shift
@@ -93,6 +93,19 @@ def _miss(predicted: Array, measured: Array, mirror: bool = False) -> float:
     """Distance in the middle of places that are brought together."""
     rotation, shift = _kabsch(predicted, measured, mirror)
     return float(np.median(np.linalg.norm(predicted @ rotation.T + shift - measured, axis=1)))
+
+
+def moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
+    """Distance in the middle of places, moved together as far as the pose is free [m]."""
+    predicted, measured = predicted.reshape(-1, 3), measured.reshape(-1, 3)
+    known = np.isfinite(predicted + measured).all(axis=1)
+    if known.sum() < 3:
+        return np.inf
+    if set(POSE) <= set(free.names):
+        return _miss(predicted[known], measured[known])
+    off = predicted[known] - measured[known]
+    off -= [float(np.median(off[:, k])) if POSE[k] in free.names else 0.0 for k in range(3)]
+    return float(np.median(np.linalg.norm(off, axis=1)))
 
 
 def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...]) -> None:
@@ -117,15 +130,22 @@ def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...])
             )
 
 
-def _refuse_mirror(predicted: Array, measured: Array) -> None:
+def _refuse_mirror(model: MarkerModel, places: Array, predicted: Array, measured: Array) -> None:
     """Refuse places whose mirror image matches far better than they do."""
     misses = [_miss(predicted, measured, mirror) for mirror in (False, True)]
     size = np.median(np.linalg.norm(measured - measured.mean(axis=0), axis=1))
     if misses[1] < 0.35 * misses[0] and misses[0] > 0.1 * size:
+        free, alike = model.free, []
+        for text, order in exchanged_inputs(free.arm):
+            other = replace(model, inputs=model.inputs[:, order]).predict(free.start).places
+            if moved_miss(free, other, places) < 0.35 * misses[0]:
+                alike.append(text)
+        cause = f"; or exchange {' or '.join(alike[:4])}, which looks the same" if alike else ""
         raise InvalidInput(
             "axes of the data",
             f"a miss of {1e3 * misses[0]:.3g} mm in the middle, {1e3 * misses[1]:.3g} mm mirrored",
-            "right-handed, as those of the design: exchange two of x, y and z, or turn one over",
+            "right-handed, as those of the design: exchange two of x, y and z, or turn one over"
+            + cause,
         )
 
 
@@ -156,10 +176,10 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
     if len(scaled) < len(free):
         allowed = f"at most {len(scaled)} numbers, as many as the data has"
         raise InvalidInput("free", f"{len(free)} numbers", allowed)
-    if values[-1] > _SAME * values[0]:
+    if values[-1] > SAME * values[0]:
         return
-    shares = zip(free.names, np.abs(axes[-1]), strict=True)
-    trading = [name for name, share in shares if share > 0.05]
+    moves = np.abs(axes[-1]) * sizes
+    trading = [free.names[k] for k in np.flatnonzero(moves > 0.05 * moves.max())]
     allowed = (
         "numbers that the data can tell apart: these change together without moving any marker, "
         f"as only their ratio or their sum shows; leave out one, such as {trading[-1]}, or give "

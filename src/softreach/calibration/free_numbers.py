@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -15,10 +16,11 @@ from numpy.typing import NDArray
 from softreach.arm.base import Base, rotation_matrices
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, find_parameters, parameters
-from softreach.arm.parameters.draft import Draft
+from softreach.arm.parameters.draft import Draft, part_of
+from softreach.arm.parameters.parameter import OwnParameter
 from softreach.arm.rest_shape import RestShape
 from softreach.support.arguments import as_mapping, as_names, plain
-from softreach.support.errors import InvalidInput, Range
+from softreach.support.errors import InvalidDesign, InvalidInput, Range
 
 __all__ = ["FreeNumber", "FreeNumbers", "free_numbers"]
 
@@ -27,6 +29,10 @@ Array = NDArray[np.float64]
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
 
+_PLACES = ("station", "start", "end")
+"""Numbers in m that lie on the arm."""
+_UNFIT = re.compile(r"(.*\.)?(lower|upper)(\[\d+\])?|base\..*|loads\.(follower|tip_moment).*")
+"""Numbers that no wildcard frees: bounds, what the pose frees, loads without a derivative."""
 _UNSEEN = 1e-12
 """Angle by which an arm that counts as bent is bent at least [rad]."""
 _STEP = 1e-3  # of the scale of a number, for derivatives of tables of fourth order
@@ -210,10 +216,33 @@ def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
             hits = [key for key in known if fnmatchcase(key, name.replace("[", "[[]"))]
             if not hits:
                 find_parameters(arm, (name,))
-            for hit in hits:
-                yield _of_parameters(arm, hit, (hit,))
+            hits = _once(arm, known, hits) or hits
+            each = [_of_parameters(arm, hit, (hit,)) for hit in hits]
+            yield from [number for number in each if _changes_alone(arm, number)]
         else:
             yield _of_parameters(arm, " = ".join(paths), paths)
+
+
+def _once(arm: Manipulator, known: Mapping[str, Parameter], names: Sequence[str]) -> list[str]:
+    """Names of numbers that a fit may change, one of each number."""
+    kept = [name for name in names if not known[name].whole and not _UNFIT.fullmatch(name)]
+    own = {name: each for name in kept if isinstance(each := known[name], OwnParameter)}
+    twins = {name.partition(".values[")[0] for name in own if ".values[" in name}
+    twins |= {name for name in own if f"{name}_over_length" in own}
+    for name, parameter in own.items():
+        given = getattr(part_of(arm, parameter.path.part), parameter.path.field, 0.0) is not None
+        others = f"{name}_ratio", name.replace("revolution", "helical_angle")
+        twins |= {(other if given else name) for other in others if other != name and other in own}
+    return [name for name in own or kept if name not in twins]
+
+
+def _changes_alone(arm: Manipulator, number: FreeNumber) -> bool:
+    """False of a number that others fix, such as the outer ratio of the outermost ring."""
+    alone = FreeNumbers(arm, (number,))
+    try:
+        return bool(alone.neighbors(alone.start, 0))
+    except InvalidDesign:
+        return False
 
 
 def _tied(name: str) -> tuple[str, ...]:
@@ -221,6 +250,9 @@ def _tied(name: str) -> tuple[str, ...]:
 
 
 def _of_parameters(arm: Manipulator, name: str, paths: tuple[str, ...]) -> FreeNumber:
+    if base := [path for path in paths if path.startswith("base.")]:
+        allowed = "a number of the body: the base is free by pose, pose.position or pose.rotation"
+        raise InvalidInput("free", base[0], allowed)
     found = find_parameters(arm, paths)
     first = found[paths[0]]
     if first.whole:
@@ -229,11 +261,14 @@ def _of_parameters(arm: Manipulator, name: str, paths: tuple[str, ...]) -> FreeN
         raise InvalidInput("free", name, "tied to numbers of the same unit")
     values = [value for p in found.values() for value in p.values(arm) if math.isfinite(value)]
     start = float(np.mean(values)) if values else _typical(arm, first.unit)
+    allowed = first.range
+    if paths[0].rpartition(".")[2] in _PLACES:
+        allowed = allowed._replace(high=arm.length)
     return FreeNumber(
         name=name,
         unit=first.unit,
         start=start,
-        range=first.range,
+        range=allowed,
         scale=max(0.1 * abs(start), 1e-2 * _typical(arm, first.unit)),
     )
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -50,6 +52,10 @@ _PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNOREC
 _MOST_ROWS = 2_000_000
 _WIDEST = 4.0
 """Distance of a place from the middle of all, in lengths of the arm, that is no pose of it."""
+_HARD = 100.0
+"""Inputs beyond the bounds of the design, in them, that are a wrong unit or a slip."""
+_SLACK = 0.01
+"""Of the largest tension: a negative one that is the zero of a load cell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +140,11 @@ def read_measurements(
 
     Raises:
         InvalidInput: No such file, columns that are missing, in no unit that is known or in one
-            that an input does not have, text or NaN among inputs, or no rows.
+            that an input does not have, text or NaN among inputs, no rows, or values that no such
+            arm has: tensions below 0, inputs 100 times its bounds, markers 4 lengths away.
+
+    Warns:
+        SoftreachWarning: Markers that were never seen; inputs below a hundredth of the bounds.
     """
     arm = a_manipulator("arm", arm)
     if isinstance(data, Measurements):
@@ -166,7 +176,8 @@ def read_measurements(
         warn(f"markers that were never seen are left out: {', '.join(lost)}")
         places = places[:, seen.any(axis=0)]
         chosen = {name: start for name, start in chosen.items() if name not in lost}
-    _refuse_far(arm, places)
+    _refuse_far(arm, places, [triples[start] for start in chosen.values()])
+    _check_inputs(arm, values, sources)
     runs, run_names = _runs(table, run)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
@@ -227,14 +238,31 @@ def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
         InvalidInput: It is no table.
     """
     import pandas as pd
+    from pandas.io.common import get_handle
 
     try:
         if name.lower().endswith((".parquet", ".pq")):
             return pd.read_parquet(file)
-        return pd.read_csv(file, skipinitialspace=True, comment="#")
-    except (ValueError, UnicodeDecodeError, OSError, ImportError) as error:
-        text = str(error).splitlines()[0]
-        raise InvalidInput("data", name, f"a table in CSV or Parquet: {text}") from None
+        with get_handle(file, "r", encoding="utf-8-sig", compression="infer") as opened:
+            text = str(opened.handle.read())
+        _refuse_short(text)
+        return pd.read_csv(io.StringIO(text), skipinitialspace=True, comment="#")
+    except InvalidInput:
+        raise
+    except Exception as error:  # each kind of compression has its own
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InvalidInput("data", name, f"a table in CSV or Parquet: {reason}") from None
+
+
+def _refuse_short(text: str) -> None:
+    """Refuse a row with fewer cells than the header, the rest of which pandas takes as empty."""
+    lines = (line if '"' in line else line.partition("#")[0] for line in text.splitlines())
+    head, *rows = list(csv.reader(line for line in lines if line.strip())) or [[]]
+    count = len([name for name in head if name.strip()])
+    for k, row in enumerate(rows):
+        if len(row) < count:
+            allowed = f"{count} cells, as the header has: it was cut short"
+            raise InvalidInput(f"row {k} of the data", counted(len(row), "cell"), allowed)
 
 
 def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:
@@ -255,14 +283,52 @@ def _refuse_repeated(columns: list[str]) -> None:
             raise InvalidInput("column", first, "there once: the data has two of this name")
 
 
-def _refuse_far(arm: Manipulator, places: Array) -> None:
+def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]]) -> None:
     """Refuse places that are farther apart than any pose of the arm could put them."""
-    known = places[np.isfinite(places).all(axis=2)]
-    middle = float(np.median(np.linalg.norm(known - np.median(known, axis=0), axis=1)))
     offsets = [float(np.linalg.norm(marker.offset)) for marker in arm.markers]
-    if middle > _WIDEST * (arm.length + max(offsets, default=0.0)):
-        allowed = f"near an arm of {1e3 * arm.length:.4g} mm: look at the units of the columns"
-        raise InvalidInput("places of markers", f"apart by {1e3 * middle:.4g} mm", allowed)
+    reach = _WIDEST * (arm.length + max(offsets, default=0.0))
+    away = np.nan_to_num(np.abs(places - np.nanmedian(places, axis=0)))
+    if (far := int((away > reach).sum())) == 0:
+        return
+    row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
+    name, others = columns[marker][axis], f", as {far - 1} others" if far > 1 else ""
+    allowed = (
+        f"within {1e3 * reach:.4g} mm of the middle, for an arm of {1e3 * arm.length:.4g} mm: look "
+        "at the unit of the column, and leave a cell empty where the marker was not seen"
+    )
+    given = f"{1e3 * places[row, marker, axis]:.4g} mm{others}"
+    raise InvalidInput(f"{name} in row {row}", given, allowed)
+
+
+def _check_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
+    """Refuse tensions that push, and inputs far beyond the bounds; warn of ones far below."""
+    bundles = [*[None] * len(arm.drives), *(arm.undriven if arm.drives else range(arm.bundles))]
+    most = np.abs(arm.input_bounds).max(axis=1)
+    for unit in dict.fromkeys(arm.input_units):
+        own = [k for k, each in enumerate(arm.input_units) if each == unit and columns[k]]
+        bound = max((most[k] for k in own), default=0.0)
+        size = np.abs(values[:, own])
+        if not own or not size.any() or not 0 < bound < np.inf:
+            continue
+        row, k = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
+        name, reached = columns[own[k]], f"{values[row, own[k]]:.4g} {unit}"
+        if size.max() > _HARD * bound:
+            allowed = (
+                f"near the bounds of the design, {bound:.4g} {unit}: look at the column's unit"
+            )
+            raise InvalidInput(f"{name} in row {row}", reached, allowed)
+        if size.max() < bound / _HARD:
+            warn(
+                f"{name} reaches {reached} and no input of its kind more, where the design bears "
+                f"{bound:.4g} {unit}: look at the column's unit"
+            )
+        for j in own:
+            actuator = None if bundles[j] is None else arm.bundle_actuators[bundles[j]]
+            row = int(values[:, j].argmin())
+            if values[row, j] < getattr(actuator, "least", -np.inf) - _SLACK * size.max():
+                given = f"{values[row, j]:.4g} {unit}"
+                allowed = f"at least 0 {unit}: a tendon pulls and cannot push"
+                raise InvalidInput(f"{columns[j]} in row {row}", given, allowed)
 
 
 def _missing(what: str, name: str, columns: list[str]) -> InvalidInput:
@@ -385,9 +451,12 @@ def _size(column: str, unit: str) -> float:
 
 def _numbers(table: pd.DataFrame, column: str) -> Array:
     try:
-        return table[column].to_numpy(float)
+        values = table[column].to_numpy(float)
     except (ValueError, TypeError) as error:
         raise InvalidInput(f"column {column}", in_short(str(error)), "numbers") from None
+    if (rows := np.flatnonzero(np.isinf(values))).size:
+        raise InvalidInput(f"{column} in row {rows[0]}", values[rows[0]], "a finite number")
+    return values
 
 
 def _place(table: pd.DataFrame, columns: list[str]) -> Array:

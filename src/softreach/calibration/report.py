@@ -67,6 +67,7 @@ def number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, st
         name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma[k] / size, digits=2)
         text += ", at its bound" if bound[k] else ", with its prior" if number.prior else ""
+        text += ", which the data does not tell" if sigma[k] == math.inf else ""
         yield number.name, text, f"{_of_design(result, k) / size:.4g}"
 
 

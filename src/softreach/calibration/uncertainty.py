@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.calibration.fit import Fit, robust_width
+from softreach.calibration.fit import SAME, Fit, robust_width
 from softreach.calibration.measurements import Measurements
 
 __all__ = ["Uncertainty", "uncertainty"]
@@ -16,6 +16,10 @@ Array = NDArray[np.float64]
 
 _FEWEST_RUNS = 8
 """Runs from which they are the clusters; with fewer, samples are."""
+_SEEN = 0.1
+"""Least share of a variance that the residuals would show if they were plain noise."""
+_VAGUE = 30.0
+"""Standard deviation, in changes that matter, from which the data does not tell a number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +27,10 @@ class Uncertainty:
     """Covariance of the fitted numbers."""
 
     covariance: Array
-    """Shape (number, number)."""
+    """Of what the data tells, shape (number, number)."""
+    told: NDArray[np.bool_]
+    """False for a number that the data does not tell at the end of the fit, of which no residuals
+    are left to say how well, or which is at a bound; shape (number,)."""
     freedom: Array
     """Degrees of freedom of the interval of each number, shape (number,)."""
     clusters: str
@@ -31,13 +38,14 @@ class Uncertainty:
 
     @property
     def sigma(self) -> Array:
-        """Standard deviations, shape (number,)."""
-        return np.sqrt(np.diag(self.covariance))
+        """Standard deviations, infinite for what the data does not tell, shape (number,)."""
+        return np.where(self.told, np.sqrt(np.diag(self.covariance)), np.inf)
 
     @property
     def correlation(self) -> Array:
         """Shape (number, number)."""
-        sigma = np.where(self.sigma > 0, self.sigma, 1.0)
+        sigma = np.sqrt(np.diag(self.covariance))
+        sigma = np.where(sigma > 0, sigma, 1.0)
         return self.covariance / np.outer(sigma, sigma)
 
     def half_widths(self, level: float = 0.95) -> Array:
@@ -50,8 +58,7 @@ class Uncertainty:
 def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertainty:
     """The sandwich of clusters, each freed of its own leverage [BellMcCaffrey2002].
 
-    Numbers at a bound are held there: their variance is 0 and that of the others is as if they
-    were known.
+    Numbers at a bound are held there, and the variance of the others is as if they were known.
 
     Args:
         fit: The fit.
@@ -62,7 +69,7 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     assert slopes is not None
     free = ~fit.at_bound
     count = len(fit.values)
-    scale = fit.free.scale
+    scale = np.maximum(fit.free.scale, 0.1 * np.abs(fit.values))
     weight = np.sqrt(fit.weights)[..., None]
     seen = (fit.weights > 0) & np.isfinite(slopes).all(axis=(2, 3))
     rows = np.where(seen[..., None, None], weight[..., None] * slopes * scale, 0.0)
@@ -76,13 +83,23 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     width = noise or robust_width(miss.reshape(-1, 3)[seen.ravel()])
     widths = [np.inf if number.prior is None else number.prior[1] for number in fit.free.numbers]
     known = ((width * scale / np.array(widths)) ** 2)[free]
-    inverse = np.linalg.pinv(bread + np.diag(known))
-    meat, freedom = _sandwich(rows, miss, keys, np.linalg.pinv(squares + np.diag(known)))
+    plain = squares + np.diag(known)
+    sizes, axes = np.linalg.eigh(plain)
+    dropped = axes[:, sizes <= SAME**2 * sizes.max(initial=0.0)]
+    inverse = np.linalg.pinv(bread + np.diag(known), SAME**2, hermitian=True)
+    expected = np.linalg.pinv(plain, SAME**2, hermitian=True)
+    meat, freedom, shown = _sandwich(rows, miss, keys, expected)
+    prior = np.diag(expected @ np.diag(known) @ expected)
     whole = np.zeros((count, count))
     whole[np.ix_(free, free)] = inverse @ (meat + np.diag(known * width**2)) @ inverse
     degrees = np.full(count, np.inf)
     degrees[free] = freedom
-    return Uncertainty(whole * np.outer(scale, scale), degrees, "run" if by_run else "sample")
+    told = np.ones(count, bool)
+    told[free] = (np.abs(dropped) < 1e-3).all(axis=1) & (shown + prior > _SEEN * np.diag(expected))
+    told &= ~fit.at_bound & (np.diag(whole) <= _VAGUE**2)
+    whole[~told] = whole[:, ~told] = 0.0
+    by = "run" if by_run else "sample"
+    return Uncertainty(whole * np.outer(scale, scale), told, degrees, by)
 
 
 def _bent(fit: Fit, seen: NDArray[np.bool_], scale: Array) -> Array:
@@ -104,8 +121,8 @@ def _bent(fit: Fit, seen: NDArray[np.bool_], scale: Array) -> Array:
 
 def _sandwich(
     rows: Array, miss: Array, keys: NDArray[np.intp], inverse: Array
-) -> tuple[Array, Array]:
-    """Sum of the squares of the scores of all clusters, and the degrees of freedom by it.
+) -> tuple[Array, Array, Array]:
+    """Squares of the scores of clusters, degrees of freedom, variances to expect of plain noise.
 
     The residuals of a cluster are freed of its own leverage, (1 - H)^-1/2; the degrees of freedom
     are those of the chi square with the same mean and variance (Satterthwaite).
@@ -137,7 +154,8 @@ def _sandwich(
     product = np.einsum("pq,cqr->cpr", inverse, spread)
     lost = np.einsum("cpp->c", product)
     variance = squares - 2.0 * mixed + np.einsum("cpq,cqp->c", product, product)
-    return meat, np.maximum((total - lost) ** 2 / np.maximum(variance, 1e-300), 1.0)
+    freedom = np.maximum((total - lost) ** 2 / np.maximum(variance, 1e-300), 1.0)
+    return meat, freedom, total - lost
 
 
 def _root(matrix: Array) -> Array:
