@@ -60,7 +60,7 @@ def measure_cells(points, cells, names, box, w, radii, least, volumes, flat):
         flat: Result, whether a cell is no thicker than rounding, shape (m,).
     """
     for t in range(len(cells)):
-        radii[t], least[t], volumes[t], flat[t] = np.inf, np.inf, 0.0, True
+        radii[t], least[t], volumes[t], flat[t] = np.inf, np.inf, 0.0, False
         i, j, k, m = corners(cells, t)
         if (i | j | k | m) < 0:
             continue
