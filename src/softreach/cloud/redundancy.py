@@ -100,9 +100,9 @@ def distance_map(
         cell: Edge of the cells [m]; None for L/20.
 
     Returns:
-        Dataset over the centers x, y, z [m] of cells: `activation_distance` in the unit of D̄, NaN where no point
-        with neighbors was evaluated; `activation_distance_error`, the standard error of that mean,
-        NaN for fewer than two points; and `evaluated`, the number of points.
+        Dataset over the centers x, y, z [m] of cells: `activation_distance` in the unit of D̄, NaN
+        where no point with neighbors was evaluated; `activation_distance_error`, the standard error
+        of that mean, NaN for fewer than two points; and `evaluated`, the number of points.
 
     Raises:
         InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
