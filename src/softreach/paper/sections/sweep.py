@@ -34,8 +34,6 @@ _SCALARS = (
     "convex_volume",
     "exact_volume",
     "exact_volume_error",
-    "exact_convex_volume",
-    "exact_convex_volume_error",
     "exact_unreachability",
     "multiple_volume",
     "fold_volume",
@@ -277,9 +275,9 @@ def cover(n: Numbers) -> Finding:
 def _shape(revolution: float, taper: float, accuracy: float) -> tuple[Shape, Shape]:
     """The shape of a set and its errors.
 
-    Errors of volumes are three times the change from half the accuracy. The area is that of the smooth
-    boundary, as that of the raster still grows with its cells; its error is what that boundary's
-    own volume is off.
+    Errors of volumes are three times the change from half the accuracy. The area is that of the
+    smooth boundary, as that of the raster still grows with its cells; its error is what the volume
+    inside that boundary is off.
     """
     arm = minimal_trunk(revolution, taper)
     reached, coarse = (reachable_set(arm, accuracy=scale * accuracy) for scale in (1.0, 2.0))
@@ -351,11 +349,10 @@ class _Sweep:
         return int((sure & (step > 0)).sum()), int((sure & (step < 0)).sum()), step.size
 
     def _error(self, name: str) -> Array:
-        """Of the volumes and lengths that state one; that of UNR from those of both volumes."""
+        """Of the volumes and lengths that state one; UNR has as much from either of its volumes."""
         if name == "exact_unreachability":
-            parts = ("exact_volume", "exact_convex_volume")
-            relative = sum(self[f"{part}_error"] / self[part] for part in parts)
-            return np.asarray(relative * (1.0 - self[name]))
+            relative = self["exact_volume_error"] / self["exact_volume"]
+            return 2.0 * relative * (1.0 - self[name])
         known = f"{name}_error" in self.numbers
         return self[f"{name}_error"] if known else np.zeros_like(self[name])
 
