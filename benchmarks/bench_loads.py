@@ -10,7 +10,7 @@ import itertools
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ import pytest
 import softreach as sr
 from benchmarks import loads_peers
 from benchmarks.bench_kernels import best_time, twelve_bundles
+from benchmarks.table import Row, print_table
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.shooting import Rung
@@ -114,75 +115,94 @@ def main(n: int = 400_000) -> None:
 
 
 def _tip_table(n: int) -> None:
-    print("| load | steps | CPU [µs a tip] | times a free tip | wanted | unstable, none |", end="")
-    print(f" wall [s], {n:,} tips |")
-    print("|---|--:|--:|--:|--:|--:|--:|")
-    for name, loads in KINDS.items():
+    def row(name: str, loads: sr.Loads) -> Row:
         arm = trunk(loads=loads)
-        row, steps = loaded_and_free(arm, n), LoadedRod(arm).steps
-        wanted = f"≤ {WANTED[name]}" if name in WANTED else ""
-        print(
-            f"| {name} | {steps} | {1e6 * row.cpu:.2f} | {row.ratio:.0f} | {wanted} "
-            f"| {row.shares[1]:.2%}, {row.shares[2]:.2%} | {row.wall:.2f} |",
-            flush=True,
-        )
+        found = loaded_and_free(arm, n)
+        return {
+            "load": name,
+            "steps": LoadedRod(arm).steps,
+            "CPU [µs a tip]": f"{1e6 * found.cpu:.2f}",
+            "times a free tip": f"{found.ratio:.0f}",
+            "wanted": f"≤ {WANTED[name]}" if name in WANTED else "",
+            "unstable, none": f"{found.shares[1]:.2%}, {found.shares[2]:.2%}",
+            f"wall [s], {n:,} tips": f"{found.wall:.2f}",
+        }
+
+    print_table(itertools.starmap(row, KINDS.items()), words=["load"])
 
 
 def _volume_table(accuracy: float = 3e-3) -> None:
     print("\n### Exact volume of the reachable set\n")
-    print("| arm | V [L³] | ± | CPU [s] | times the free arm |")
-    print("|---|--:|--:|--:|--:|")
-    loaded = trunk()
-    free = None
-    for name, arm in (("free", loaded.replace(loads=None)), ("loaded", loaded)):
+    loaded, free = trunk(), trunk().replace(loads=None)
+    cpu = {}
+
+    def row(name: str, arm: sr.Manipulator) -> Row:
         reachable_set(arm, accuracy=0.05)
         found = reachable_set(arm, accuracy=accuracy)
-        cpu = best_time(lambda arm=arm: reachable_set(arm, accuracy=accuracy), repeat=3).cpu
-        free = free or cpu
-        print(
-            f"| {name} | {found.volume:.5f} | {found.volume_error:.1e} | {cpu:.3f} "
-            f"| {cpu / free:.1f} |",
-            flush=True,
-        )
+        cpu[name] = best_time(lambda: reachable_set(arm, accuracy=accuracy), repeat=3).cpu
+        return {
+            "arm": name,
+            "V [L³]": f"{found.volume:.5f}",
+            "±": f"{found.volume_error:.1e}",
+            "CPU [s]": f"{cpu[name]:.3f}",
+            "times the free arm": f"{cpu[name] / cpu['free']:.1f}",
+        }
+
+    print_table((row(*each) for each in (("free", free), ("loaded", loaded))), words=["arm"])
 
 
 def _bundle_table(n: int) -> None:
     print(f"\n### Growth with bundles, {n:,} tips under gravity\n")
     print("With more than four free bundles no grid of equilibria is made to begin from.\n")
-    print("| bundles | steps | CPU [µs a tip] | times a free tip |")
-    print("|--:|--:|--:|--:|")
-    for bundles, make in ARMS.items():
+
+    def row(bundles: int, make: Callable[[], sr.Manipulator]) -> Row:
         arm = rubber(make(), 2.5, KINDS["gravity"])
-        row = loaded_and_free(arm, n)
-        steps = LoadedRod(arm).steps
-        print(f"| {bundles} | {steps} | {1e6 * row.cpu:.2f} | {row.ratio:.0f} |", flush=True)
+        found = loaded_and_free(arm, n)
+        return {
+            "bundles": bundles,
+            "steps": LoadedRod(arm).steps,
+            "CPU [µs a tip]": f"{1e6 * found.cpu:.2f}",
+            "times a free tip": f"{found.ratio:.0f}",
+        }
+
+    print_table(itertools.starmap(row, ARMS.items()))
 
 
 def _ladder_table(n: int = 2048) -> None:
     print(f"\n### The ladder to an equilibrium, {n:,} activations with all corners\n")
     print("Steps that the rule chose; error against twice the steps; shares of samples that the")
-    print("rungs of the ladder found, and of those that are unstable or have no equilibrium.\n")
     print(
-        "| φ | load number | base | steps | times a free tip | at once | continued | patient "
-        "| unstable | none | error [L] |"
+        "rungs of the ladder found, and of those that are unstable, have no equilibrium or were not"
     )
-    print("|--:|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|")
-    for taper, load_number, base in itertools.product((0, 2, 3), (0.1, 1, 2.5, 5, 8, 12), BASES):
-        arm = trunk(load_number, sr.Loads(gravity=BASES[base]), taper)
-        print(f"| {taper}° | {load_number:g} | {base} | {_ladder_row(arm, n)} |", flush=True)
+    print("followed to their end.\n")
+    places = itertools.product((0, 2, 3), (0.1, 1, 2.5, 5, 8, 12), BASES)
+    print_table((_ladder_row(*place, n) for place in places), words=["base"])
 
 
-def _ladder_row(arm: sr.Manipulator, n: int) -> str:
+def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
+    arm = trunk(load_number, sr.Loads(gravity=BASES[base]), taper)
     loaded, free = LoadedRod(arm), FreeRod(arm)
     gamma = activations(loaded, n)
     loaded.solver  # noqa: B018  makes the grid
     cost = best_time(lambda: loaded.solver.find(gamma), repeat=2).cpu
     cost /= best_time(lambda: free.tips(gamma)).cpu
     found = loaded.solver.find(gamma)
-    rungs = np.bincount(found.rung, minlength=len(Rung)) / n
-    status = np.bincount(found.status, minlength=len(TipStatus)) / n
-    shares = " | ".join(f"{share:.2%}" for share in (*rungs[:3], *status[1:]))
-    return f"{loaded.steps} | {cost:.0f} | {shares} | {_error(loaded, gamma, found):.1e}"
+    rungs = {"at once": Rung.DIRECT, "continued": Rung.CONTINUATION, "patient": Rung.PATIENT}
+    ends = {
+        "unstable": TipStatus.UNSTABLE,
+        "none": TipStatus.NO_EQUILIBRIUM,
+        "undecided": TipStatus.UNDECIDED,
+    }
+    return {
+        "φ": f"{taper}°",
+        "load number": f"{load_number:g}",
+        "base": base,
+        "steps": loaded.steps,
+        "times a free tip": f"{cost:.0f}",
+        **{name: f"{np.mean(found.rung == rung):.2%}" for name, rung in rungs.items()},
+        **{name: f"{np.mean(found.status == end):.2%}" for name, end in ends.items()},
+        "error [L]": f"{_error(loaded, gamma, found):.1e}",
+    }
 
 
 def _error(loaded: LoadedRod, gamma: np.ndarray, found: sr.rod.Equilibria) -> float:
@@ -201,13 +221,23 @@ def _peer_table(n: int = 6) -> None:
     ours = loaded.equilibria(gamma).tips
     each = loaded_and_free(arm, 50_000).cpu
     print(f"\n### The same {n} shapes by SciPy, to 1e-6, on one thread\n")
-    print("| method | CPU [ms a shape] | times ours | largest difference of tips [L] |")
-    print("|---|--:|--:|--:|")
-    print(f"| softreach | {1e3 * each:.4f} | 1 | |")
-    for name, solve in loads_peers.METHODS.items():
-        cpu, tips = _timed(solve, arm, gamma)
-        apart = float(np.linalg.norm(tips - ours, axis=1).max()) / arm.length
-        print(f"| {name} | {1e3 * cpu:.1f} | {cpu / each:,.0f} | {apart:.1e} |", flush=True)
+
+    def row(name: str, cpu: float, apart: str) -> Row:
+        return {
+            "method": name,
+            "CPU [ms a shape]": f"{1e3 * cpu:.4g}",
+            "times ours": f"{cpu / each:,.0f}",
+            "largest difference of tips [L]": apart,
+        }
+
+    def rows() -> Iterator[Row]:
+        yield row("softreach", each, "")
+        for name, solve in loads_peers.METHODS.items():
+            cpu, tips = _timed(solve, arm, gamma)
+            apart = float(np.linalg.norm(tips - ours, axis=1).max()) / arm.length
+            yield row(name, cpu, f"{apart:.1e}")
+
+    print_table(rows(), words=["method"])
 
 
 def _timed(solve: Callable[..., np.ndarray], arm, gamma) -> tuple[float, np.ndarray]:

@@ -146,6 +146,18 @@ class TestDesign:
         assert run(["design", "minimal_trunk", "--verbose"]) == 0
         assert "fiber: Exact to first order" in capsys.readouterr().out
 
+    @pytest.mark.parametrize(
+        ("robot", "said"), [("helical_tendon_robot", True), ("three_tendon_robot", False)]
+    )
+    @pytest.mark.parametrize(
+        "command", ["solve {} --target 0,0,0.1", "reach {} --accuracy 0.3", "cloud {} -n 9 --out c"]
+    )
+    def test_what_the_linear_law_misses_is_one_line(self, command, robot, said, folder, capsys):
+        run(command.format(robot).split())
+        err = capsys.readouterr().err
+        assert err.count("tips are off by up to about") == said
+        assert ("L) within the bounds" in err) == said
+
     def test_the_schema_is_printed_for_editors(self, capsys):
         from softreach.arm.design_file.schema import json_schema
 

@@ -136,6 +136,15 @@ def test_the_navigation_and_the_pages_are_the_same():
 
 
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
+def test_every_row_of_a_table_has_as_many_cells_as_it_has_heads(page):
+    heads, text = 0, re.sub(r"(?ms)^```.*?^```", "", page.read_text(encoding="utf-8"))
+    for line in text.splitlines():
+        cells = len(re.findall(r"(?<!\\)\|", line)) if line.startswith("|") else 0
+        assert not heads or not cells or cells == heads, line
+        heads = cells
+
+
+@pytest.mark.parametrize("page", PAGES, ids=on_page)
 def test_every_picture_on_a_page_exists(page):
     for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
         assert (page.parent / picture).is_file(), picture

@@ -128,6 +128,41 @@ def test_verdicts_follow_the_numbers(folder, words, change, verdict):
     assert checked(part, numbers | changed, words).verdict == verdict
 
 
+def test_a_step_smaller_than_its_errors_is_no_growth(folder):
+    numbers = notebook(folder, "sweep")["numbers"]
+    unsure = numbers | {"aside_error": np.ones((3, 3)).tolist()}
+    found = checked("sweep", unsure, "normal to the plane")
+    assert "grows in 0 of 6 (6 within the errors) steps" in found.text
+    assert found.verdict is Verdict.DIFFERS
+
+
+def test_volumes_beyond_planes_are_within_their_errors(folder):
+    """Of Ω = 108° and φ = 3°, where counts of cells gave 0.107: a set to 1e-3, with cut cells."""
+    numbers = notebook(folder, "sweep")["numbers"]
+    for name, right in (("aside", 0.1254), ("behind", 0.3639), ("thickness", 0.193)):
+        value, error = (numbers[key][-1][-1] for key in (name, f"{name}_error"))
+        assert abs(value - right) < error < 0.05 * right
+
+
+def test_what_only_the_full_sizes_test_is_marked_so_in_a_quick_run(folder):
+    text = (folder / "quick" / "report.html").read_text()
+    found = re.findall(r'class="verdict ([a-z ]+)"', text)
+    assert found.count("not tested") == sum(claim.full for claim in CLAIMS) > 5
+    assert "differs" not in found
+
+
+def test_a_part_computed_by_itself_is_that_of_a_whole_run_to_the_last_bit(folder, tmp_path):
+    """As when a run is killed and resumed; all but the seconds that it took."""
+    notes = Notebook(tmp_path, "volume", notebook(folder, "volume")["key"])
+    reproduce.PARTS["volume"](TINY, tmp_path, notes)
+    notes.close(0.0)
+    whole = notebook(folder, "volume") | {"seconds": 0.0}
+    assert json.loads((tmp_path / "volume.json").read_text()) == whole
+    figure = "alpha_dependence.pdf"
+    before = (folder / "quick" / "figures" / figure).read_bytes()
+    assert (tmp_path / figure).read_bytes() == before
+
+
 def test_both_activations_of_the_example_reach_the_same_tip(folder):
     from softreach.arm.designs import minimal_trunk
     from softreach.rod.kinematics import tip_positions

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.integrate import quad
 
 import softreach as sr
 from softreach.arm import Base, Loads, Manipulator, designs
+from softreach.arm.actuators import Chamber
 from softreach.arm.parameters import changed, find_parameters
 from softreach.arm.summary import load_number
 from softreach.cloud.clouds import compute_cloud
@@ -257,6 +259,28 @@ def test_fewer_bundles_have_an_area_or_a_length_and_no_orientation(trunk):
         gram = slope.transpose(0, 2, 1) @ slope
         assert np.allclose(found.manipulability, np.sqrt(np.linalg.det(gram)), rtol=1e-5)
         assert "orientation" not in found
+
+
+def test_manipulability_and_families_have_the_units_of_their_inputs(trunk):
+    def units(arm):
+        cloud = compute_cloud(arm, n=8, sampler="sobol")
+        found = [dexterity(cloud).manipulability.attrs["units"]]
+        if arm.bundles > 2:
+            found.append(solution_measure(cloud, cell=arm.length).solution_measure.attrs["units"])
+        return found
+
+    robot = designs.three_tendon_robot()
+    tendons = robot.actuators[0]
+    mixed = robot.replace(
+        actuators=(tendons, Chamber(distance=0.001, radius=1e-3, activation_bounds=(0, 1e3)))
+    )
+    assert units(trunk) == ["m3", "1"]
+    assert units(robot) == ["m3/N3", "1"]
+    assert units(robot.replace(actuators=(replace(tendons, bundles=2),))) == ["m2/N2"]
+    assert units(robot.replace(actuators=(replace(tendons, bundles=5),))) == ["m3/N3", "N2"]
+    assert units(mixed) == ["m3/mixed", "mixed"]
+    fewer = robot.replace(actuators=(replace(tendons, bundles=1), mixed.actuators[1]))
+    assert units(fewer) == ["m2/(N Pa)"]
 
 
 def test_only_a_cloud_has_dexterity(trunk):

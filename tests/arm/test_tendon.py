@@ -21,6 +21,7 @@ from softreach.arm import (
     Section,
     Tendon,
 )
+from softreach.arm.linear_law import law_warning, pull_error
 from softreach.arm.parameters import changed
 from softreach.arm.tables import tables
 from softreach.support.errors import InvalidDesign
@@ -158,6 +159,27 @@ def test_helical_tendons_miss_the_follower_load_by_less_than_their_bending(revol
         misses.append(np.linalg.norm(found - exact.place[0]) / moved)
         assert misses[-1] < bend
     np.testing.assert_allclose(np.array(misses[1:]) / misses[:-1], 2.0, rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("revolution", "tension", "end"),
+    [(2 * math.pi, 1e-3, 1.0), (3.0, 1e-3, 1.0), (4.0, 5e-4, 0.6), (4.0, 1e-4, 1.0)],
+)
+def test_what_the_linear_law_misses_is_known_before_and_said(revolution, tension, end):
+    thin = LinearTaper(length=LENGTH, outer_radius=0.1 * RADIUS)
+    one = tendon(revolution=revolution, end_over_length=end, activation_bounds=(0, tension))
+    pulled = arm(one, profile=thin)
+    exact = follower_shape(rod(thin), [cable(one, thin, tension)], [LENGTH]).place[0]
+    apart = np.linalg.norm(sr.tip_positions(pulled, [[tension]], tol=1e-9)[0] - exact)
+    assert pull_error(pulled) == pytest.approx(apart, rel=0.05, abs=1e-5 * LENGTH)
+    assert (f"about {1e3 * pull_error(pulled):.2g} mm" in law_warning(pulled)) == (
+        apart > 1e-3 * LENGTH
+    )
+
+
+@pytest.mark.parametrize("distance", [0.008, (0.008, 0.0)])
+def test_parallel_and_convergent_tendons_are_within_the_linear_law(distance):
+    assert law_warning(arm(tendon(distance=distance, bundles=3, activation_bounds=(0, 3)))) == ""
 
 
 def test_a_routing_of_even_rotation_is_a_revolution():

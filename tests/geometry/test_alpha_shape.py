@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
@@ -135,8 +136,7 @@ def test_the_surface_is_closed_and_oriented(alpha, seed):
 
 
 def test_volume_grows_with_the_radius(arm_shape):
-    radii, volumes = arm_shape.volume_curve()
-    assert (np.diff(radii) >= 0).all()
+    volumes = arm_shape.volume(np.geomspace(1e-3, 1e9, 300))
     assert (np.diff(volumes) >= 0).all()
     assert arm_shape.volume(0.0) == 0.0
     assert volumes[-1] == pytest.approx(arm_shape.volumes.sum())
@@ -150,7 +150,7 @@ def test_the_curve_passes_through_the_volume_of_every_hull(arm_shape):
 
 def test_a_cell_belongs_to_the_shape_of_exactly_its_radius(arm_shape):
     radius = np.median(arm_shape.radii)
-    below = np.nextafter(radius, 0.0)
+    below = radius * (1.0 - 1e-9)
     step = arm_shape.volumes[arm_shape.radii == radius].sum()
     assert arm_shape.volume(radius) - arm_shape.volume(below) == pytest.approx(step)
 
@@ -173,6 +173,49 @@ def test_the_number_of_regions_is_not_monotone(arm_shape):
     regions = np.array([arm_shape.regions(a) for a in np.geomspace(0.005, 1.0, 40)])
     assert (np.diff(regions) > 0).any()
     assert (np.diff(regions) < 0).any()
+
+
+def voxels(h: float, shift: float, jitter: float, copies: int) -> np.ndarray:
+    """Centers of 6 x 6 x 6 voxels."""
+    grid = shift + h * np.stack(np.meshgrid(*[np.arange(6)] * 3), axis=-1).reshape(-1, 3)
+    rng = np.random.default_rng(0)
+    return np.concatenate([grid + jitter * h * rng.normal(size=grid.shape) for _ in range(copies)])
+
+
+@pytest.mark.parametrize(
+    ("h", "shift", "jitter", "copies"),
+    [(0.05, 0, 0, 1), (1.0, 0.123456789, 0, 2), (0.02, 1e3, 0, 1), (0.1, 0, 1e-12, 2)],
+)
+def test_voxels_are_one_block_from_half_the_diagonal_of_a_voxel_on(h, shift, jitter, copies):
+    """All corners of a voxel lie on one sphere; below its radius there are flat cells only."""
+    points = voxels(h, shift, jitter, copies)
+    shape, radius = alpha_complex(points), h * np.sqrt(3) / 2
+    critical = shape.critical_alpha()
+    assert jitter > 0 or critical == pytest.approx(radius, rel=1e-8)  # thin duplicates have others
+    for alpha in (critical, radius, 1.5 * radius):
+        hull = alpha_hull(points, alpha, boxes=3)[0]
+        assert hull.volume == shape.hull(alpha).volume
+        assert shape.volume(np.array([alpha])) == pytest.approx(hull.volume, rel=1e-12)
+        assert hull.volume == pytest.approx((5 * h) ** 3, rel=1e-8)
+        assert (hull.regions, len(hull.faces)) == (1, 2 * 6 * 25 if copies == 1 else ANY)
+        assert hull.area == pytest.approx(6 * (5 * h) ** 2, rel=1e-8)
+    hull = shape.hull(0.9 * radius)
+    assert jitter > 0 or (hull.volume, hull.regions, len(hull.faces)) == (0.0, 0, 0)
+
+
+@pytest.mark.parametrize(("n", "radius"), [(200, 0.3), (2000, 1.0)])
+def test_points_of_a_sphere_are_its_inscribed_polyhedron(n, radius):
+    """Every tetrahedron has the sphere itself as circumscribed sphere."""
+    points = np.random.default_rng(0).normal(size=(n, 3))
+    points *= radius / np.linalg.norm(points, axis=1, keepdims=True)
+    shape, right = alpha_complex(points), convex_hull(points)
+    assert shape.critical_alpha() == pytest.approx(radius, rel=1e-9)
+    for alpha in (shape.critical_alpha(), radius):
+        hull = shape.hull(alpha)
+        assert hull.regions == 1
+        assert hull.volume == pytest.approx(right.volume, rel=1e-12)
+        assert hull.area == pytest.approx(right.area, rel=1e-9)
+    assert shape.volume(radius * (1.0 - 1e-6)) < 1e-3 * right.volume
 
 
 @pytest.mark.parametrize("name", FLAT)

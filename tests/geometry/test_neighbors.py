@@ -12,7 +12,7 @@ from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.manifold import parted
 from softreach.geometry.neighbors import mean_value_distance
-from softreach.geometry.surface import Surface, enclosed_volume, plane_cut
+from softreach.geometry.surface import Surface, enclosed_volume, plane_cut, volume_beyond
 from softreach.kernels.points.neighbor_sums import stable_order
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput
@@ -265,6 +265,17 @@ def test_a_plane_through_the_axis_of_a_torus_cuts_its_tube_twice():
     for curve in curves:
         away = np.hypot(np.abs(curve[:, 1]) - 1.0, curve[:, 2])
         np.testing.assert_allclose(away, 0.3, atol=2e-3)
+
+
+@pytest.mark.parametrize("at", [-0.25, 0.0, 0.1, 0.31])
+def test_the_volume_of_a_torus_beyond_a_plane_is_that_of_its_rings(at):
+    """4π ∫ √(r² - z²) dz from there to r."""
+    low = min(at, 0.3)
+    right = 2 * np.pi * (0.3**2 * np.arccos(low / 0.3) - low * np.sqrt(0.3**2 - low**2))
+    whole = 2 * np.pi**2 * 0.3**2
+    assert volume_beyond(torus(), 2, at) == pytest.approx(right, abs=3e-3 * whole)
+    both = volume_beyond(torus(), 2, at) + volume_beyond(torus(), 2, at, side=-1)
+    assert both == pytest.approx(torus().volume, rel=1e-12)
 
 
 def test_a_plane_beside_a_surface_cuts_nothing():

@@ -17,6 +17,7 @@ __all__ = [
     "limit_shortening",
     "line_lengths",
     "line_strains",
+    "places",
 ]
 
 Array = NDArray[np.float64]
@@ -66,8 +67,8 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
     """
     z, weights, half = quadrature(body_of(arm))
     step = _STEP * half
-    place = _places(arm, z)
-    along = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
+    place = places(arm, z)
+    along = (places(arm, z + step) - places(arm, z - step)) / (2.0 * step[:, None])
     (x, y), (dx, dy) = place, along
     one, two, three = (turn[..., k, None] for k in range(3))
     speed = np.sqrt(
@@ -115,7 +116,7 @@ def _strains_at(arm: Manipulator, ends: Array) -> Array:
     return (lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0).T
 
 
-def _places(arm: Manipulator, z: Array) -> Array:
+def places(arm: Manipulator, z: Array) -> Array:
     """Middle of each bundle in the sections [m], shape (2, station, bundle)."""
     outline = arm.outline(z)
     middle = outline.middle_ratio * arm.profile.radius(z)[:, None]

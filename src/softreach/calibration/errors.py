@@ -78,7 +78,7 @@ class Repeatability(NamedTuple):
 
 
 def repeatability(data: Measurements, residuals: Array) -> Repeatability:
-    """From pairs of samples with the same inputs, or near ones: within 5 % of their ranges, or 10 %.
+    """From pairs of samples with the same inputs, or near ones (5 % of their ranges, or 10 %).
 
     Residuals are compared and not places, so that the arm's own motion between near inputs does not
     count.

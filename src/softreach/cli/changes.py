@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from softreach.cli.values import NUMBER, pairs_in
-from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean
+from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, warn
 
 if TYPE_CHECKING:
     from softreach.arm.loads import Loads
@@ -189,10 +189,19 @@ def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
     try:
         changed = changes.applied_to(arm)
         check_extension(changed)
+        say_limits(changed)
         return changed
     except InvalidDesign as error:
         one_option = len(error.faults) == 1 and changes.given
         raise design_file.in_file_terms(error, "" if one_option else text) from None
+
+
+def say_limits(arm: Manipulator) -> None:
+    """Warn where the design leaves what the linear law covers."""
+    from softreach.arm.linear_law import law_warning
+
+    if text := law_warning(arm):
+        warn(text)
 
 
 def _unchanged(text: str) -> Manipulator:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.changes import Changes, design_from
+from softreach.cli.changes import Changes, design_from, say_limits
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, check_unit
 from softreach.cli.values import WHOLE
@@ -131,7 +131,8 @@ def cloud_of(
         changes.refuse(_STORED)
         refuse(_STORED, **vars(sampling))
         cloud = open_cloud(source)
-        return cloud, Lengths.of(design_of(cloud), unit)
+        say_limits(arm := design_of(cloud))
+        return cloud, Lengths.of(arm, unit)
     if check is not None:
         check(sampling.count)
     arm = design_from(source, changes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.tip_map import BLOCK
 from softreach.rod.view import stable_tips
-from softreach.schema import cell_dataset, check_cloud, tip_cells
+from softreach.schema import activation_units, cell_dataset, check_cloud, tip_cells
 from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -20,7 +20,7 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dexterity", "solution_measure"]
+__all__ = ["dexterity", "manipulability_unit", "solution_measure"]
 
 Signs = NDArray[np.int8]
 
@@ -40,8 +40,10 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
         cloud: A cloud; its design and tolerance are in its attributes. It is read in blocks.
 
     Returns:
-        Dataset over `sample`: `manipulability` [m³] (m² or m for two bundles or one),
-        `condition` [-] and, for three bundles, `orientation`, the sign of det J.
+        Dataset over `sample`: `manipulability`, `condition` [-] and, for three bundles,
+        `orientation`, the sign of det J. The unit of manipulability is m³ over that of three
+        inputs, as "m3/N3" for tendons (m² over two, m over one), and "m3" for strains; more than
+        three inputs that differ in their units are "mixed".
 
     Raises:
         InvalidInput: The dataset is no cloud.
@@ -55,7 +57,7 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     for rows in parallel.blocks(n, 8 * BLOCK):
         _, slope = rod.tips_and_slopes(cloud.activation[rows].values)
         parallel.run(_tasks(slope, measure[rows], condition[rows], sign[rows]))
-    unit = {1: "m", 2: "m2"}.get(rod.box.bundles, "m3")
+    unit = manipulability_unit(activation_units(cloud["activation"]))
     status = {"status": cloud.coords["status"]} if "status" in cloud.coords else {}
     result = xr.Dataset(coords=status, attrs=cloud.attrs)
     result["manipulability"] = ("sample", measure, {"units": unit, "long_name": "√det(J Jᵀ)"})
@@ -81,9 +83,10 @@ def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Data
         cell: Edge of the cells [m]; None for L/20.
 
     Returns:
-        Dataset over the centers x, y, z [m] of cells: `solution_measure` [-], 0 where no tip is,
-        and `solution_measure_error`, its standard error for independent samples; those of a Sobol
-        sequence are better.
+        Dataset over the centers x, y, z [m] of cells: `solution_measure`, 0 where no tip is, and
+        `solution_measure_error`, its standard error for independent samples; those of a Sobol
+        sequence are better. Both are numbers [-] for three bundles, and in the unit of m - 3 inputs
+        for more.
 
     Raises:
         InvalidInput: The dataset is no cloud, of fewer bundles, of one that cannot be activated, or
@@ -102,13 +105,37 @@ def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Data
     weight = dexterity(cloud)["manipulability"].values
     total, squares = grid.sum(weight), grid.sum(weight * weight)
     scale, scatter = box / n / grid.volume, np.sqrt((squares - total**2 / n).clip(0.0))
-    name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
-    error = {"units": "1", "long_name": "standard error of solution_measure"}
+    unit = _product(activation_units(cloud["activation"]), space.bundles - 3) or "1"
+    name = {"units": unit, "long_name": "activations that reach a place: number, length, area, ..."}
+    error = {"units": unit, "long_name": "standard error of solution_measure"}
     return cell_dataset(
         grid,
         solution_measure=(scale * total, name),
         solution_measure_error=(scale * scatter, error),
     ).assign_attrs(cloud.attrs)
+
+
+def manipulability_unit(inputs: Sequence[str], length: str = "m") -> str:
+    """Unit of √det(J Jᵀ), such as "m3/N3", from the units of the inputs and of lengths."""
+    rank = min(len(inputs), 3)
+    return "/".join(filter(None, (_power(length, rank), _product(inputs, rank))))
+
+
+def _product(inputs: Sequence[str], count: int) -> str:
+    """Unit of the product of so many inputs; empty for numbers."""
+    kinds = set(inputs)
+    if not count or kinds == {"1"}:
+        return ""
+    if len(kinds) == 1:
+        return _power(inputs[0], count)
+    if count < len(inputs):
+        return "mixed"
+    units = [_power(unit, inputs.count(unit)) for unit in dict.fromkeys(inputs) if unit != "1"]
+    return units[0] if len(units) == 1 else f"({' '.join(units)})"
+
+
+def _power(unit: str, count: int) -> str:
+    return unit if count == 1 else f"{unit}{count}"
 
 
 def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Iterator[partial[None]]:

@@ -104,18 +104,19 @@ def distance_map(
         cell: Edge of the cells [m]; None for L/20.
 
     Returns:
-        Dataset over the centers x, y, z [m] of cells: `activation_distance` [-], NaN where no point
-        with neighbors was evaluated; `activation_distance_error`, the standard error of that mean,
-        NaN for fewer than two points; and `evaluated`, the number of points.
+        Dataset over the centers x, y, z [m] of cells: `activation_distance` in the unit of D̄, NaN
+        where no point with neighbors was evaluated; `activation_distance_error`, the standard error
+        of that mean, NaN for fewer than two points; and `evaluated`, the number of points.
 
     Raises:
         InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
     """
     grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
     count = grid.count(evaluated[np.isfinite(distance.values)])
-    name = {"long_name": "mean activation-space distance D̄ in the cell", "units": "1"}
+    unit = distance.attrs.get("units", "1")
+    name = {"long_name": "mean activation-space distance D̄ in the cell", "units": unit}
     number = {"long_name": "evaluated points with neighbors", "units": "1"}
-    error = {"long_name": "standard error of activation_distance", "units": "1"}
+    error = {"long_name": "standard error of activation_distance", "units": unit}
     mean = grid.mean(distance.values, evaluated)
     squares = grid.mean(distance.values**2, evaluated)
     several = np.where(count > 1, count - 1.0, np.nan)

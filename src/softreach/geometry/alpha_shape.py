@@ -44,7 +44,9 @@ class AlphaComplex:
 
     The alpha shape of radius α is the union of the tetrahedra whose circumscribed sphere has a
     radius R <= α (Edelsbrunner and Mücke 1994): what is left of the convex hull after a ball of
-    that radius has scooped out everything it can reach without enclosing a point.
+    that radius has scooped out everything it can reach without enclosing a point. Radii that
+    rounding of the coordinates can make equal to α count as such, and what is as flat as that
+    rounding has no volume and is no region (`kernels.points.alpha`).
     """
 
     triangulation: Delaunay
@@ -52,34 +54,32 @@ class AlphaComplex:
     """Circumscribed radii [m], shape (m,)."""
     volumes: np.ndarray = field(init=False, repr=False)
     """Volumes of the tetrahedra [m³], shape (m,)."""
+    least: np.ndarray = field(init=False, repr=False)
+    """The least radii that rounding of the coordinates leaves possible [m], shape (m,)."""
+    flat: Mask = field(init=False, repr=False)
+    """Whether a tetrahedron is no thicker than that rounding, shape (m,)."""
 
     def __post_init__(self) -> None:
-        radii, volumes = _measure(self.triangulation)
-        object.__setattr__(self, "radii", radii)
-        object.__setattr__(self, "volumes", volumes)
+        for name, values in _measure(self.triangulation).items():
+            object.__setattr__(self, name, values)
 
     @lazy
     def _curve(self) -> tuple[np.ndarray, np.ndarray]:
-        """Radii in increasing order, and the volumes summed up to each."""
-        order = np.argsort(self.radii)
-        return self.radii[order], np.cumsum(self.volumes[order])
-
-    def volume_curve(self) -> tuple[np.ndarray, np.ndarray]:
-        """Every radius at which the volume steps [m], and the volume from there on [m³]."""
-        radii, volumes = self._curve
-        return radii.copy(), volumes.copy()
+        """Least radii in increasing order, and the volumes summed up to each."""
+        order = np.argsort(self.least)
+        return self.least[order], np.cumsum(np.where(self.flat, 0.0, self.volumes)[order])
 
     def volume(self, alpha: float | np.ndarray) -> float | np.ndarray:
         """Volume [m³] of the shape at one radius or at an array of radii [m]."""
         if np.ndim(alpha) == 0:  # one sum takes a fiftieth of the time of the sorted curve
-            return float(self.volumes[self.radii <= alpha].sum())
+            return float(self.volumes[(self.least <= alpha) & ~self.flat].sum())
         radii, volumes = self._curve
         steps = np.searchsorted(radii, alpha, side="right")
         return np.where(steps > 0, volumes[steps - 1], 0.0) if len(volumes) else 0.0 * steps
 
     def regions(self, alpha: float) -> int:
         """Number of parts of the shape that are connected through faces."""
-        return self._joined(alpha)[1]
+        return self._joined(alpha)[2]
 
     def critical_alpha(self) -> float:
         """The smallest radius [m] at which one region covers all points; inf for a flat cloud.
@@ -90,31 +90,37 @@ class AlphaComplex:
         volume there converges as a random cloud grows: its most isolated point decides.
         """
         mesh = self.triangulation
-        if len(mesh.tetrahedra) == 0:
+        at_points = np.full(len(mesh.points), -1.0)
+        kernels.least_radii(mesh.tetrahedra, self.least, at_points)
+        covering = at_points.max(initial=-1.0)
+        if covering < 0.0:
             return np.inf
-        least = np.full(len(mesh.points), -1.0)
-        kernels.least_radii(mesh.tetrahedra, self.radii, least)
-        covering = least.max()
-        parent, regions = self._joined(covering)
+        radius = self.radii[self.least == covering].max()
+        alike = self.least <= 2.0 * radius - covering
+        parent, solid, regions = self._joined(2.0 * radius - covering)
         if regions == 1:
-            return float(covering)
-        later = np.flatnonzero(self.radii > covering)
-        order = later[np.argsort(self.radii[later])]
-        asked = parent, regions, order
-        return float(kernels.radius_of_one_region(mesh.neighbors, self.radii, *asked))
+            return float(max(radius, self.least[alike].max()))
+        later = np.flatnonzero(~alike)
+        order = later[np.argsort(self.least[later])]
+        return float(
+            kernels.radius_of_one_region(
+                mesh.neighbors, self.radii, self.least, solid, parent, regions, order
+            )
+        )
 
-    def _joined(self, alpha: float) -> tuple[np.ndarray, int]:
-        """Forest for `kernels.join_regions` to add further tetrahedra, and the number of parts."""
-        parent = np.full(len(self.radii), -1, np.int32)
-        neighbors = self.triangulation.neighbors
-        return parent, int(kernels.join_regions(neighbors, self.radii <= alpha, parent))
+    def _joined(self, alpha: float) -> tuple[np.ndarray, Mask, int]:
+        """Sets for `kernels.added_regions` to add tetrahedra to, and the number of regions."""
+        parent, solid = np.full(len(self.radii), -1, np.int32), ~self.flat
+        kept = self.least <= alpha
+        regions = kernels.join_regions(self.triangulation.neighbors, kept, solid, parent)
+        return parent, solid, int(regions)
 
     def hull(self, alpha: float) -> Hull:
         """The shape of one radius [m]: surface, volume, area and regions."""
-        mesh, kept = self.triangulation, self.radii <= alpha
-        faces, _ = _boundary(mesh.tetrahedra, mesh.neighbors, kept)
-        volume = _sum(self.volumes[kept])
-        return _hull(mesh.points, faces, volume, alpha, self.regions(alpha))
+        mesh, kept = self.triangulation, self.least <= alpha
+        faces, regions = _joined([_kept_piece(mesh.tetrahedra, mesh.neighbors, kept, self.flat)])
+        volume = _sum(self.volumes[kept & ~self.flat])
+        return _hull(mesh.points, faces, volume, alpha, regions)
 
 
 def alpha_hull(
@@ -147,11 +153,11 @@ class _Piece(NamedTuple):
 
     faces: Faces
     """Those between them and the rest, as indices of points."""
-    regions: Index
-    """Region at each face, counted from 0."""
-    number: int
-    """Number of regions."""
-    volumes: tuple[Array, Array]
+    sets: Index
+    """Set of connected tetrahedra at each face, counted from 0."""
+    solid: Mask
+    """Whether each set is a region: not all of it is flat."""
+    volumes: tuple[Array, Array] = (np.empty(0), np.empty(0))
     """Of the tetrahedra, and of those that a part of the points has by itself [m³]."""
 
 
@@ -185,43 +191,57 @@ def _piece(
     inserted, work = points[order], scratch()
     volumes_of_part = [np.empty(0)]
 
-    def measured(cells: np.ndarray) -> tuple[Array, Array]:
-        radii, volumes = np.empty((2, len(cells)))
-        kernels.measure_cells(inserted, cells, order, box, work, radii, volumes)
-        return radii, volumes
+    def measured(cells: np.ndarray) -> tuple[Mask, Mask, Array]:
+        radii, least, volumes = np.empty((3, len(cells)))
+        flat = np.empty(len(cells), bool)
+        kernels.measure_cells(inserted, cells, order, box, work, radii, least, volumes, flat)
+        return least <= alpha, flat, volumes
 
     def look(cells: np.ndarray) -> None:
-        radii, volumes = measured(cells)
-        volumes_of_part[0] = volumes[radii <= alpha]
+        kept, flat, volumes = measured(cells)
+        volumes_of_part[0] = volumes[kept & ~flat]
 
     early = 0 if part is None else int(part[members].sum())
     cells, neighbors, _ = triangulate(inserted, lies_on_curve, early, look)
-    radii, volumes = measured(cells)
-    kept = radii <= alpha
-    faces, owners = _boundary(cells, neighbors, kept)
-    parent = np.full(len(kept), -1, np.int32)
-    kernels.join_regions(neighbors, kept, parent)
+    kept, flat, volumes = measured(cells)
+    piece = _kept_piece(cells, neighbors, kept, flat)
+    return piece._replace(
+        faces=order[piece.faces], volumes=(volumes[kept & ~flat], volumes_of_part[0])
+    )
+
+
+def _kept_piece(cells: np.ndarray, neighbors: np.ndarray, kept: Mask, flat: Mask) -> _Piece:
+    """The faces between kept tetrahedra and the rest, normals outwards, and whose they are."""
+    room = 4 * len(cells)  # of which only what is written takes memory
+    faces, owners = np.empty((room, 3), np.int32), np.empty(room, np.int32)
+    count = kernels.boundary_faces(cells, neighbors, kept, faces, owners)
+    faces, owners = faces[:count].copy(), owners[:count].copy()
+    parent, solid = np.full(len(kept), -1, np.int32), ~flat
+    kernels.join_regions(neighbors, kept, solid, parent)
     roots = np.flatnonzero(parent == np.arange(len(parent)))
     while not np.array_equal(above := parent[owners], owners):
         owners = above
-    regions = np.searchsorted(roots, owners)
-    return _Piece(order[faces], regions, len(roots), (volumes[kept], volumes_of_part[0]))
+    return _Piece(faces, np.searchsorted(roots, owners), solid[roots])
 
 
 def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
-    """The faces around all pieces together, and the number of regions."""
-    if len(pieces) == 1:
-        return pieces[0].faces, pieces[0].number
-    counts = np.array([piece.number for piece in pieces])
+    """The faces around the regions of all pieces together, and the number of regions."""
+    solid = np.concatenate([piece.solid for piece in pieces])
+    counts = np.array([len(piece.solid) for piece in pieces])
     firsts = np.cumsum(counts) - counts
     faces = np.concatenate([piece.faces for piece in pieces])
     each = zip(firsts, pieces, strict=True)
-    regions = np.concatenate([first + piece.regions for first, piece in each])
+    sets = np.concatenate([first + piece.sets for first, piece in each])
+    if len(pieces) == 1:
+        return faces[solid[sets]], int(solid.sum())
     inner = np.zeros(len(faces), bool)
     table = np.full(1 << (2 * len(faces)).bit_length(), -1)
-    parent = np.arange(counts.sum())
-    joins = kernels.join_pieces(np.sort(faces, axis=1), regions, parent, table, inner)
-    return faces[~inner], int(counts.sum() - joins)
+    parent = np.arange(len(solid))
+    kernels.join_pieces(np.sort(faces, axis=1), sets, solid, parent, table, inner)
+    while not np.array_equal(above := parent[sets], sets):
+        sets = above
+    roots = parent == np.arange(len(parent))
+    return faces[~inner & solid[sets]], int(solid[roots].sum())
 
 
 def _boxes(points: Points, alpha: float, most: int) -> list[Array]:
@@ -261,8 +281,8 @@ def _cut(x: Array, alpha: float, share: float) -> tuple[float, float]:
 
 
 def _near(points: Points, alpha: float, box: Array) -> Mask:
-    """Mask of the points in a box widened by alpha, and by more than rounding moves a center."""
-    margin = alpha * (1.0 + 2.0**-20) + 2.0**-50
+    """Mask of the points in a box widened by the largest radius kept, and by rounding."""
+    margin = alpha * (1.0 + 2.0 * kernels.LARGEST_SLACK) + 2.0**-50
     near = np.ones(len(points), bool)
     for axis in range(3):
         if box[0, axis] > -np.inf:
@@ -270,16 +290,6 @@ def _near(points: Points, alpha: float, box: Array) -> Mask:
         if box[1, axis] < np.inf:
             near &= points[:, axis] <= box[1, axis] + margin
     return near
-
-
-def _boundary(
-    cells: np.ndarray, neighbors: np.ndarray, kept: Mask
-) -> tuple[np.ndarray, np.ndarray]:
-    """The faces between kept tetrahedra and the rest, normals outwards, and whose they are."""
-    room = 4 * len(cells)  # of which only what is written takes memory
-    faces, owners = np.empty((room, 3), np.int32), np.empty(room, np.int32)
-    count = kernels.boundary_faces(cells, neighbors, kept, faces, owners)
-    return faces[:count].copy(), owners[:count].copy()
 
 
 def _hull(points: Points, faces: Faces, volume: float, alpha: float, regions: int) -> Hull:
@@ -304,15 +314,22 @@ def _sum(volumes: Array) -> float:
     return float(np.sort(volumes).sum())
 
 
-def _measure(mesh: Delaunay) -> tuple[Array, Array]:
-    """Radii [m] and volumes [m³] of all tetrahedra, on all threads."""
+def _measure(mesh: Delaunay) -> dict[str, np.ndarray]:
+    """Radii [m], volumes [m³] and flatness of all tetrahedra, on all threads."""
     points, exponent = unit_scale(mesh.points)
-    radii, volumes = np.empty((2, len(mesh.tetrahedra)))
+    radii, least, volumes = np.empty((3, len(mesh.tetrahedra)))
+    flat = np.empty(len(mesh.tetrahedra), bool)
     names = np.arange(len(points))
 
     def task(part: slice) -> Callable[[], object]:
-        given = points, mesh.tetrahedra[part], names, WHOLE, scratch()
-        return partial(kernels.measure_cells, *given, radii[part], volumes[part])
+        results = (each[part] for each in (radii, least, volumes, flat))
+        cells = mesh.tetrahedra[part]
+        return partial(kernels.measure_cells, points, cells, names, WHOLE, scratch(), *results)
 
     parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))
-    return np.ldexp(radii, exponent), np.ldexp(volumes, 3 * exponent)
+    return {
+        "radii": np.ldexp(radii, exponent),
+        "least": np.ldexp(least, exponent),
+        "volumes": np.ldexp(volumes, 3 * exponent),
+        "flat": flat,
+    }

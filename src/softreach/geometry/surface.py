@@ -168,6 +168,24 @@ def corner_areas(vertices: Points, faces: Faces) -> Points:
     return area
 
 
+def volume_beyond(surface: Surface, axis: int, at: float, side: int = 1) -> float:
+    """Volume [m³] inside a closed surface where a coordinate is above a value; side -1: below.
+
+    By the divergence theorem ∮ max(h, 0) n dA with the height h above the plane: on a triangle with
+    heights a <= b <= c the mean of max(h, 0) is (a + b + c)/3 plus -a³/(3 (b - a)(c - a)) where
+    a < 0 <= b, and c³/(3 (c - a)(c - b)) where b < 0 < c.
+    """
+    heights = side * (surface.vertices[:, axis] - at)
+    a, b, c = np.sort(heights[surface.faces], axis=1).T
+    p, q, r = np.moveaxis(surface.vertices[surface.faces], 1, 0)
+    area = side * np.cross(q - p, r - p)[:, axis] / 2.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lowest = (a + b + c) / 3.0 - a**3 / (3.0 * (b - a) * (c - a))
+        highest = c**3 / (3.0 * (c - a) * (c - b))
+    cases = [a >= 0, b >= 0, c > 0]
+    return float((np.select(cases, [(a + b + c) / 3.0, lowest, highest], 0.0) * area).sum())
+
+
 def surface_area(vertices: Points, faces: Faces) -> float:
     """Area of a surface [m²]."""
     scaled, exponent = unit_scale(vertices)  # squares of squares overflow early

@@ -22,6 +22,7 @@ class Verdict(StrEnum):
     DIFFERS = "differs"
     MISPRINT = "misprint"
     OPEN = "open"
+    UNTESTED = "not tested"
 
 
 class Finding(NamedTuple):
@@ -51,6 +52,8 @@ class Claim:
     """The part of the report that computes what it needs."""
     check: Callable[[Numbers], Finding]
     """From the part's numbers to a finding."""
+    full: bool = False
+    """True if only the full sizes test it."""
 
 
 def _claims() -> Iterator[Claim]:

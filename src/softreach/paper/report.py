@@ -43,7 +43,7 @@ def write_report(
     Raises:
         MissingExtra: Jinja2 is not installed.
     """
-    rows = list(_rows(notebooks))
+    rows = list(_rows(notebooks, quick))
     page = report_template().render(
         rows=rows,
         counts={verdict: sum(row["verdict"] == verdict for row in rows) for verdict in Verdict},
@@ -60,7 +60,7 @@ def write_report(
     return path
 
 
-def _rows(notebooks: Mapping[str, Notebook]) -> Iterator[dict[str, Any]]:
+def _rows(notebooks: Mapping[str, Notebook], quick: bool) -> Iterator[dict[str, Any]]:
     """One for each statement of the paper."""
     for claim in CLAIMS:
         finding = claim.check(notebooks[claim.part].numbers)
@@ -69,7 +69,7 @@ def _rows(notebooks: Mapping[str, Notebook]) -> Iterator[dict[str, Any]]:
             "says": claim.says,
             "found": finding.text,
             "how": claim.how,
-            "verdict": finding.verdict,
+            "verdict": Verdict.UNTESTED if quick and claim.full else finding.verdict,
         }
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLORMAP",
+    "POWERS",
     "UNSTABLE",
     "BundleKey",
     "Coloring",
@@ -39,6 +40,7 @@ UNSTABLE = (255, 0, 200)
 """Magenta, RGB from 0 to 255, of unstable equilibria: no scale of colors has it."""
 _LINE, _PAGE = 44, 100  # characters above axes of a column's width, and above a figure
 _MIXED = 3  # bundles whose lights can be told apart in a mixture
+POWERS = str.maketrans("23", "²³")
 _WIDE = 8.0  # ratio of the largest to the smallest value from which ratios are shown
 
 
@@ -265,7 +267,7 @@ def _clipped(coloring: Coloring) -> Coloring:
 
 def _described(color: ArrayLike) -> str:
     attrs = getattr(color, "attrs", {})
-    name, unit = attrs.get("long_name", ""), attrs.get("units")
+    name, unit = attrs.get("long_name", ""), attrs.get("units", "").translate(POWERS)
     return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
 
 

@@ -115,9 +115,11 @@ def save_figure(
         root = figure.get_figure(root=True)
         if root is not None:
             # at this level a PNG takes less than half the time of the default for 5 % more bytes
-            options: dict[str, Any] = (
-                {"pil_kwargs": {"compress_level": 4}} if suffix == ".png" else {}
-            )
+            encodings: dict[str, Any] = {
+                ".png": {"pil_kwargs": {"compress_level": 4}},
+                ".pdf": {"metadata": {"CreationDate": None}},
+            }
+            options = encodings.get(suffix, {})
             root.savefig(file, dpi=DPI, format=suffix[1:], **options)
 
 

@@ -3,6 +3,12 @@
 The alpha shape of radius α is the union of the cells whose circumscribed sphere has radius R <= α.
 A region is a set of such cells that are connected through faces.
 
+Points on a sphere or a grid have many spheres of one radius, which rounding of the coordinates
+makes differ. So a cell counts from the least radius that rounding leaves possible. With edges of
+up to l and 6V = |det|, every height is at least |det| / l², so that coordinates off by e move R by
+at most 4 e R l² / |det|. A cell no thicker than rounding is flat: it joins others, and alone it is
+no region.
+
 References:
     Edelsbrunner, Mücke (1994), Three-dimensional alpha shapes, ACM Trans. Graphics 13, 43-72.
 """
@@ -28,11 +34,15 @@ __all__ = [
 
 DIGITS = 2.0**26  # a value this many times its rounding error is good to eight digits
 LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two products
+SLACK = 2.0**-33  # of a radius: what is typed or computed has so many digits
+COORDINATES = 64 * EPS  # 4 vertices whose coordinates are good to nine roundings, times √3
+LARGEST_SLACK = 2.0**-11
+FLAT = 2.0**-43  # thickness over coordinates: a thousand roundings
 
 
 @strict
-def measure_cells(points, cells, names, box, w, radii, volumes):
-    """Write the radius of the circumscribed sphere and the volume of every cell.
+def measure_cells(points, cells, names, box, w, radii, least, volumes, flat):
+    """Write the radius of the circumscribed sphere, the volume and the thickness of every cell.
 
     With edges a, b, c from the last vertex, 6V = a · (b × c), and the center of the sphere is at
     (a² b × c + b² c × a + c² a × b) / 12V from there. Vertices are taken in the order of their
@@ -45,24 +55,38 @@ def measure_cells(points, cells, names, box, w, radii, volumes):
         box: Lower and upper corner; a cell counts if its center is inside or on a lower face.
         w: Work array of the predicates.
         radii: Result, shape (m,); inf where a cell has no volume or does not count.
+        least: Result, the least radius that rounding leaves possible, shape (m,).
         volumes: Result, shape (m,).
+        flat: Result, whether a cell is no thicker than rounding, shape (m,).
     """
     for t in range(len(cells)):
-        radii[t], volumes[t] = np.inf, 0.0
+        radii[t], least[t], volumes[t], flat[t] = np.inf, np.inf, 0.0, False
         i, j, k, m = corners(cells, t)
         if (i | j | k | m) < 0:
             continue
         i, j, k, m = by_name(names, i, j, k, m)
-        x, y, z, det, sure = sphere(points, i, j, k, m)
+        x, y, z, det, sure, longest = sphere(points, i, j, k, m)
         if not sure:
             x, y, z, det = sphere_exact(points, i, j, k, m, w)
         volumes[t] = abs(det) / 6.0
+        coarse = longest * max(
+            max(size(points, i), size(points, j)), max(size(points, k), size(points, m))
+        )
+        flat[t] = abs(det) <= FLAT * coarse
         if det != 0.0 and not (
             beyond(points[m, 0] + x / (2.0 * det), box[0, 0], box[1, 0])
             or beyond(points[m, 1] + y / (2.0 * det), box[0, 1], box[1, 1])
             or beyond(points[m, 2] + z / (2.0 * det), box[0, 2], box[1, 2])
         ):
             radii[t] = np.sqrt(x * x + y * y + z * z) / (2.0 * abs(det))
+            slack = SLACK + COORDINATES * coarse / abs(det)
+            least[t] = radii[t] * (1.0 - min(slack, LARGEST_SLACK))
+
+
+@strict
+def size(points, i):
+    """The largest coordinate of a point."""
+    return max(abs(points[i, 0]), max(abs(points[i, 1]), abs(points[i, 2])))
 
 
 @strict
@@ -85,7 +109,7 @@ def beyond(x, lower, upper):
 
 @strict
 def sphere(points, i, j, k, m):
-    """The numerator of the center, 6V, and whether rounding left them good to eight digits."""
+    """The numerator of the center, 6V, if both are good to eight digits, the longest edge²."""
     a, b, c = difference(points, i, m), difference(points, j, m), difference(points, k, m)
     a2, b2, c2 = dot(a, a), dot(b, b), dot(c, c)
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
@@ -97,12 +121,13 @@ def sphere(points, i, j, k, m):
     u = max(abs(a[0]), abs(b[0]), abs(c[0]))
     v = max(abs(a[1]), abs(b[1]), abs(c[1]))
     w = max(abs(a[2]), abs(b[2]), abs(c[2]))
-    length_size = max(a2, b2, c2) * (u * v + v * w + w * u)
+    longest = max(a2, b2, c2)
+    length_size = longest * (u * v + v * w + w * u)
     sure = (
         abs(det) > DIGITS * ORIENT_BOUND * u * v * w
         and length > DIGITS * LENGTH_BOUND * length_size
     )
-    return x, y, z, det, sure
+    return x, y, z, det, sure, longest
 
 
 @strict
@@ -154,12 +179,14 @@ def is_boundary(neighbors, kept, t, i):
 
 
 @strict
-def merges(neighbors, parent, t):
-    """Join cell t, new, to the cells around it that have a region; how many regions that cost.
+def added_regions(neighbors, solid, parent, t):
+    """Join cell t, new, to the cells around it that have a region; how many more regions there are.
 
-    ``parent`` leads from each cell towards the one that names its region (union-find).
+    ``parent`` leads from each cell towards the one that names its set (union-find), and ``solid``
+    of that one is True if not all of them are flat: if the set is a region.
     """
-    merged = 0
+    parent[t] = t
+    added = int(solid[t])
     here = t
     for i in range(4):
         there = neighbors[t, i]
@@ -168,34 +195,34 @@ def merges(neighbors, parent, t):
         there = root(parent, there)
         if there != here:
             parent[here] = there
+            added -= int(solid[here] and solid[there])
+            solid[there] |= solid[here]
             here = there
-            merged += 1
-    return merged
+    return added
 
 
 @strict
-def join_regions(neighbors, kept, parent):
-    """The number of regions of the kept cells; `merges`' parent of every cell, -1 at the start."""
+def join_regions(neighbors, kept, solid, parent):
+    """The number of regions of the kept cells; arguments of `added_regions`, parents -1 before."""
     regions = 0
     for t in range(len(neighbors)):
         if kept[t]:
-            parent[t] = t
-            regions += 1 - merges(neighbors, parent, t)
+            regions += added_regions(neighbors, solid, parent, t)
     return regions
 
 
 @strict
-def join_pieces(faces, regions, parent, table, inner):
-    """Mark faces that are listed twice, and join the regions on both sides; how many that cost.
+def join_pieces(faces, regions, solid, parent, table, inner):
+    """Mark faces that are listed twice, and join the sets on both sides.
 
     Args:
         faces: Sorted vertices of the outer faces of all pieces, shape (f, 3).
-        regions: Region at each face, shape (f,).
-        parent: Each region itself, shape (r,); changed (see `merges`).
+        regions: Set at each face, shape (f,).
+        solid: Whether each set is a region, shape (r,); changed (see `added_regions`).
+        parent: Each set itself, shape (r,); changed.
         table: Work array of -1, its size a power of two above f.
         inner: Result, a mask of False, shape (f,).
     """
-    joined = 0
     for f in range(len(faces)):
         a, b, c = np.int64(faces[f, 0]), np.int64(faces[f, 1]), np.int64(faces[f, 2])
         at = (a * 73856093 ^ b * 19349663 ^ c * 83492791) & (len(table) - 1)
@@ -212,8 +239,7 @@ def join_pieces(faces, regions, parent, table, inner):
         here, there = root(parent, regions[f]), root(parent, regions[g])
         if here != there:
             parent[here] = there
-            joined += 1
-    return joined
+            solid[there] |= solid[here]
 
 
 @strict
@@ -236,21 +262,22 @@ def least_radii(cells, radii, least):
 
 
 @strict
-def radius_of_one_region(neighbors, radii, parent, regions, order):
+def radius_of_one_region(neighbors, radii, least, solid, parent, regions, order):
     """The first radius at which one region is left, adding further cells one after the other.
 
     Args:
         neighbors: Neighbors, -1 for none, shape (m, 4).
         radii: Circumscribed radii, shape (m,).
-        parent: Regions so far, from `join_regions`; changed.
-        regions: Number of them.
-        order: The cells still to come, by increasing radius.
+        least: The least that rounding leaves possible, shape (m,).
+        solid: Whether each set is a region, from `join_regions`; changed.
+        parent: Sets so far, from there; changed.
+        regions: Number of regions.
+        order: The cells still to come, by increasing least radius.
     """
     for k in range(len(order)):
         t = order[k]
-        parent[t] = t
-        regions += 1 - merges(neighbors, parent, t)
-        last = k + 1 == len(order) or radii[order[k + 1]] > radii[t]
-        if last and regions == 1:
+        regions += added_regions(neighbors, solid, parent, t)
+        alike = 2.0 * radii[t] - least[t]
+        if regions == 1 and (k + 1 == len(order) or least[order[k + 1]] > alike):
             return radii[t]
     return np.inf

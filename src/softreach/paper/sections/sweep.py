@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from softreach.arm.designs import minimal_trunk
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
+from softreach.geometry.surface import volume_beyond
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
@@ -23,13 +25,15 @@ if TYPE_CHECKING:
 ASIDE = 0.3
 """Distance at which a place begins to lie far from the plane of symmetry [L]."""
 
-_ACCURACY = 2e-2  # finer is not needed for what is shown
+_ACCURACY = 1e-2  # finer is not needed for what is shown
+_RATIOS = (0.7, 0.75, 0.8, 0.85)
 _STORE = "atlas.zarr"
 _SCALARS = (
     "volume",
     "unreachability",
     "convex_volume",
     "exact_volume",
+    "exact_volume_error",
     "exact_unreachability",
     "multiple_volume",
     "fold_volume",
@@ -58,10 +62,14 @@ class Shape(NamedTuple):
 
 
 def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list[list[float]]]:
-    """The shapes of exact reachable sets over (revolution, taper) [rad], by name."""
+    """The shapes of exact reachable sets over (revolution, taper) [rad], by name, with errors."""
     accuracy = max(accuracy, _ACCURACY)
-    values = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
-    return {name: values[..., k].tolist() for k, name in enumerate(Shape._fields)}
+    pairs = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
+    return {
+        name + of: pairs[..., row, k].tolist()
+        for k, name in enumerate(Shape._fields)
+        for row, of in enumerate(("", "_error"))
+    }
 
 
 def swept_atlas(folder: Path) -> xr.Dataset:
@@ -88,6 +96,7 @@ def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
         taper_deg=np.degrees(atlas["taper"].values).round(6).tolist(),
         alpha=atlas["volume"].attrs["alpha_over_length"],
         **shapes(atlas["revolution"].values, atlas["taper"].values, settings.accuracy),
+        best_taper_deg=_best_tapers(atlas, settings.accuracy),
         aside_from=ASIDE,
         quantiles=curvature["quantile"].values.tolist(),
         curvature=curvature.transpose("taper", "station", "quantile").values.tolist(),
@@ -111,12 +120,13 @@ def widening(n: Numbers) -> Finding:
     aside = sweep["aside"]
     best = sweep.taper[int(aside[-1].argmax())]
     words = (
-        f"the volume beyond {n['aside_from']:g} L from that plane grows in {_rises(aside, 0)} "
-        f"steps of Ω and {_rises(aside, 1)} of φ: without helicity from {aside[0, 0]:.3f} to "
-        f"{aside[0, -1]:.3f} L³, at the largest Ω from {aside[-1, 0]:.3f} to "
-        f"{aside[-1].max():.3f} at φ = {best:.2g}°, and then down to {aside[-1, -1]:.3f}"
+        f"the volume beyond {n['aside_from']:g} L from that plane grows in "
+        f"{sweep.rises('aside', 0)} steps of Ω and {sweep.rises('aside', 1)} of φ: without "
+        f"helicity from {aside[0, 0]:.3f} to {aside[0, -1]:.3f} L³, at the largest Ω from "
+        f"{aside[-1, 0]:.3f} to {aside[-1].max():.3f} at φ = {best:.2g}°, and then down to "
+        f"{aside[-1, -1]:.3f} (each ± {sweep['aside_error'].max():.1g})"
     )
-    helicity, taper = _share(aside, 0), _share(aside, 1)
+    helicity, taper = sweep.share("aside", 0), sweep.share("aside", 1)
     return judged(words, min(helicity, taper) > 0.95, helicity > 0.95)
 
 
@@ -125,12 +135,14 @@ def thickness(n: Numbers) -> Finding:
     sweep = _Sweep(n)
     thick = sweep["thickness"]
     words = (
-        f"the mean thickness 2 V/A of the reachable set is {thick[0].min():.2f} to "
-        f"{thick[0].max():.2f} L at Ω = {sweep.revolution[0]:.3g}° and {thick[-1].min():.2f} to "
-        f"{thick[-1].max():.2f} L at Ω = {sweep.revolution[-1]:.4g}°; it grows in "
-        f"{_rises(thick, 0)} steps of Ω"
+        f"the mean thickness 2 V/A of the reachable set is {thick[0].min():.3f} to "
+        f"{thick[0].max():.3f} L at Ω = {sweep.revolution[0]:.3g}° and {thick[-1].min():.3f} to "
+        f"{thick[-1].max():.3f} L at Ω = {sweep.revolution[-1]:.4g}° (each ± "
+        f"{sweep['thickness_error'].max():.1g}); it grows in {sweep.rises('thickness', 0)} steps "
+        "of Ω"
     )
-    return judged(words, _share(thick, 0) > 0.95, bool(thick[0].max() < thick[-1].min()))
+    share = sweep.share("thickness", 0)
+    return judged(words, share > 0.95, bool(thick[0].max() < thick[-1].min()))
 
 
 def behind(n: Numbers) -> Finding:
@@ -139,12 +151,12 @@ def behind(n: Numbers) -> Finding:
     volume = sweep["behind"]
     best = sweep.taper[int(volume[-1].argmax())]
     words = (
-        f"the volume behind the arm (y > 0) grows in {_rises(volume, 1)} steps of φ; at the "
-        f"largest Ω from {volume[-1, 0]:.3f} to {volume[-1].max():.3f} L³ at φ = {best:.2g}° and "
-        f"{volume[-1, -1]:.3f} at the largest, without helicity from {volume[0, 0]:.3f} to "
-        f"{volume[0, -1]:.3f}"
+        f"the volume behind the arm (y > 0) grows in {sweep.rises('behind', 1)} steps of φ; at "
+        f"the largest Ω from {volume[-1, 0]:.3f} to {volume[-1].max():.3f} L³ at φ = {best:.2g}° "
+        f"and {volume[-1, -1]:.3f} at the largest, without helicity from {volume[0, 0]:.3f} to "
+        f"{volume[0, -1]:.3f} (each ± {sweep['behind_error'].max():.1g})"
     )
-    return judged(words, _share(volume, 1) > 0.95, volume[-1, -1] > volume[-1, 0])
+    return judged(words, sweep.share("behind", 1) > 0.95, volume[-1, -1] > volume[-1, 0])
 
 
 def hulls(n: Numbers) -> Finding:
@@ -158,25 +170,28 @@ def hulls(n: Numbers) -> Finding:
 def growth(n: Numbers) -> Finding:
     """Volume over Ω."""
     sweep = _Sweep(n)
-    cloud, exact = sweep["volume"], sweep["exact_volume"]
+    cloud = sweep["volume"]
     words = (
-        f"the volume of the α-shapes grows in {_rises(cloud, 0)} steps of Ω, the exact one in "
-        f"{_rises(exact, 0)}"
+        f"the volume of the α-shapes grows in {sweep.rises('volume', 0)} steps of Ω, the exact "
+        f"one in {sweep.rises('exact_volume', 0)}"
     )
-    return judged(words, _share(cloud, 0) > 0.95, bool((cloud[-1] > cloud[0]).all()))
+    return judged(words, sweep.share("volume", 0) > 0.95, bool((cloud[-1] > cloud[0]).all()))
 
 
 def maximum(n: Numbers) -> Finding:
     """The largest volume and its place."""
     sweep = _Sweep(n)
     cloud, exact = sweep["volume"], sweep["exact_volume"]
+    at_two = np.interp(2.0, sweep.taper, exact[-1])
+    places = ", ".join(f"{taper:.2g}° for {ratio}" for ratio, taper in n["best_taper_deg"].items())
     words = (
         f"α-shapes of radius {n['alpha']:g} L: {cloud.max():.3f} at {sweep.place(cloud.argmax())}; "
-        f"exact: {exact.max():.3f} at {sweep.place(exact.argmax())}. The radii ratio, misprinted "
-        "in the paper, was read so as to fit this very number, so it confirms little; the place "
-        "of the maximum does"
+        f"exact: {exact.max():.5f} ± {sweep['exact_volume_error'].max():.0e} at "
+        f"{sweep.place(exact.argmax())}, and {at_two:.5f} at the largest Ω and φ = 2°. The ratio "
+        "R1/R2, misprinted in the paper, was read so as to fit the number, and the best φ at the "
+        f"largest Ω depends on it, too: {places}. So neither confirms the reading"
     )
-    best = sweep.taper[int(cloud.argmax()) % len(sweep.taper)]
+    best = sweep.taper[int(exact.argmax()) % len(sweep.taper)]
     off, aside = abs(cloud.max() - 0.67), abs(best - 2)
     return judged(words, off <= 0.005 and aside < 0.05, off < 0.03 and aside < 0.5)
 
@@ -207,14 +222,15 @@ def overtapered(n: Numbers) -> Finding:
 def decline(n: Numbers) -> Finding:
     """UNR over Ω and φ."""
     sweep = _Sweep(n)
-    unr, exact = sweep["unreachability"], sweep["exact_unreachability"]
+    exact = sweep["exact_unreachability"]
     rise = max(0.0, *(float(np.diff(exact, axis=k).max()) for k in (0, 1)))
     words = (
-        f"UNR rises in {_rises(unr, 0)} steps of Ω and {_rises(unr, 1)} of φ; exactly in "
-        f"{_rises(exact, 0)} and {_rises(exact, 1)}, by {rise:.4f} at most. It falls from "
-        f"{exact[0, 0]:.3f} to {exact[-1, -1]:.3f} (exact)"
+        f"UNR rises in {sweep.rises('unreachability', 0)} steps of Ω and "
+        f"{sweep.rises('unreachability', 1)} of φ; exactly in "
+        f"{sweep.rises('exact_unreachability', 0)} and {sweep.rises('exact_unreachability', 1)}, "
+        f"by {rise:.4f} at most. It falls from {exact[0, 0]:.3f} to {exact[-1, -1]:.3f} (exact)"
     )
-    worst = max(_share(unr, axis) for axis in (0, 1))
+    worst = max(sweep.share("unreachability", axis) for axis in (0, 1))
     return judged(words, worst == 0, worst < 0.05)
 
 
@@ -256,16 +272,43 @@ def cover(n: Numbers) -> Finding:
     return judged(words, bool((most >= most_plain).all() and beyond))
 
 
-def _shape(revolution: float, taper: float, accuracy: float) -> Shape:
-    reached = reachable_set(minimal_trunk(revolution, taper), accuracy=accuracy)
+def _shape(revolution: float, taper: float, accuracy: float) -> tuple[Shape, Shape]:
+    """The shape of a set and its errors.
+
+    Errors of volumes are three times the change from half the accuracy. The area is that of the
+    smooth boundary, as that of the raster still grows with its cells; its error is what the volume
+    inside that boundary is off.
+    """
+    arm = minimal_trunk(revolution, taper)
+    reached, coarse = (reachable_set(arm, accuracy=scale * accuracy) for scale in (1.0, 2.0))
     assert isinstance(reached, ReachableSolid)
-    grid, length = reached.grid, reached.arm.length
-    occupied, cell = grid["occupied"], (grid.attrs["cell"] / length) ** 3
-    return Shape(
-        aside=float((occupied & (abs(grid.x) > ASIDE * length)).sum()) * cell,
-        behind=float((occupied & (grid.y > 0)).sum()) * cell,
-        thickness=2 * reached.volume / reached.surface().area / length,
+    assert isinstance(coarse, ReachableSolid)
+    sheets, (aside, behind) = coarse.sheets(), _beyond(reached)
+    thickness = 2 * reached.volume / sheets.area / arm.length
+    off = abs(sheets.volume / reached.volume - 1) * thickness
+    error = (
+        2 * abs(fine - other) for fine, other in zip((aside, behind), _beyond(coarse), strict=True)
     )
+    return Shape(aside, behind, thickness), Shape(*error, off)
+
+
+def _beyond(reached: ReachableSolid) -> tuple[float, float]:
+    """Volumes aside and behind [L³]."""
+    surface, length = reached.surface(), reached.arm.length
+    aside = (volume_beyond(surface, 0, side * ASIDE * length, side) for side in (-1, 1))
+    return sum(aside) / length**3, volume_beyond(surface, 1, 0.0) / length**3
+
+
+def _best_tapers(atlas: xr.Dataset, accuracy: float) -> dict[str, float]:
+    """φ of the largest exact volume at the largest revolution, by R1/R2 [deg]."""
+    turn, tapers = float(atlas["revolution"][-1]), atlas["taper"].values
+
+    def volume(ratio: float, taper: float) -> float:
+        trunk = minimal_trunk(turn, taper, radius_ratio=ratio)
+        return reachable_set(trunk, accuracy=accuracy).volume
+
+    best = {ratio: max(tapers, key=partial(volume, ratio)) for ratio in _RATIOS}
+    return {str(ratio): round(float(np.degrees(taper)), 6) for ratio, taper in best.items()}
 
 
 def _swept(settings: Settings, folder: Path) -> xr.Dataset:
@@ -299,21 +342,35 @@ class _Sweep:
     def __getitem__(self, name: str) -> Array:
         return np.array(self.numbers[name], float)
 
+    def steps(self, name: str, axis: int) -> tuple[int, int, int]:
+        """Steps along an axis that go up and down by more than the errors, and all."""
+        step, error = np.diff(self[name], axis=axis), np.swapaxes(self._error(name), 0, axis)
+        sure = np.abs(step) > np.swapaxes(error[1:] + error[:-1], 0, axis)
+        return int((sure & (step > 0)).sum()), int((sure & (step < 0)).sum()), step.size
+
+    def _error(self, name: str) -> Array:
+        """Of the volumes and lengths that state one; UNR has as much from either of its volumes."""
+        if name == "exact_unreachability":
+            relative = self["exact_volume_error"] / self["exact_volume"]
+            return 2.0 * relative * (1.0 - self[name])
+        known = f"{name}_error" in self.numbers
+        return self[f"{name}_error"] if known else np.zeros_like(self[name])
+
+    def rises(self, name: str, axis: int) -> str:
+        """Number of steps along an axis that go up, and of those that errors leave open."""
+        up, down, every = self.steps(name, axis)
+        unsure = every - up - down
+        return f"{up} of {every}" + (f" ({unsure} within the errors)" if unsure else "")
+
+    def share(self, name: str, axis: int) -> float:
+        """The share of steps that go up, of those that exceed the errors."""
+        up, down, _ = self.steps(name, axis)
+        return up / max(up + down, 1)
+
     def place(self, flat: int | np.intp) -> str:
         """A design by its number."""
         i, j = divmod(int(flat), len(self.taper))
         return f"Ω = {self.revolution[i]:.4g}°, φ = {self.taper[j]:.4g}°"
-
-
-def _rises(values: Array, axis: int) -> str:
-    """Number of steps along an axis that go up."""
-    step = np.diff(values, axis=axis)
-    return f"{int((step > 0).sum())} of {step.size}"
-
-
-def _share(values: Array, axis: int) -> float:
-    """The share of steps along an axis that go up."""
-    return float((np.diff(values, axis=axis) > 0).mean())
 
 
 def _curvatures(n: Numbers) -> tuple[Array, Array, dict[float, int]]:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from softreach.arm.manipulator import Manipulator
-from softreach.cloud.dexterity import dexterity
+from softreach.cloud.dexterity import dexterity, manipulability_unit
 from softreach.cloud.redundancy import activation_distance
-from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
+from softreach.plot.coloring import POWERS, BundleKey, Coloring, ScalarKey, color_samples
 from softreach.rod.tip_map import has_tip
 from softreach.schema import activation_symbols
 from softreach.studio import markup
@@ -203,7 +203,7 @@ def sample_values(
     clipped = color in _CLIPPED and np.isfinite(values).any()
     if clipped:
         values = np.clip(values, *np.nanpercentile(values, _PERCENTILES))
-    attrs = {"long_name": color_label(color), "clipped": clipped}
+    attrs = {"long_name": color_label(color, reach.arm), "clipped": clipped}
     return xr.DataArray(values, dims="sample", attrs=attrs)
 
 
@@ -219,9 +219,10 @@ def shown_color(arm: Manipulator, color: str) -> str:
     return color if color in color_names(arm) else "rgb"
 
 
-def color_label(color: str) -> str:
+def color_label(color: str, arm: Manipulator) -> str:
     """Label of the key of a color; "" where the key needs none."""
-    return _LABELS.get(color, "")
+    unit = manipulability_unit(arm.input_units, "L").translate(POWERS)
+    return _LABELS.get(color, "").format(unit=unit)
 
 
 def key_html(key: BundleKey | ScalarKey | None) -> str:
@@ -252,7 +253,7 @@ def _effort(reach: Reach, rows: NDArray[np.int64]) -> Array:
 
 
 def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
-    """√det(J Jᵀ) with J = ∂r/∂γ [L]; of fewer than three bundles an area [L²] or a length [L]."""
+    """√det(J Jᵀ) with J = ∂r/∂γ [L per input]; of fewer than three bundles an area or a length."""
     volume = dexterity(reach.cloud.isel(sample=rows)).manipulability.values
     return volume / reach.arm.length ** min(reach.arm.inputs, 3)
 
@@ -275,7 +276,7 @@ _VALUES = {
 _LABELS = {
     "effort": "effort: mean |γ| / max |γ| [-]",
     "multiplicity": "multiplicity",
-    "manipulability": "manipulability [L³]",
+    "manipulability": "manipulability [{unit}]",
     "activation distance": "activation distance D̄ [-]",
 }
 
