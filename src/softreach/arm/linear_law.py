@@ -33,20 +33,20 @@ def law_warning(arm: Manipulator) -> str:
 def pull_error(arm: Manipulator) -> float:
     """Largest distance of tips from those of tendons that pull along their bent lines [m].
 
-    Without loads, the moments along such lines, -τ p × t with t along
-    dp/dZ = (x' - ω₃ y) d₁ + (y' + ω₃ x) d₂ + (ζ + ω₁ y - ω₂ x) d₃, make an equation for the
-    curvature of each section alone ([Rucker2011]; without shear), which is solved by repetition
-    from the linear law (52), for inputs at the ends and the middle of their bounds.
+    Without loads (54) is an equation for the curvature of each section alone. It is solved by
+    repetition from the linear law (52), for inputs at the ends and the middle of their bounds.
     """
     body = body_of(arm)
     pulls = np.array([isinstance(each, Tendon) for each in body.bundle_actuators], bool)
     if not pulls.any():
         return 0.0
     step = arm.length / _STATIONS
-    z = step * (0.5 + np.arange(_STATIONS))
+    z = np.linspace(0.5 * step, arm.length - 0.5 * step, _STATIONS)
     table, acts = tables(body, z), body.outline(z).acts[:, pulls, None]
-    (x, y), slope = places(body, z), places(body, z + 1e-4 * step) - places(body, z - 1e-4 * step)
-    x, y, (dx, dy) = x[:, pulls], y[:, pulls], slope[..., pulls] / (2e-4 * step)
+    (x, y), (dx, dy) = (
+        values[..., pulls]
+        for values in (places(body, z), np.gradient(places(body, z), step, axis=1, edge_order=2))
+    )
     stiffness = body.stiffness_at(z)
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     shares = np.rint(2.0 * np.random.default_rng(0).random((_SAMPLES, arm.inputs))) / 2.0
@@ -56,20 +56,15 @@ def pull_error(arm: Manipulator) -> float:
 
     def moments(omega: Array, zeta: Array) -> Array:
         one, two, three = (omega[..., k, None] for k in range(3))
-        along = dx - three * y, dy + three * x, zeta[..., None] + one * y - two * x
-        t1, t2, t3 = np.stack(along) / np.sqrt(sum(each**2 for each in along))
+        along = np.stack([dx - three * y, dy + three * x, zeta[..., None] + one * y - two * x])
+        t1, t2, t3 = along / np.linalg.norm(along, axis=0)
         moment = np.stack([-y * t3, x * t3, y * t1 - x * t2], axis=-1)
         return np.einsum("nb,nsbk->nsk", gamma[:, pulls], np.where(acts, moment, 0.0))
 
     linear = np.einsum("nb,skb->nsk", gamma, table.curvature)
     rest, bent = moments(0.0 * linear, 1.0 + 0.0 * zeta), linear
     for _ in range(_STEPS):
-        before = bent
         bent = linear + (moments(eta[..., None] * bent, zeta) - rest) / resistance
-        if np.abs(bent - before).max() * arm.length < 1e-2 * _NOTED:
-            break
-    if np.abs(bent - linear).max() * arm.length < _NOTED:
-        return 0.0
     tips = [_tips(eta[..., None] * each * step, zeta * step) for each in (linear, bent)]
     return float(np.linalg.norm(tips[1] - tips[0], axis=1).max())
 

@@ -93,19 +93,18 @@ class AlphaComplex:
         at_points = np.full(len(mesh.points), -1.0)
         kernels.least_radii(mesh.tetrahedra, self.least, at_points)
         covering = at_points.max(initial=-1.0)
-        if covering < 0.0:
+        if not 0.0 <= covering < np.inf:
             return np.inf
         radius = self.radii[self.least == covering].max()
-        alike = self.least <= 2.0 * radius - covering
-        parent, solid, regions = self._joined(2.0 * radius - covering)
+        alike = 2.0 * radius - covering
+        parent, solid, regions = self._joined(alike)
         if regions == 1:
-            return float(max(radius, self.least[alike].max()))
-        later = np.flatnonzero(~alike)
+            return float(max(radius, self.least[self.least <= alike].max()))
+        later = np.flatnonzero(self.least > alike)
         order = later[np.argsort(self.least[later])]
+        sizes = self.radii, self.least
         return float(
-            kernels.radius_of_one_region(
-                mesh.neighbors, self.radii, self.least, solid, parent, regions, order
-            )
+            kernels.radius_of_one_region(mesh.neighbors, *sizes, solid, parent, regions, order)
         )
 
     def _joined(self, alpha: float) -> tuple[np.ndarray, Mask, int]:

@@ -283,13 +283,11 @@ def _shape(revolution: float, taper: float, accuracy: float) -> tuple[Shape, Sha
     reached, coarse = (reachable_set(arm, accuracy=scale * accuracy) for scale in (1.0, 2.0))
     assert isinstance(reached, ReachableSolid)
     assert isinstance(coarse, ReachableSolid)
-    sheets, (aside, behind) = coarse.sheets(), _beyond(reached)
+    sheets, fine = coarse.sheets(), _beyond(reached)
     thickness = 2 * reached.volume / sheets.area / arm.length
+    aside, behind = (3 * abs(a - b) for a, b in zip(fine, _beyond(coarse), strict=True))
     off = abs(sheets.volume / reached.volume - 1) * thickness
-    error = (
-        2 * abs(fine - other) for fine, other in zip((aside, behind), _beyond(coarse), strict=True)
-    )
-    return Shape(aside, behind, thickness), Shape(*error, off)
+    return Shape(*fine, thickness), Shape(aside, behind, off)
 
 
 def _beyond(reached: ReachableSolid) -> tuple[float, float]:
@@ -344,23 +342,19 @@ class _Sweep:
 
     def steps(self, name: str, axis: int) -> tuple[int, int, int]:
         """Steps along an axis that go up and down by more than the errors, and all."""
-        step, error = np.diff(self[name], axis=axis), np.swapaxes(self._error(name), 0, axis)
-        sure = np.abs(step) > np.swapaxes(error[1:] + error[:-1], 0, axis)
-        return int((sure & (step > 0)).sum()), int((sure & (step < 0)).sum()), step.size
-
-    def _error(self, name: str) -> Array:
-        """Of the volumes and lengths that state one; UNR has as much from either of its volumes."""
-        if name == "exact_unreachability":
-            relative = self["exact_volume_error"] / self["exact_volume"]
-            return 2.0 * relative * (1.0 - self[name])
-        known = f"{name}_error" in self.numbers
-        return self[f"{name}_error"] if known else np.zeros_like(self[name])
+        stated = self.numbers.get(f"{name}_error")
+        error = 0.0 * self[name] if stated is None else np.array(stated, float)
+        if name == "exact_unreachability":  # as much from either of its volumes
+            error = 2.0 * (1.0 - self[name]) * self["exact_volume_error"] / self["exact_volume"]
+        step, error = np.diff(self[name], axis=axis), np.swapaxes(error, 0, axis)
+        bound = np.swapaxes(error[1:] + error[:-1], 0, axis)
+        return int((step > bound).sum()), int((step < -bound).sum()), step.size
 
     def rises(self, name: str, axis: int) -> str:
         """Number of steps along an axis that go up, and of those that errors leave open."""
         up, down, every = self.steps(name, axis)
-        unsure = every - up - down
-        return f"{up} of {every}" + (f" ({unsure} within the errors)" if unsure else "")
+        open_ = f" ({every - up - down} within the errors)" if up + down < every else ""
+        return f"{up} of {every}{open_}"
 
     def share(self, name: str, axis: int) -> float:
         """The share of steps that go up, of those that exceed the errors."""
