@@ -22,7 +22,7 @@ REST = np.zeros((1, 3))
 def design_tasks() -> dict[str, Task]:
     """What a design costs before its first sample."""
     import softreach as sr
-    from softreach.arm.summary import describe
+    from softreach.rod.summary import describe
     from softreach.arm.tables import tables
     from softreach.rod.free import FreeRod
 

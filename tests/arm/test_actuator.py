@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.arm.summary import design_warnings
 from softreach.arm.tables import tables
 from softreach.export import export_cloud
+from softreach.rod.summary import design_warnings
 from tests.cable import Cable
 from tests.laws import arm_of, in_box, integrated_tip
 

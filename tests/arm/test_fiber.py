@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
-from softreach.arm.summary import describe
 from softreach.rod.kinematics import tip_positions
+from softreach.rod.summary import describe
 from softreach.support.errors import InvalidInput
 from tests.laws import arm_of, arms, in_box
 

@@ -23,7 +23,7 @@ from softreach.arm import (
     describe,
 )
 from softreach.arm.loads import GRAVITY
-from softreach.arm.summary import load_number, mass
+from softreach.arm.scale import load_number, mass
 
 RUBBER = Material(young_modulus=1e5, density=1100.0)
 SOLID = Section(rings=(Ring(inner_ratio=0.7, material=RUBBER),))

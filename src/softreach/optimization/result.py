@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.optimization.objectives import Goal
 from softreach.optimization.problem import Candidate, Problem
 from softreach.requirements.checks import Check
-from softreach.requirements.findings import Finding, quick_excess
+from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
 from softreach.support.errors import SoftreachError
 from softreach.support.versions import versions
@@ -23,9 +23,22 @@ from softreach.support.versions import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Search"]
+__all__ = ["NEAR", "Restarts", "Search"]
 
 _AT_END = 1e-3  # of a range
+NEAR = 0.1
+"""Relative distance within which ends of polishes agree."""
+
+
+class Restarts(NamedTuple):
+    """Ends of polishes that meet all requirements."""
+
+    count: int
+    near: int
+    """Of them, within a tenth of the best in every objective."""
+    second: float
+    """Largest relative distance of the objectives of the end that is second nearest to the best;
+    NaN without one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -54,9 +67,28 @@ class Search:
         return self.front[0]
 
     @property
+    def verdict(self) -> Verdict:
+        """Of the best under all requirements: met, missed or undecided."""
+        if self.best.is_feasible:
+            return "undecided" if self.best.undecided else "met"
+        return "undecided" if {*self.best.missed} <= {*self.best.undecided} else "missed"
+
+    @property
     def met(self) -> bool:
         """True if the best meets all requirements."""
-        return self.best.is_feasible
+        return self.verdict == "met"
+
+    @property
+    def restarts(self) -> Restarts:
+        """Ends of polishes from designs apart, and how many of them agree with the best."""
+        ends = [each for each in self.candidates if each.designs > 1 and each.is_feasible]
+        if not (self.best.is_feasible and self.goals):
+            return Restarts(0, 0, math.nan)
+        best = np.array(self.problem.costs(self.best))
+        costs = np.array([self.problem.costs(each) for each in ends]).reshape(-1, len(best))
+        apart = (np.abs(costs - best) / np.where(best != 0.0, np.abs(best), 1.0)).max(axis=1)
+        near = np.sort(apart)[1] if len(apart) > 1 else math.nan
+        return Restarts(len(ends), int((apart <= NEAR).sum()), float(near))
 
     @property
     def arm(self) -> Manipulator:
@@ -79,13 +111,8 @@ class Search:
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """Findings of the check; of a best that bounds rule out, what they prove of it.
-
-        Empty where no such arm can exist, or nothing holds it under its loads.
-        """
+        """Findings of the check; empty where no such arm can exist, or nothing holds it."""
         try:
-            if self.best.fidelity == "bounds":
-                return quick_excess(self.arm, self.problem.requirements)
             return self.check.findings
         except SoftreachError:
             return ()

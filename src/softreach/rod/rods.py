@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.arm.scale import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.driven import DrivenRod
 from softreach.rod.free import FreeRod

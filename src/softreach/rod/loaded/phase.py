@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import load_number
+from softreach.arm.scale import load_number
 from softreach.arm.tables import both_sides, ends_over, tables
 from softreach.support.errors import InvalidInput
 

@@ -23,7 +23,7 @@ from softreach.studio.needs import (
     with_place,
     with_shortening,
 )
-from softreach.studio.scene.needs import MISSED, REACHED
+from softreach.studio.scene.needs import COLORS
 from softreach.studio.widgets import Line, number_of, show_where
 from softreach.support.errors import InvalidInput
 from softreach.support.units import LengthUnit
@@ -221,10 +221,18 @@ def _numbers(text: str, count: int) -> list[float]:
     return numbers
 
 
+_SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
+
+
 def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
     """A finding in words: a place by its gap, all else by its own text."""
-    color, sign = (REACHED, "\N{CHECK MARK}") if finding.met else (MISSED, "\N{MULTIPLICATION X}")
+    sign = _SIGNS[finding.verdict]
     text = finding.text
     if finding.kind == "reach":
         text = reach_text(check, finding)
-    return Swatch(color), f" {sign} ", Term(finding.name, finding.text), f": {text}"
+    return (
+        Swatch(COLORS[finding.verdict]),
+        f" {sign} ",
+        Term(finding.name, finding.text),
+        f": {text}",
+    )
