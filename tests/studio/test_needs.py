@@ -116,7 +116,9 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
         session.scene.axes.corners,
         atol=1e-5,
     )
-    broken = [tuple(np.asarray(node.colors).ravel()[:3]) == COLORS["missed"] for node in (inside, avoid)]
+    broken = [
+        tuple(np.asarray(node.colors).ravel()[:3]) == COLORS["missed"] for node in (inside, avoid)
+    ]
     assert broken == [False, True]
     assert "the arm keeps" in verdict(session)
     assert "inside or too near" in verdict(session)

@@ -150,7 +150,7 @@ class _Run:
     ) -> None:
         self.problem, self._designs, self._polishes = problem, designs, polishes
         self._follow, self._progress = follow, progress
-        last = polishes and bool(problem.goals)
+        last = polishes and (len(problem.goals) > 1 or problem.is_finer_on_finer_sets)
         self._kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
         self._spent = 0
         self._begun = time.perf_counter()
