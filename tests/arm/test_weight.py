@@ -20,10 +20,10 @@ from softreach.arm import (
     SampledTaper,
     Section,
     Tendon,
-    describe,
 )
 from softreach.arm.loads import GRAVITY
 from softreach.arm.scale import load_number, mass
+from softreach.rod.summary import describe
 
 RUBBER = Material(young_modulus=1e5, density=1100.0)
 SOLID = Section(rings=(Ring(inner_ratio=0.7, material=RUBBER),))

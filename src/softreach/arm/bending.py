@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import Tables, tables
+from softreach.arm.tables import tables
 
 __all__ = [
     "Extreme",
@@ -73,21 +73,19 @@ def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
     Returns:
         Least and largest bending [1/m], each of shape (station,).
     """
-    table, inputs, bounds = _affine(arm, stations)
-    center, halves = _zonogons(table, inputs, bounds)
-    start, end = _edges(table, inputs, bounds, center, halves)
-    least = np.where(_holds_origin(center, halves), 0.0, _distance_to_edges(start, end))
-    return least, _farthest(start, end)
+    center, halves, edges = _reached(arm, stations)
+    return np.where(_holds_origin(center, halves), 0.0, _distance_to_edges(*edges)), _farthest(
+        edges
+    )
 
 
 def _largest_at(arm: Manipulator, stations: Array) -> Array:
     """As `bending_at`, the largest alone [1/m]: with many bundles by far the cheaper half."""
-    table, inputs, bounds = _affine(arm, stations)
-    return _farthest(*_edges(table, inputs, bounds, *_zonogons(table, inputs, bounds)))
+    return _farthest(_reached(arm, stations)[2])
 
 
-def _farthest(*vertices: Array) -> Array:
-    return np.max([np.linalg.norm(each, axis=-1).max(axis=1) for each in vertices], axis=0)
+def _farthest(edges: tuple[Array, Array]) -> Array:
+    return np.max([np.linalg.norm(ends, axis=-1).max(axis=1) for ends in edges], axis=0)
 
 
 def largest_bending(arm: Manipulator) -> Extreme:
@@ -110,36 +108,28 @@ def smallest_bending(arm: Manipulator) -> Extreme:
     return Extreme(float(least) if least > 1e-9 * largest else 0.0, station)
 
 
-def _affine(arm: Manipulator, stations: ArrayLike) -> tuple[Tables, Array, Array]:
-    """Tables of the bundles, these by 1 and the inputs (bundle, 1 + input), and bounds of those."""
+def _reached(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array, tuple[Array, Array]]:
+    """Zonogons of (u1, u2): centers (station, 2) and half the edges (station, 1 + input, 2) [1/m].
+
+    And both ends of segments whose hull is the (κ1, κ2) reached, shape (station, edge, 2) [1/m].
+    """
     driving = Driving(arm)
-    inputs = np.column_stack([driving.offsets, driving.gains])
-    return tables(driving.law.arm, stations), inputs, np.vstack([[[1.0, 1.0]], arm.input_bounds])
-
-
-def _zonogons(table: Tables, inputs: Array, bounds: Array) -> tuple[Array, Array]:
-    """Centers, shape (station, 2), and half the edges, shape (station, 1 + input, 2) [1/m]."""
-    plane, (low, high) = table.curvature[:, :2] @ inputs, bounds.T
-    return plane @ (0.5 * (low + high)), np.swapaxes(plane * (0.5 * (high - low)), 1, 2)
-
-
-def _edges(
-    table: Tables, inputs: Array, bounds: Array, center: Array, halves: Array
-) -> tuple[Array, Array]:
-    """Ends of segments whose hull is the (κ1, κ2) reached, shape (station, edge, 2) each [1/m]."""
+    table = tables(driving.law.arm, stations)
+    inputs = np.column_stack([driving.offsets, driving.gains])  # of 1, and of each input
+    low, high = np.vstack([[[1.0, 1.0]], arm.input_bounds]).T
+    mean, half = 0.5 * (low + high), 0.5 * (high - low)
+    plane, rates = table.curvature[:, :2] @ inputs, table.extension @ inputs
+    center, halves = plane @ mean, np.swapaxes(plane * half, 1, 2)
     if table.growth is table.extension:
         vertices = _vertices(center, halves)
-        return vertices, np.roll(vertices, -1, axis=1)
-    (low, high), rates = bounds.T, table.extension @ inputs
-    moving = np.flatnonzero(high > low)
+        return center, halves, (vertices, np.roll(vertices, -1, axis=1))
+    moving = np.flatnonzero(half)
     signs = 2.0 * np.indices((2,) * len(moving)).reshape(len(moving), -1) - 1.0
-    middle, half = rates @ (0.5 * (low + high)), (rates * (0.5 * (high - low)))[:, moving]
     seen = center[:, None] + np.einsum("smc,mv->svc", halves[:, moving], signs)
-    seen /= (1.0 + middle[:, None] + half @ signs)[..., None]
-    first, second = np.arange(signs.shape[1]), 1 << np.arange(len(moving))[::-1, None]
-    pairs = [np.stack([first, first ^ step]) for step in second] or [np.stack([first, first])]
-    start, end = np.concatenate(pairs, axis=1)
-    return seen[:, start], seen[:, end]
+    seen /= (1.0 + (rates @ mean)[:, None] + (rates * half)[:, moving] @ signs)[..., None]
+    first, steps = np.arange(signs.shape[1]), 1 << np.arange(len(moving))
+    pairs = np.concatenate([np.stack([first, first ^ step]) for step in (0, *steps)], axis=1)
+    return center, halves, (seen[:, pairs[0]], seen[:, pairs[1]])
 
 
 def _vertices(center: Array, halves: Array) -> Array:

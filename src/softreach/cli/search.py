@@ -193,7 +193,7 @@ def _record(result: Search, out: Path) -> dict[str, Any]:
     return {
         "met": result.met,
         "verdict": result.verdict,
-        "restarts": result.restarts._asdict(),
+        "restarts": result.restarts,
         "designs": result.designs,
         "judged": result.judged,
         "seconds": result.seconds,

@@ -128,12 +128,9 @@ class Problem:
         return DesignCase(self.parameters.arm(values), self.requirements, accuracy, fine)
 
     def judge(self, values: Values, *, fine: bool = False, bounds: bool = True) -> Candidate:
-        """A design against all requirements and goals.
+        """A design against all requirements and goals; first by bounds, which cost next to nothing.
 
-        Args:
-            values: Its free parameters.
-            fine: Whether to the accuracy that is reported, instead of on coarse sets.
-            bounds: Whether bounds, which cost next to nothing, may discard it before.
+        Bounds discard a design only where it is not judged `fine`.
         """
         try:
             case = self.case(values, self.accuracy if fine else self.coarse)
@@ -176,8 +173,7 @@ class Problem:
     def score(self, candidate: Candidate) -> Score:
         """Place among others: what is missed first, then the only goal."""
         if not candidate.is_feasible:
-            is_bound = candidate.fidelity == "bounds"
-            return Score(is_bound, candidate.excess or math.inf, 0.0)
+            return Score(candidate.fidelity == "bounds", candidate.excess or math.inf, 0.0)
         return Score(False, 0.0, self.costs(candidate)[0] if self.goals else 0.0)
 
     def front(self, candidates: Iterable[Candidate]) -> list[Candidate]:

@@ -167,14 +167,10 @@ def remarks(search: Search) -> Iterator[str]:
 
 def _how_sure(search: Search) -> Iterator[str]:
     """Agreement of polishes from designs apart, whose spread is that of searches by other seeds."""
-    count, near, second = search.restarts
-    if not (search.goals and search.best.is_feasible):
-        return
-    if not count:
-        yield "how sure: no restart was polished, so that other seeds may end elsewhere"
-    elif near > 1:
-        yield f"how sure: {near} of {counted(count, 'restart')} ended within {100 * NEAR:g} %"
-    else:
-        others = f", the next {100 * second:.0f} % off" if math.isfinite(second) else ""
-        share = f"{near} of {counted(count, 'restart')} ended within {100 * NEAR:g} %{others}"
-        yield f"how sure: {share}: other seeds may find better designs; allow for more designs"
+    count, near = search.restarts
+    if search.goals and search.best.is_feasible:
+        text = (
+            f"how sure: {near} of {counted(count, 'restart')} ended within {100 * NEAR:g} % of it"
+        )
+        doubt = "" if near > 1 else ": other seeds may find better designs; allow for more designs"
+        yield text + doubt

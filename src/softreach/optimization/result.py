@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,22 +23,11 @@ from softreach.support.versions import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NEAR", "Restarts", "Search"]
+__all__ = ["NEAR", "Search"]
 
 _AT_END = 1e-3  # of a range
 NEAR = 0.1
 """Relative distance within which ends of polishes agree."""
-
-
-class Restarts(NamedTuple):
-    """Ends of polishes that meet all requirements."""
-
-    count: int
-    near: int
-    """Of them, within a tenth of the best in every objective."""
-    second: float
-    """Largest relative distance of the objectives of the end that is second nearest to the best;
-    NaN without one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -79,16 +68,14 @@ class Search:
         return self.verdict == "met"
 
     @property
-    def restarts(self) -> Restarts:
-        """Ends of polishes from designs apart, and how many of them agree with the best."""
-        ends = [each for each in self.candidates if each.designs > 1 and each.is_feasible]
-        if not (self.best.is_feasible and self.goals):
-            return Restarts(0, 0, math.nan)
+    def restarts(self) -> tuple[int, int]:
+        """Polishes from designs apart that meet all, and those within a tenth of the best."""
+        if not (self.goals and self.best.is_feasible):
+            return 0, 0
         best = np.array(self.problem.costs(self.best))
-        costs = np.array([self.problem.costs(each) for each in ends]).reshape(-1, len(best))
-        apart = (np.abs(costs - best) / np.where(best != 0.0, np.abs(best), 1.0)).max(axis=1)
-        near = np.sort(apart)[1] if len(apart) > 1 else math.nan
-        return Restarts(len(ends), int((apart <= NEAR).sum()), float(near))
+        ends = [each for each in self.candidates if each.designs > 1 and each.is_feasible]
+        apart = [np.abs(np.array(self.problem.costs(each)) - best) for each in ends]
+        return len(ends), sum(bool((each <= NEAR * np.abs(best)).all()) for each in apart)
 
     @property
     def arm(self) -> Manipulator:

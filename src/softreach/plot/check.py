@@ -103,9 +103,8 @@ def plot_check(
         draw_arms(panel, arm, shapes, range(arm.bundles), _FADE)
         for kind, each in lines.items():
             style = {"linewidth": 0.9, **_REGIONS[kind]}
-            words = {finding.verdict for finding in check.findings if finding.kind == kind}
-            for word in sorted(words - {"met"}):
-                style["label"] = f"{style['label']}: {word}"
+            words = {each.verdict for each in check.findings if each.kind == kind} - {"met"}
+            style["label"] = ": ".join([str(style["label"]), *sorted(words)])
             _draw_lines(panel, each, style)
         _draw_places(panel, check)
         if panel.ax.get_legend_handles_labels()[1]:

@@ -49,11 +49,7 @@ class BendingRange(NamedTuple):
 def bending_over_bounds(arm: Manipulator) -> BendingRange:
     """Range of bending over all inputs within the bounds, under the loads of the arm.
 
-    Exact for arms without loads whose strains are affine in the inputs: `arm.bending`. Of others,
-    with loads, tendons driven by length, dead zones, or fibers beside forces, by `worst_inputs`.
-
-    Args:
-        arm: The design.
+    Exact where `has_exact_bending`, else by `worst_inputs`.
 
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
@@ -87,8 +83,7 @@ def worst_inputs(
 ) -> tuple[Array, Array]:
     """The inputs within the bounds at which each of some measures is largest, by search.
 
-    Samples, corners and faces of the box, then the neighborhood of the worst, ever closer. It
-    proves nothing.
+    Samples, corners and faces of the box, then the neighborhood of the worst: it proves nothing.
 
     Args:
         rod: The tip map.

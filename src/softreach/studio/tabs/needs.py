@@ -226,13 +226,8 @@ _SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided"
 
 def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
     """A finding in words: a place by its gap, all else by its own text."""
-    sign = _SIGNS[finding.verdict]
+    mark, sign = Swatch(COLORS[finding.verdict]), _SIGNS[finding.verdict]
     text = finding.text
     if finding.kind == "reach":
         text = reach_text(check, finding)
-    return (
-        Swatch(COLORS[finding.verdict]),
-        f" {sign} ",
-        Term(finding.name, finding.text),
-        f": {text}",
-    )
+    return mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"
