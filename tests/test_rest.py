@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm.scale import load_number
+from softreach.arm.load_number import load_number
 from softreach.rest import rest
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipStatus

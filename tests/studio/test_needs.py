@@ -129,7 +129,7 @@ def test_what_quick_poses_miss_is_looked_at_again(session, monkeypatch):
 
     def blind(*arguments):
         made = plain(*arguments)
-        wrong = tuple(dataclasses.replace(each, met=False) for each in made.findings)
+        wrong = tuple(dataclasses.replace(each, verdict="missed") for each in made.findings)
         return dataclasses.replace(made, findings=wrong, gaps=made.gaps + 0.1)
 
     monkeypatch.setattr(jobs, "quick_check", blind)

@@ -280,7 +280,7 @@ def _payload(case: DesignCase) -> Value:
 
 
 def _mass(case: DesignCase) -> Value:
-    from softreach.arm.scale import mass
+    from softreach.arm.load_number import mass
 
     value = mass(case.arm)
     return Value(math.nan if value is None else value, 0.0)

@@ -19,7 +19,10 @@ from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
 from softreach.support.errors import InvalidDesign, InvalidInput
 
-__all__ = ["Candidate", "Fidelity", "Problem"]
+__all__ = ["NEAR", "Candidate", "Fidelity", "Problem"]
+
+NEAR = 0.1
+"""Relative distance within which objectives at the ends of polishes agree."""
 
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from softreach.optimization.free_parameters import FreeParameter
 from softreach.optimization.objectives import Goal, Value
-from softreach.optimization.problem import Candidate
-from softreach.optimization.result import NEAR
+from softreach.optimization.problem import NEAR, Candidate
 from softreach.support.errors import counted
 from softreach.support.quantity import columns, quantity
 from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit

@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.optimization.objectives import Goal
-from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.problem import NEAR, Candidate, Problem
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
@@ -23,11 +23,9 @@ from softreach.support.versions import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NEAR", "Search"]
+__all__ = ["Search"]
 
 _AT_END = 1e-3  # of a range
-NEAR = 0.1
-"""Relative distance within which ends of polishes agree."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.lines import line_strains
-from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.scale import (
+from softreach.arm.load_number import (
     VERIFIED_LOAD_NUMBER,
     is_overloaded,
     load_number,
     load_number_faults,
     mass,
-    scale_warnings,
 )
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
 from softreach.rod.bending import bending_over_bounds
