@@ -22,9 +22,9 @@ REST = np.zeros((1, 3))
 def design_tasks() -> dict[str, Task]:
     """What a design costs before its first sample."""
     import softreach as sr
-    from softreach.arm.summary import describe
     from softreach.arm.tables import tables
     from softreach.rod.free import FreeRod
+    from softreach.rod.summary import describe
 
     trunks = [_trunk(o, p) for o in (36, 75, 108) for p in (0, 2, 3)]
     stations = np.linspace(0.0, 1.0, 101)

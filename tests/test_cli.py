@@ -15,10 +15,10 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed
-from softreach.arm.summary import describe
 from softreach.cli.app import app, run
 from softreach.cli.changes import Changes
 from softreach.cli.console import console
+from softreach.rod.summary import describe
 
 # Few samples make the α-shape too fine; the command line prints that and goes on.
 pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")

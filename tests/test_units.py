@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach import export, plot
 from softreach.arm.scale import scale_warnings
-from softreach.arm.summary import design_warnings
 from softreach.cli.app import run
+from softreach.rod.summary import design_warnings
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
 from softreach.support.quantity import quantity, read_quantity, unit_names
 from softreach.support.units import UNITS, as_unit, lengths_in, read_length

@@ -25,7 +25,6 @@ from .arm import Ring as Ring
 from .arm import SampledTaper as SampledTaper
 from .arm import Section as Section
 from .arm import Tendon as Tendon
-from .arm import describe as describe
 from .arm import designs as designs
 from .atlas import DesignSpace as DesignSpace
 from .atlas import build_atlas as build_atlas
@@ -49,6 +48,7 @@ from .optimization import search as search
 from .requirements import Requirements as Requirements
 from .requirements import check as check
 from .rod import configuration as configuration
+from .rod import describe as describe
 from .rod import equilibria as equilibria
 from .rod import tip_jacobian as tip_jacobian
 from .rod import tip_positions as tip_positions

@@ -23,11 +23,11 @@ from softreach.arm import (
     parameters,
 )
 from softreach.arm.parameters import changed
-from softreach.arm.summary import design_warnings
 from softreach.arm.tables import tables
 from softreach.cli.app import run
 from softreach.export import export_cloud
 from softreach.rod.rods import tip_map
+from softreach.rod.summary import design_warnings
 from softreach.support.errors import InvalidDesign
 from tests.cable import Cable
 from tests.laws import arm_of, in_box, integrated_tip

@@ -20,8 +20,8 @@ from softreach.arm import (
     Section,
     Tendon,
 )
-from softreach.arm.summary import design_warnings
 from softreach.arm.tables import check_extension, tables
+from softreach.rod.summary import design_warnings
 from softreach.support.errors import InvalidDesign
 from tests.kinds import any_arms, layers_at
 from tests.oracles.sections import disc, pressure_load, stiffness

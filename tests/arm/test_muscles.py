@@ -23,9 +23,9 @@ from softreach.arm import (
     designs,
 )
 from softreach.arm.along import AlongArm
-from softreach.arm.summary import describe
 from softreach.arm.tables import tables
 from softreach.rod.kinematics import tip_positions
+from softreach.rod.summary import describe
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.kinds import any_arms, layers_at
 from tests.laws import arm_of, arms, in_box

@@ -32,8 +32,11 @@ from softreach.arm.bending import (
     sharpest_bending,
     smallest_bending,
 )
-from softreach.arm.summary import describe, design_warnings
 from softreach.arm.tables import check_extension, extension_range, tables
+from softreach.requirements import Limits, Requirements
+from softreach.rod.bending import bending_over_bounds
+from softreach.rod.rods import tip_map
+from softreach.rod.summary import describe, design_warnings
 from softreach.support.errors import InvalidDesign
 from tests.laws import arm_of, arms, in_box, single
 
@@ -173,6 +176,7 @@ def test_the_summary_of_twice_as_many_bundles_costs_twice_as_much(trunk, monkeyp
         arm = trunk.split("longitudinal", count)
         arm = arm.with_bounds((-0.01, 0.0))
         asked.clear()
+        bending_over_bounds.cache_clear()
         describe(arm)
         return len(asked)
 
@@ -446,3 +450,74 @@ def test_steep_and_shallow_fibers_in_one_array_do_not_see_each_other():
     together = ring_integrals(0.0, 0.05, alpha, 0.5)
     alone = [ring_integrals(0.0, 0.05, one, 0.5) for one in alpha]
     np.testing.assert_array_equal(together, np.transpose(alone))
+
+
+def of_tendons(kind=sr.Tendon, **changes):
+    """A soft rod of 0.3 m with three cables at 8 mm from its axis, beyond 1 mm of it or within."""
+    soft = sr.Material(young_modulus=1e5, density=1000.0, poisson_ratio=0.49)
+    return sr.Manipulator(
+        profile=sr.LinearTaper(length=0.3, outer_radius=0.01),
+        section=sr.arm.Section(core=soft, rings=(sr.Ring(inner_ratio=0.5, material=soft),)),
+        actuators=(kind(bundles=3, distance=0.008, **changes),),
+    )
+
+
+def sharpness(arm, gamma):
+    """Largest κ R2 of a pose by second differences of its centerline."""
+    shape = sr.configuration(arm, [gamma], 2001)
+    steps = np.diff(shape.position.values[0], axis=0)
+    sizes = np.linalg.norm(steps, axis=1)
+    turns = np.linalg.norm(np.diff(steps / sizes[:, None], axis=0), axis=1)
+    return float((turns / (0.5 * (sizes[1:] + sizes[:-1]))).max()) * 0.01
+
+
+def pulled(count):
+    """That rod by so many inputs: tensions without balance, two of them perhaps of one input."""
+    arm = of_tendons(activation_bounds=((1.5, 3.0), (0.0, 0.5), (0.0, 0.5)))
+    arm = arm.replace(rest=sr.arm.RestShape(curvature_x=2.0))
+    names = arm.bundle_names
+    drive = sr.arm.Drive.antagonists("b", *names[:2], bounds=(0.1, 0.7), offset=1.0, gain=1.2)
+    return arm.replace(drives=(drive,)) if count == 2 else arm
+
+
+@pytest.mark.parametrize(
+    ("arm", "poses", "exact"),
+    [
+        (of_tendons(activation_bounds=(0, 4)), itertools.product((0, 4), repeat=3), True),
+        (
+            of_tendons(sr.arm.LengthTendon, activation_bounds=(0, 0.03)),
+            itertools.product((0, 0.015, 0.03), repeat=3),
+            False,
+        ),
+        (
+            of_tendons(activation_bounds=(0, 0.05)).replace(
+                base=sr.Base(points="x"), loads=sr.Loads(gravity=(0, 0, -2.0))
+            ),
+            [(0, 0, 0), (0.05, 0, 0), (0, 0.05, 0.05)],
+            False,
+        ),
+    ],
+    ids=["tensions", "lengths", "loads"],
+)
+def test_bending_over_bounds_is_that_of_the_centerlines_whatever_drives_or_loads(arm, poses, exact):
+    found = bending_over_bounds(arm)
+    most = max(sharpness(arm, pose) for pose in poses)
+    assert found.exact is exact
+    assert most * (1 - 1e-5) <= found.sharpest.value <= most * (1.00001 if exact else 1.02)
+    assert found.largest == pytest.approx(found.sharpest.value / 0.01)
+    (finding,) = sr.check(arm, Requirements(limits=Limits(bending=0.95 * most))).findings
+    assert finding.verdict == "missed"
+
+
+@given(count=st.sampled_from([2, 3]), seed=st.integers(0, 99))
+def test_no_pose_of_forces_bends_more_or_less_than_the_exact_range(count, seed):
+    arm = pulled(count)
+    z = np.linspace(0, arm.length, 4)
+    least, most = bending_at(arm, z)
+    gamma = np.random.default_rng(seed).uniform(*arm.input_bounds.T, (500, arm.inputs))
+    curvature = tip_map(arm).strains(gamma, z).curvature
+    kappa = np.hypot(curvature[..., 0], curvature[..., 1])
+    assert (kappa.max(axis=0) <= most * (1 + 1e-9)).all()
+    assert (kappa.min(axis=0) >= least * (1 - 1e-9)).all()
+    assert (0.8 * most < kappa.max(axis=0)).all()
+    assert (kappa.min(axis=0) < 1.4 * least).all()

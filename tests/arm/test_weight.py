@@ -23,12 +23,12 @@ from softreach.arm import (
     Samples,
     Section,
     Tendon,
-    describe,
 )
+from softreach.arm.load_number import load_number, mass
 from softreach.arm.loads import GRAVITY
 from softreach.arm.parameters import changed, parameters
-from softreach.arm.summary import load_number, mass
 from softreach.arm.tables import compliance, tables
+from softreach.rod.summary import describe
 from softreach.support.errors import InvalidDesign
 
 RUBBER = Material(young_modulus=1e5, density=1100.0)
@@ -189,20 +189,20 @@ def test_without_moduli_and_densities_both_are_asked_for(trunk):
 
 
 def test_the_range_of_each_activation_alone_is_that_of_the_closed_form():
-    """A parallel tendon: ζ = 1 - τ/K0 and |κ| = τ d/K1."""
+    """A parallel tendon: ζ = 1 - τ/K0, and κ = τ d/(K1 ζ) of the centerline, which is shorter."""
     facts = describe(arm())
     tension, distance = 0.01, 0.8 * 0.012
     k0, k1 = 1e5 * math.pi * 0.012**2, 1e5 * math.pi / 4 * 0.012**4
     np.testing.assert_allclose(facts.bundle_extension, [[1 - tension / k0, 1.0]], rtol=1e-12)
-    np.testing.assert_allclose(
-        facts.bundle_bending, [[0.0, tension * distance / k1 * 0.012]], rtol=1e-9
-    )
+    kappa = tension * distance / k1 / (1 - tension / k0)
+    np.testing.assert_allclose(facts.bundle_bending, [[0.0, kappa * 0.012]], rtol=1e-9)
 
 
 def test_an_activation_that_never_rests_has_a_least_bending_of_its_own():
     tight = arm().with_bounds((0.005, 0.01))
     least, largest = describe(tight).bundle_bending[0]
-    assert least == pytest.approx(largest / 2)
+    k0 = 1e5 * math.pi * 0.012**2
+    assert least == pytest.approx(largest / 2 * (1 - 0.01 / k0) / (1 - 0.005 / k0))
 
 
 def test_a_summary_says_where_the_law_of_each_kind_ends_once():

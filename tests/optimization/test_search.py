@@ -48,6 +48,10 @@ def test_the_best_is_the_first_that_no_other_beats_and_meets_all(alone):
     assert best >= max(each.objectives[0].value for each in alone.candidates if each.is_feasible)
     assert alone.judged["bounds"] == sum(bool(each.missed) for each in alone.candidates) > 0
     assert all(each.fidelity == "full" for each in alone.finalists)
+    ends = [each for each in alone.candidates if each.designs > 1 and each.is_feasible]
+    near = [end for end in ends if abs(end.objectives[0].value / best - 1.0) <= 0.1]
+    assert alone.restarts == (len(ends), len(near))
+    assert f"how sure: {len(near)} of {len(ends)} restart" in repr(alone)
 
 
 @pytest.mark.parametrize("threads", ["1", "3"])
@@ -175,12 +179,24 @@ def test_without_an_objective_it_ends_with_the_first_design_that_meets_all():
     assert sr.describe(search.arm).mass <= 5.0
 
 
-def test_what_no_design_reaches_is_proved_by_bounds_and_said():
+def test_what_no_design_reaches_is_proved_by_bounds_and_judged_in_full():
     far = Requirements(targets=(Target([[0, 0, 2.0]], name="moon"),), limits=Limits(mass=100.0))
     search = sr.search(ARM, FREE, far, minimize="mass", polish=False, **FAST)
     assert not search.met
     assert search.judged["bounds"] == len(search.candidates)
-    assert "MISSED  moon: 1 m farther from the base" in repr(search).replace("0.999999", "1")
+    assert search.best.fidelity == "full"  # what bounds prove is less than what is missed
+    assert search.best.excess == sr.check(search.arm, far, accuracy=0.1).excess
+    assert "MISSED  moon: 0 of 1 place reached" in repr(search)
+
+
+def test_bounds_discard_designs_and_the_best_misses_least_of_all_judged_in_full():
+    """A bound of 0.04 is no better than a design that misses 0.058."""
+    needs = Requirements(targets=(Target([[0.0, 0.75, 0.75]], within=1e-3),))
+    free = {"length": (0.6, 1.1)}
+    search = sr.search(ARM, free, needs, minimize="mass", designs=8, polish=False, accuracy=0.2)
+    assert search.judged["bounds"] > 0
+    arms = [search.problem.parameters.arm(each.values) for each in search.candidates]
+    assert search.best.excess == min(sr.check(arm, needs, accuracy=0.2).excess for arm in arms)
 
 
 def test_ties_follow_what_they_are_tied_to():

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import brentq
 
 from softreach.arm import Material, designs
+from softreach.arm.load_number import mass
 from softreach.arm.parameters import changed, find_parameter
-from softreach.arm.summary import mass
 from softreach.optimization import sensitivity
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.objectives import DesignCase, Goal, Objective, Value, goals

@@ -65,6 +65,7 @@ def test_a_finding_is_met_where_its_excess_is_zero_and_the_check_where_all_are()
     )
     check = checked(**needs)
     for finding in check.findings:
+        assert finding.verdict in ("met", "missed")
         assert finding.met == (finding.excess == 0.0)
         assert np.isfinite(finding.excess)
     verdicts = {finding.name: finding.met for finding in check.findings}
@@ -296,3 +297,73 @@ def test_what_lies_between_the_stations_is_within_the_stated_error(keep):
         seen, bound = Body.of(rod, poses, parts).missed(keep, rows)
         assert (seen <= fine + 1e-6).all()  # the error of places
         assert (fine <= bound + 1e-6).all()
+
+
+def test_a_margin_smaller_than_its_own_error_is_undecided():
+    reached = sr.reachable_set(ARM, accuracy=0.05)
+    volume, error = reached.volume, reached.volume_error
+    for shift, verdict in ((-2.0, "met"), (-0.5, "undecided"), (0.5, "undecided"), (2.0, "missed")):
+        needs = Requirements(measures={"exact_volume": (volume + shift * error, None)})
+        check = sr.check(ARM, needs, accuracy=0.05)
+        assert check.findings[0].verdict == check.verdict == verdict
+        assert check.met == (verdict == "met")
+    # The whole of a region is covered where every place of it is that was tried.
+    share = checked(targets=[Target(region=Sphere((0.3, 0.0, 0.6), 0.05))]).findings[0]
+    assert share.met
+    half = Target(region=Sphere((0.3, 0.0, 0.6), 0.5))
+    (coverage,) = checked(targets=[half]).coverages
+    near = Target(region=half.region, share=coverage.share - 0.5 * coverage.error)
+    assert checked(targets=[near]).verdict == "undecided"
+
+
+def test_what_an_arm_may_touch_between_its_stations_is_undecided():
+    ball, target = Sphere((0.4, 0.1, 0.4), 0.1), Target(TIPS[:1], within=3.0)
+
+    def kept(clearance):
+        return checked(targets=[target], keeps=[Keep(ball, False, clearance=clearance)]).findings[1]
+
+    gap = 1.0 - ARM.length * kept(1.0).excess
+    for clearance, verdict in (
+        (0.5 * gap, "met"),
+        (gap - 1e-6, "undecided"),
+        (1.1 * gap, "missed"),
+    ):
+        assert kept(clearance).verdict == verdict
+        assert (kept(clearance).excess > 0.0) == (verdict == "missed")
+
+
+def test_an_arm_keeps_as_clear_as_the_disks_that_hold_its_tendons():
+    wire = sr.designs.three_tendon_robot()
+    (ratio,) = np.unique(wire.outline([0.0]).outer_ratio.round(9))
+    disks = ratio * float(wire.profile.radius(0.0))
+    assert disks > 10 * wire.profile.radius(0.0)
+    at_rest = Target([[0.0, 0.0, wire.length]], within=1e-3 * wire.length)
+    for spare in (0.3, -0.3):
+        wall = HalfSpace(((1.0 + spare) * disks, 0.0, 0.0), (-1.0, 0.0, 0.0))
+        finding = checked(wire, targets=[at_rest], keeps=[Keep(wall, False)]).findings[-1]
+        assert finding.met == (spare > 0)
+        assert finding.excess == pytest.approx(max(-spare, 0.0) * disks / wire.length, abs=2e-4)
+
+
+def test_a_measure_of_a_cloud_has_an_error_that_holds_the_exact_value():
+    volume = sr.reachable_set(ARM, accuracy=0.01).convex_volume
+    for ends, verdict in (((volume, None), "undecided"), ((1.05 * volume, None), "missed")):
+        assert checked(measures={"convex_volume": ends}).verdict == verdict
+
+
+def test_requirements_that_ask_for_nothing_are_refused():
+    for needs in (Requirements(), Requirements(payloads=[0.1])):
+        with pytest.raises(sr.InvalidInput, match="requirements = nothing that an arm could miss"):
+            sr.check(ARM, needs)
+
+
+def test_a_check_passes_on_what_sets_warn_of(monkeypatch):
+    from softreach.requirements import checks
+    from softreach.support.errors import SoftreachWarning, warn
+
+    made = checks.reachable_set
+    monkeypatch.setattr(checks, "reachable_set", lambda *a, **k: warn("rough") or made(*a, **k))
+    needs = Requirements(measures={"exact_volume": (0.1, None)})
+    with pytest.warns(SoftreachWarning, match="rough"):
+        sr.check(ARM, needs, accuracy=0.1)
+    checks.quick_check(ARM, needs, 0.1)  # on the way of a search nothing is said

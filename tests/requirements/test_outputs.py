@@ -25,12 +25,15 @@ def needs(tmp_path, monkeypatch):
     return "needs.toml"
 
 
-def test_the_exit_code_says_met_missed_or_wrong(needs, capsys):
+def test_the_exit_code_says_met_missed_undecided_or_wrong(needs, capsys):
     assert run(["check", "minimal_trunk", needs]) == 0
     assert "met     shelf  1 place reached" in capsys.readouterr().out
     Path("far.toml").write_text("[[reach]]\nplaces_m = [[2.0, 0, 0]]\n")
     assert run(["check", "minimal_trunk", "far.toml", "--unit", "mm"]) == 1
     assert "place 1 at (2000, 0, 0) mm is missed by" in capsys.readouterr().out
+    Path("half.toml").write_text("[measures]\nconvex_volume = { at_least = 1.00477 }\n")
+    assert run(["check", "minimal_trunk", "half.toml"]) == 3
+    assert "UNDECIDED  convex_volume" in capsys.readouterr().out
     assert run(["check", "minimal_trunk", "none.toml"]) == 2
     Path("bad.toml").write_text("[[reach]]\nplaces = 3\n[limit]\n")
     assert run(["check", "minimal_trunk", "bad.toml"]) == 2

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softreach as sr
-from softreach.arm import describe, designs
+from softreach.arm import designs
 from softreach.arm.tables import tables
 from softreach.kernels.rod import reference
 from softreach.rod.free import FreeRod
@@ -50,7 +50,7 @@ def test_a_single_helical_fiber_without_taper_makes_a_circular_helix(revolution)
     arm = single(revolution)
     shape = sr.configuration(arm, [-0.9], stations=401, tol=1e-12)
     bend = np.hypot(*shape.curvature.values[:, :2].T)
-    zeta, tangent = float(shape.extension[0]), np.tan(describe(arm).helical_angles[0])
+    zeta, tangent = float(shape.extension[0]), np.tan(sr.describe(arm).helical_angles[0])
     # Torsion: u3 plus the turning of (u1, u2) in the cross-section, per activated arclength.
     torsion = float(shape.curvature[0, 2]) + tangent / (zeta * arm.profile.outer_radius)
     d = np.gradient(shape.position.values, zeta * shape.Z.values, axis=0, edge_order=2)

@@ -18,7 +18,7 @@ from softreach.rod.kinematics import tip_positions
 from softreach.studio import Studio
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.needs import requirements_of
-from softreach.studio.scene.needs import MISSED
+from softreach.studio.scene.needs import COLORS
 from softreach.studio.session import Session
 from softreach.studio.tabs.needs import NeedsPanel
 from softreach.support.errors import SoftreachError
@@ -116,7 +116,9 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
         session.scene.axes.corners,
         atol=1e-5,
     )
-    broken = [tuple(np.asarray(node.colors).ravel()[:3]) == MISSED for node in (inside, avoid)]
+    broken = [
+        tuple(np.asarray(node.colors).ravel()[:3]) == COLORS["missed"] for node in (inside, avoid)
+    ]
     assert broken == [False, True]
     assert "the arm keeps" in verdict(session)
     assert "inside or too near" in verdict(session)
@@ -127,7 +129,7 @@ def test_what_quick_poses_miss_is_looked_at_again(session, monkeypatch):
 
     def blind(*arguments):
         made = plain(*arguments)
-        wrong = tuple(dataclasses.replace(each, met=False) for each in made.findings)
+        wrong = tuple(dataclasses.replace(each, verdict="missed") for each in made.findings)
         return dataclasses.replace(made, findings=wrong, gaps=made.gaps + 0.1)
 
     monkeypatch.setattr(jobs, "quick_check", blind)

@@ -27,14 +27,12 @@ from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledT
 from softreach.arm.rest_shape import RestShape
 from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Layer, Ring, Section, Stiffness
-from softreach.arm.summary import DesignSummary, describe
 
 __all__ = [
     "Actuator",
     "AlongArm",
     "Base",
     "Chamber",
-    "DesignSummary",
     "Drive",
     "FiberArchitecture",
     "Layer",
@@ -63,7 +61,6 @@ __all__ = [
     "SectorActuator",
     "Stiffness",
     "Tendon",
-    "describe",
     "designs",
     "limit_shortening",
     "line_lengths",

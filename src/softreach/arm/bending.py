@@ -1,7 +1,10 @@
-"""Extremes of bending in the activation box, exact: at stations and along the arm.
+"""Extremes of bending κ over the bounds of an arm, exact: at stations and along the arm.
 
-At one station the reachable (u1, u2) are a zonogon, the image of the activation box. Its farthest
-vertex and its nearest point to the origin are the range of bending there.
+κ is the curvature of the centerline as it is, |u| η/ζ of theory (7) and (45). Fibers and muscles
+have η = ζ: the (u1, u2) that they reach at a station are a zonogon, the image of the box of inputs.
+Forces have η = 1: they reach a polygon, the box seen from ζ = 0, whose vertices and edges are those
+of corners and edges of the box. The farthest vertex and the point nearest to the origin are the
+range.
 """
 
 from __future__ import annotations
@@ -13,10 +16,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 
-__all__ = ["Extreme", "bending_at", "largest_bending", "sharpest_bending", "smallest_bending"]
+__all__ = [
+    "Extreme",
+    "bending_at",
+    "bending_stations",
+    "has_exact_bending",
+    "largest_bending",
+    "sharpest_bending",
+    "smallest_bending",
+]
 
 Array = NDArray[np.float64]
 
@@ -26,6 +38,7 @@ _FEWEST = 9  # stations between two breakpoints
 _BRACKETS = 16
 _POINTS = 17  # into which a bracket is divided, again and again
 _ROUNDS = 10  # each narrows a bracket eightfold
+_MOST_INPUTS = 8  # of which all corners are looked at
 
 
 class Extreme(NamedTuple):
@@ -37,64 +50,86 @@ class Extreme(NamedTuple):
     """The first Z where it is reached [m]."""
 
 
+def has_exact_bending(arm: Manipulator) -> bool:
+    """True if the functions below hold: no loads, strains that are affine in the inputs.
+
+    And fibers and muscles alone, or forces alone by at most eight inputs.
+    """
+    driving = Driving(arm)
+    if arm.loads is not None or not driving.is_affine:
+        return False
+    forces = [actuator.is_force for actuator in driving.law.arm.bundle_actuators[: arm.bundles]]
+    moving = int(np.ptp(arm.input_bounds, axis=1).astype(bool).sum())
+    return not any(forces) or (all(forces) and moving <= _MOST_INPUTS)
+
+
 def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
-    """Least and largest bending √(u1² + u2²), theory (45) with u of (7), of the activation box.
+    """Least and largest bending κ = √(u1² + u2²) η/ζ, theory (45), within the bounds.
 
     Args:
-        arm: The design.
+        arm: A design that `has_exact_bending`.
         stations: Z [m], shape (station,).
 
     Returns:
         Least and largest bending [1/m], each of shape (station,).
     """
-    arm = arm.inner
-    center, halves = _zonogons(arm, stations)
-    if not arm.bundles:
-        return np.zeros(len(center)), np.zeros(len(center))
-    vertices = _vertices(center, halves)
-    edge = _distance_to_edges(vertices)
-    return np.where(_holds_origin(center, halves), 0.0, edge), _farthest(vertices)
+    center, halves, edges = _reached(arm, stations)
+    return np.where(_holds_origin(center, halves), 0.0, _distance_to_edges(*edges)), _farthest(
+        edges
+    )
 
 
 def _largest_at(arm: Manipulator, stations: Array) -> Array:
     """As `bending_at`, the largest alone [1/m]: with many bundles by far the cheaper half."""
-    center, halves = _zonogons(arm, stations)
-    return _farthest(_vertices(center, halves)) if arm.bundles else np.zeros(len(center))
+    return _farthest(_reached(arm, stations)[2])
 
 
-def _farthest(vertices: Array) -> Array:
-    return np.linalg.norm(vertices, axis=-1).max(axis=1)
+def _farthest(edges: tuple[Array, Array]) -> Array:
+    return np.max([np.linalg.norm(ends, axis=-1).max(axis=1) for ends in edges], axis=0)
 
 
 def largest_bending(arm: Manipulator) -> Extreme:
-    """The largest bending [1/m] in the box and along the arm, to 1e-9 of it."""
-    arm = arm.inner
+    """The largest bending [1/m] within the bounds and along the arm, to 1e-9 of it."""
     return _largest(arm, lambda z: _largest_at(arm, z))
 
 
 def sharpest_bending(arm: Manipulator) -> Extreme:
     """The largest bending times R2(Z) [-]: the inner side folds where it is 1 or more."""
-    arm = arm.inner
     return _largest(arm, lambda z: _largest_at(arm, z) * arm.profile.radius(z))
 
 
 def smallest_bending(arm: Manipulator) -> Extreme:
     """The least bending [1/m] in the box and along the arm; 0 below 1e-9 of the largest there."""
-    arm = arm.inner
-    low, high = arm.bounds.T
-    if (low <= 0).all() and (high >= 0).all():
+    low, high = arm.input_bounds.T
+    if not Driving(arm).offsets.any() and (low <= 0).all() and (high >= 0).all():
         return Extreme(0.0, 0.0)
     station = _largest(arm, lambda z: -bending_at(arm, z)[0]).station
     (least,), (largest,) = bending_at(arm, station)
     return Extreme(float(least) if least > 1e-9 * largest else 0.0, station)
 
 
-def _zonogons(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
-    """Centers, shape (station, 2), and half the edges, shape (station, bundle, 2) [1/m]."""
-    plane = tables(arm, stations).curvature[:, :2]
-    low, high = arm.bounds.T
-    center = plane @ (0.5 * (low + high))
-    return center, np.swapaxes(plane * (0.5 * (high - low)), 1, 2)
+def _reached(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array, tuple[Array, Array]]:
+    """Zonogons of (u1, u2): centers (station, 2) and half the edges (station, 1 + input, 2) [1/m].
+
+    And both ends of segments whose hull is the (κ1, κ2) reached, shape (station, edge, 2) [1/m].
+    """
+    driving = Driving(arm)
+    table = tables(driving.law.arm, stations)
+    inputs = np.column_stack([driving.offsets, driving.gains])  # of 1, and of each input
+    low, high = np.vstack([[[1.0, 1.0]], arm.input_bounds]).T
+    mean, half = 0.5 * (low + high), 0.5 * (high - low)
+    plane, rates = table.curvature[:, :2] @ inputs, table.extension @ inputs
+    center, halves = plane @ mean, np.swapaxes(plane * half, 1, 2)
+    if table.growth is table.extension:
+        vertices = _vertices(center, halves)
+        return center, halves, (vertices, np.roll(vertices, -1, axis=1))
+    moving = np.flatnonzero(half)
+    signs = 2.0 * np.indices((2,) * len(moving)).reshape(len(moving), -1) - 1.0
+    seen = center[:, None] + np.einsum("smc,mv->svc", halves[:, moving], signs)
+    seen /= (1.0 + (rates @ mean)[:, None] + (rates * half)[:, moving] @ signs)[..., None]
+    first, steps = np.arange(signs.shape[1]), 1 << np.arange(len(moving))
+    pairs = np.concatenate([np.stack([first, first ^ step]) for step in (0, *steps)], axis=1)
+    return center, halves, (seen[:, pairs[0]], seen[:, pairs[1]])
 
 
 def _vertices(center: Array, halves: Array) -> Array:
@@ -122,19 +157,19 @@ def _holds_origin(center: Array, halves: Array) -> NDArray[np.bool_]:
     return (away <= reach).all(axis=1)
 
 
-def _distance_to_edges(vertices: Array) -> Array:
-    """Distance of the origin to the nearest edge, shape (station,)."""
-    edges = np.roll(vertices, -1, axis=1) - vertices
+def _distance_to_edges(start: Array, end: Array) -> Array:
+    """Distance of the origin to the nearest segment, shape (station,)."""
+    edges = end - start
     square = (edges**2).sum(axis=-1)
-    along = -(vertices * edges).sum(axis=-1)
+    along = -(start * edges).sum(axis=-1)
     part = np.divide(along, square, out=np.zeros_like(square), where=square > 0)
-    nearest = vertices + np.clip(part, 0.0, 1.0)[..., None] * edges
+    nearest = start + np.clip(part, 0.0, 1.0)[..., None] * edges
     return np.linalg.norm(nearest, axis=-1).min(axis=1)
 
 
 def _largest(arm: Manipulator, measure: Callable[[Array], Array]) -> Extreme:
     """The largest value of a function of Z that is smooth or kinks downward between breakpoints."""
-    grid = _grid(arm)
+    grid = bending_stations(arm)
     values = measure(grid.ravel())
     low, high = _brackets(grid, values.reshape(grid.shape))
     stations = [grid.ravel()]
@@ -164,11 +199,12 @@ def _brackets(grid: Array, values: Array) -> tuple[Array, Array]:
     return grid[piece, np.maximum(place - 1, 0)], grid[piece, np.minimum(place + 1, last)]
 
 
-def _grid(arm: Manipulator) -> Array:
-    """Stations fine enough to see each turn of the bundles, shape (piece, station).
+def bending_stations(arm: Manipulator) -> Array:
+    """Stations fine enough to see each turn of the bundles [m], shape (piece, station).
 
     A piece lies between two breakpoints, where the curvature may jump: it ends just inside them.
     """
+    arm = body_of(arm)
     ends = np.array([0.0, *arm.breakpoints, arm.length])
     start, end = ends[:-1].copy(), ends[1:].copy()
     start[1:], end[:-1] = np.nextafter(start[1:], np.inf), np.nextafter(end[:-1], -np.inf)

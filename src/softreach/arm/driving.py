@@ -109,7 +109,7 @@ class Driving:
         bounds = self.arm.input_bounds.copy()
         for k, drive in enumerate(self.arm.drives):
             bounds[k] = drive.effective(bounds[k])[0]
-        return self._offsets[:, None] + ends_over(self.gains, bounds)
+        return self.offsets[:, None] + ends_over(self.gains, bounds)
 
     @lazy
     def widths(self) -> Array:
@@ -129,7 +129,7 @@ class Driving:
         return gains
 
     @lazy
-    def _offsets(self) -> Array:
+    def offsets(self) -> Array:
         """Activation of each bundle of the inner arm at inputs of 0; 1 of the rest shape."""
         offsets = np.zeros(self.law.arm.bundles)
         offsets[self.arm.bundles :] = 1.0
@@ -156,7 +156,7 @@ class Driving:
         effective, slopes = x.copy(), np.ones(x.shape)
         for k, drive in enumerate(self.arm.drives):
             effective[:, k], slopes[:, k] = drive.effective(x[:, k])
-        bundles = np.tile(self._offsets, (len(x), 1))
+        bundles = np.tile(self.offsets, (len(x), 1))
         for k in range(x.shape[1]):  # in their order, whatever BLAS and its threads would do
             bundles += effective[:, k, None] * self.gains[:, k]
         slack = self._pulls & (bundles < 0.0)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.summary import design_warnings
 from softreach.calibration.baselines import constant_curvature, quadratic
 from softreach.calibration.errors import (
     Misses,
@@ -31,6 +30,7 @@ from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.calibration.uncertainty import Uncertainty, uncertainty
+from softreach.rod.summary import design_warnings
 from softreach.support.arguments import as_flag, as_integer, as_number, as_path
 from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.files.atomic import writing

@@ -23,7 +23,10 @@ from softreach.cli.options import (
 from softreach.cli.values import NUMBER
 
 if TYPE_CHECKING:
-    from softreach.requirements import Check
+    from softreach.requirements import Check, Finding
+
+EXIT = {"met": 0, "missed": 1, "undecided": 3}
+"""Verdict -> exit code; 2 is that of wrong input."""
 
 
 def check(
@@ -48,7 +51,8 @@ def check(
 
     Places to reach, regions to stay in or to avoid, payloads, limits, measures;
     for what is missed, how far, which bounds hold the arm back, and what it would
-    take. The exit code is 0 if all is met and 1 if not.
+    take. A margin that is smaller than its own error is undecided. The exit code
+    is 0 if all is met, 1 if something is missed, and 3 if something is undecided.
 
     Example: softreach check arm.toml needs.toml --out check.png
     """
@@ -77,15 +81,21 @@ def check(
 
         axes: Any = plot_check(result, view=view or "oblique", unit=lengths.unit)
         save_figure(axes.figure, out, overwrite=overwrite)
-    return 0 if result.met else 1
+    return EXIT[result.verdict]
+
+
+def finding_record(finding: Finding) -> dict[str, object]:
+    """A finding for machines."""
+    return {**vars(finding), "met": finding.met}
 
 
 def _record(result: Check, lengths: Lengths) -> dict[str, object]:
     """The result for machines."""
     return {
         "met": result.met,
+        "verdict": result.verdict,
         "excess": result.excess,
-        "findings": [vars(finding) for finding in result.findings],
+        "findings": [finding_record(finding) for finding in result.findings],
         "payloads_kg": list(result.payloads),
         **lengths.record("places", result.places.tolist()),
         **lengths.record("gaps", result.gaps.tolist()),

@@ -17,8 +17,8 @@ from softreach.support.errors import InvalidInput, no_warnings
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
-    from softreach.arm.summary import DesignSummary
     from softreach.rest import Rest
+    from softreach.rod.summary import DesignSummary
 
 
 def design(
@@ -42,7 +42,7 @@ def design(
     Example: softreach design minimal_trunk --taper-deg 3
     """
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.arm.summary import describe
+    from softreach.rod.summary import describe
 
     if schema:
         changes.refuse("left out with --schema")
@@ -200,8 +200,8 @@ def _rest_rows(arm: Manipulator) -> Rows:
     upright; nothing where moduli or densities are not known.
     """
     from softreach.arm.base import Base
+    from softreach.arm.load_number import load_number_faults
     from softreach.arm.loads import GRAVITY, Loads
-    from softreach.arm.summary import load_number_faults
 
     if load_number_faults(arm):
         return {}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from softreach.cli.changes import design_from
+from softreach.cli.check import EXIT, finding_record
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
 from softreach.cli.options import AsJson, Overwrite, Unit, out_option
@@ -97,8 +98,8 @@ def search(
     """Search the designs that meet requirements and are best.
 
     Writes them as design files, with tables and a report. The same command goes on
-    after an interruption. The exit code is 0 if the best meets all requirements
-    and 1 if not.
+    after an interruption. The exit code is 0 if the best meets all requirements,
+    1 if it misses one, and 3 if one is undecided.
 
     Example: softreach search needs.toml --free taper_deg=0:3 --maximize exact_volume -o best
     """
@@ -148,7 +149,7 @@ def search(
 
         console.line(summary_text(result, lengths.unit))
     result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
-    return 0 if result.met else 1
+    return EXIT[result.verdict]
 
 
 class _Watch:
@@ -168,14 +169,15 @@ class _Watch:
 
     def _place(self, candidate: Candidate) -> tuple[float, float]:
         if not candidate.is_feasible:
-            return candidate.excess or math.inf, 0.0
+            by_bounds = candidate.fidelity == "bounds"  # at least, so that it beats nothing
+            return (math.inf if by_bounds else candidate.excess or math.inf), 0.0
         sign = -1.0 if self._up else 1.0
         return 0.0, sign * candidate.objectives[0].value if candidate.objectives else 0.0
 
     def label(self) -> str:
         """The best in a few words; with several objectives, how many designs meet all."""
         best, names = self._best, [*self._up, *self._down]
-        if best is None or not (best.is_feasible or math.isfinite(best.excess)):
+        if best is None or math.isinf(self._place(best)[0]):
             return "searching"
         if not best.is_feasible:
             return f"searching, best misses {best.excess:.3g}"
@@ -188,12 +190,14 @@ def _record(result: Search, out: Path) -> dict[str, Any]:
     """The result for machines: SI units, angles in degrees."""
     return {
         "met": result.met,
+        "verdict": result.verdict,
+        "restarts": result.restarts,
         "designs": result.designs,
         "judged": result.judged,
         "seconds": result.seconds,
         "front": [_design(result, each) for each in result.front],
         "at_ends": result.at_ends,
-        "findings": [vars(finding) for finding in result.findings],
+        "findings": [finding_record(finding) for finding in result.findings],
         "folder": str(out),
     }
 

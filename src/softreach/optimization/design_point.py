@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softreach.arm.load_number import load_number, mass
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameters
 from softreach.arm.parameters.changes import parameters_by_every_name
-from softreach.arm.summary import load_number, mass
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.objectives import SETS, DesignCase
 from softreach.optimization.problem import Problem

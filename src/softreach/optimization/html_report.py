@@ -56,13 +56,13 @@ def write_report(
     ends = [f"{name} at its {end} end" for name, end in search.at_ends.items()]
     page = template.render(
         verdict=verdict(search),
-        met=search.met,
+        state=search.verdict,
         facts=f"{counted(search.designs, 'design')}, {search.seconds:.1f} s",
         missed=list(missed_text(search)),
         objectives=list(objective_rows(search, shown)) if search.best.objectives else [],
         parameters=list(parameter_rows(search, shown)),
         ends=ends,
-        findings=[(each.name, each.met, each.text) for each in search.findings],
+        findings=[(each.name, each.verdict, each.text) for each in search.findings],
         front=list(front_rows(search, shown)) if several else [],
         notes=list(remarks(search)),
         picture=png_source(_picture(search, shown)),
@@ -93,7 +93,7 @@ def _check_picture(search: Search, unit: Any) -> str:
     from softreach.plot.check import plot_check
 
     needs = search.problem.requirements
-    if not (needs.targets or needs.keeps) or search.best.fidelity == "bounds":
+    if not (needs.targets or needs.keeps):
         return ""
     try:
         return png_source(_png(plot_check(search.check, unit=unit).figure))

@@ -75,15 +75,15 @@ class DesignCase:
     @lazy
     def set_of(self) -> Sets:
         """Reachable sets of the design and of it under payloads."""
-        return sets_to(self.accuracy)
+        return sets_to(self.accuracy, quiet=not self.fine)
 
     @lazy
-    @no_warnings()
     def check(self) -> Check:
         """Requirements met and missed; on the way by poses that few descents find."""
         if self.fine:
             return checked(self.arm, self.requirements, self.accuracy, self.set_of)
-        return quick_check(self.arm, self.requirements, self.accuracy, self.set_of)
+        with no_warnings():
+            return quick_check(self.arm, self.requirements, self.accuracy, self.set_of)
 
     @lazy
     @no_warnings()
@@ -280,7 +280,7 @@ def _payload(case: DesignCase) -> Value:
 
 
 def _mass(case: DesignCase) -> Value:
-    from softreach.arm.summary import mass
+    from softreach.arm.load_number import mass
 
     value = mass(case.arm)
     return Value(math.nan if value is None else value, 0.0)

@@ -26,6 +26,7 @@ MOST_DESIGNS = 60
 _HOPELESS = 0.5  # over L or relative: what a start may miss
 _TOLERANCE = 0.003  # of the accuracy
 _GENTLE = 0.1  # of the cost: the first step is along its slope, and as long
+_BACK = (0.05, 0.1, 0.2, 0.4)  # of the way from an end that misses something to its start
 _WORSE = 10.0  # times the cost of the start: a design that cannot exist
 
 
@@ -73,15 +74,27 @@ def polished(
     """
     if start.excess > _HOPELESS:
         return Polished(start, 0)
-    program = _Program(problem, start, accuracy or problem.coarse, goal, floors, designs)
+    most = max(designs - len(_BACK), 1) if start.is_feasible else designs
+    program = _Program(problem, start, accuracy or problem.coarse, goal, floors, most)
     try:
         first = program.begin()
         end = _solved(program, first)
         candidate = problem.judged(program.values_of(end), program.point(end).design.case)
+        designs = program.designs
+        if start.is_feasible and not candidate.is_feasible:
+            # A program that was cut, or stalled, ends a little outside of what is required.
+            low, high = (problem.parameters.reals(each.values) for each in (candidate, start))
+            for back in _BACK:
+                values = problem.parameters.moved(start.values, low + back * (high - low))
+                again = problem.judged(values, problem.case(values, accuracy or problem.coarse))
+                designs += 1
+                if again.is_feasible:
+                    candidate = again
+                    break
     except (InvalidDesign, InvalidInput):
         return Polished(start, max(1, program.designs))
     better = min((start, candidate), key=problem.score) if len(problem.goals) < 2 else candidate
-    return Polished(better, program.designs)
+    return Polished(better, designs)
 
 
 @no_warnings()

@@ -19,7 +19,10 @@ from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
 from softreach.support.errors import InvalidDesign, InvalidInput
 
-__all__ = ["Candidate", "Fidelity", "Problem"]
+__all__ = ["NEAR", "Candidate", "Fidelity", "Problem"]
+
+NEAR = 0.1
+"""Relative distance within which objectives at the ends of polishes agree."""
 
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
@@ -38,6 +41,8 @@ class Candidate:
     such arm can exist."""
     missed: Mapping[str, float] = field(default_factory=dict)
     """Part of it by requirement."""
+    undecided: tuple[str, ...] = ()
+    """Requirements whose margin is smaller than the error of that."""
     fidelity: Fidelity = "coarse"
     fault: str = ""
     """Reason why no such arm can exist, or why it has no such number."""
@@ -60,6 +65,7 @@ class Candidate:
             "objectives": [[*value] for value in self.objectives],
             "excess": self.excess,
             "missed": dict(self.missed),
+            "undecided": [*self.undecided],
             "fidelity": self.fidelity,
             "fault": self.fault,
             "designs": self.designs,
@@ -69,12 +75,15 @@ class Candidate:
     def from_dict(cls, values: Values, record: Mapping[str, Any]) -> Self:
         """The candidate that `to_dict` described."""
         objectives = tuple(Value(*pair) for pair in record["objectives"])
-        return cls(values=values, **{**record, "objectives": objectives})
+        undecided = tuple(record.get("undecided", ()))
+        return cls(values=values, **{**record, "objectives": objectives, "undecided": undecided})
 
 
 class Score(NamedTuple):
     """Order of candidates of one goal, or of none: the least first."""
 
+    bound: bool
+    """True of what bounds alone have judged: its excess is no less, so that it beats nothing."""
     excess: float
     cost: float
 
@@ -121,13 +130,16 @@ class Problem:
         fine = accuracy <= self.accuracy
         return DesignCase(self.parameters.arm(values), self.requirements, accuracy, fine)
 
-    def judge(self, values: Values, *, fine: bool = False) -> Candidate:
-        """A design against all requirements and goals: bounds first, which cost next to nothing."""
+    def judge(self, values: Values, *, fine: bool = False, bounds: bool = True) -> Candidate:
+        """A design against all requirements and goals; first by bounds, which cost next to nothing.
+
+        Bounds discard a design only where it is not judged `fine`.
+        """
         try:
             case = self.case(values, self.accuracy if fine else self.coarse)
         except InvalidDesign as error:
             return Candidate(values=values, excess=math.inf, fidelity="bounds", fault=str(error))
-        findings = quick_excess(case.arm, self.requirements)
+        findings = quick_excess(case.arm, self.requirements) if bounds and not fine else ()
         proved = {each.name: each.excess for each in findings if each.excess > 0.0}
         if total := sum(proved.values()):
             return Candidate(values=values, excess=total, missed=proved, fidelity="bounds")
@@ -137,9 +149,12 @@ class Problem:
         """A design of which a case is known."""
         fidelity: Fidelity = "full" if case.fine else "coarse"
         try:
-            missed = {each.name: each.excess for each in case.check.findings if each.excess > 0.0}
+            findings = case.check.findings
+            missed = {each.name: each.excess for each in findings if each.excess > 0.0}
+            unsure = tuple(each.name for each in findings if each.verdict == "undecided")
+            known = {"values": values, "fidelity": fidelity, "undecided": unsure}
             if total := sum(missed.values()):
-                return Candidate(values=values, excess=total, missed=missed, fidelity=fidelity)
+                return Candidate(excess=total, missed=missed, **known)
             objectives = tuple(goal.value(case) for goal in self.goals)
         except (InvalidInput, InvalidDesign, MetricFailed) as error:
             # Nothing stable under these loads, or a number that this kind of arm does not have.
@@ -151,7 +166,7 @@ class Problem:
             if not math.isfinite(value.value)
         ]
         fault = f"no {', '.join(lacking)}" if lacking else ""
-        return Candidate(values=values, objectives=objectives, fidelity=fidelity, fault=fault)
+        return Candidate(objectives=objectives, fault=fault, **known)
 
     def costs(self, candidate: Candidate) -> tuple[float, ...]:
         """Objectives to be made small, of a feasible design."""
@@ -161,8 +176,8 @@ class Problem:
     def score(self, candidate: Candidate) -> Score:
         """Place among others: what is missed first, then the only goal."""
         if not candidate.is_feasible:
-            return Score(candidate.excess or math.inf, 0.0)
-        return Score(0.0, self.costs(candidate)[0] if self.goals else 0.0)
+            return Score(candidate.fidelity == "bounds", candidate.excess or math.inf, 0.0)
+        return Score(False, 0.0, self.costs(candidate)[0] if self.goals else 0.0)
 
     def front(self, candidates: Iterable[Candidate]) -> list[Candidate]:
         """Feasible designs that no other one beats in every goal; the best alone for one goal.

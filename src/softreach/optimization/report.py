@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from softreach.optimization.free_parameters import FreeParameter
 from softreach.optimization.objectives import Goal, Value
-from softreach.optimization.problem import Candidate
+from softreach.optimization.problem import NEAR, Candidate
 from softreach.support.errors import counted
 from softreach.support.quantity import columns, quantity
 from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
@@ -65,8 +65,9 @@ def verdict(search: Search) -> str:
     count = len(needs.targets) + len(needs.keeps) + len(needs.limits.given) + len(needs.measures)
     if math.isinf(best.excess) or best.fault:
         return "Search: no design that can be judged was found"
-    if not search.met:
-        return f"Search: requirements missed, {len(best.missed)} of {count} by the best design"
+    if search.verdict != "met":
+        number = len(best.missed if search.verdict == "missed" else best.undecided)
+        return f"Search: requirements {search.verdict}, {number} of {count} by the best design"
     front = (
         f"front of {counted(len(search.front), 'design')}"
         if len(search.goals) > 1
@@ -141,22 +142,34 @@ def _cells(search: Search, each: Candidate, unit: LengthUnit) -> Iterator[str]:
 
 
 def missed_text(search: Search) -> Iterator[str]:
-    """Requirements that the best design misses, each with its gap."""
+    """Requirements that the best design misses or leaves undecided, each with its gap."""
     if search.best.fault:
         yield search.best.fault.splitlines()[0]
         return
     if search.met:
         return
-    texts = {finding.name: finding.text for finding in search.findings}
-    for name, excess in sorted(search.best.missed.items(), key=lambda pair: -pair[1]):
-        yield f"MISSED  {name}: {texts.get(name, f'by {excess:.3g}, over L or relative')}"
+    for finding in sorted(search.findings, key=lambda each: -each.excess):
+        if not finding.met:
+            yield f"{finding.verdict.upper()}  {finding.name}: {finding.text}"
 
 
 def remarks(search: Search) -> Iterator[str]:
-    """Counts of designs by how they were judged."""
+    """Counts of designs by how they were judged, and how sure the best is."""
     problem, judged = search.problem, search.judged
     ways = [f"{judged['bounds']} by bounds alone"] if judged["bounds"] else []
     ways += [f"{judged['coarse']} on coarse sets (to {problem.coarse:g})"] * bool(judged["coarse"])
     ways.append(f"{judged['full']} to full accuracy ({problem.accuracy:g})")
     shown = "; numbers shown are of full accuracy" if search.best.fidelity == "full" else ""
     yield f"judged: {', '.join(ways)}{shown}"
+    yield from _how_sure(search)
+
+
+def _how_sure(search: Search) -> Iterator[str]:
+    """Agreement of polishes from designs apart, whose spread is that of searches by other seeds."""
+    count, near = search.restarts
+    if search.goals and search.best.is_feasible:
+        text = (
+            f"how sure: {near} of {counted(count, 'restart')} ended within {100 * NEAR:g} % of it"
+        )
+        doubt = "" if near > 1 else ": other seeds may find better designs; allow for more designs"
+        yield text + doubt

@@ -13,9 +13,9 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.optimization.objectives import Goal
-from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.problem import NEAR, Candidate, Problem
 from softreach.requirements.checks import Check
-from softreach.requirements.findings import Finding, quick_excess
+from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
 from softreach.support.errors import SoftreachError
 from softreach.support.versions import versions
@@ -54,9 +54,26 @@ class Search:
         return self.front[0]
 
     @property
+    def verdict(self) -> Verdict:
+        """Of the best under all requirements: met, missed or undecided."""
+        if self.best.is_feasible:
+            return "undecided" if self.best.undecided else "met"
+        return "undecided" if {*self.best.missed} <= {*self.best.undecided} else "missed"
+
+    @property
     def met(self) -> bool:
         """True if the best meets all requirements."""
-        return self.best.is_feasible
+        return self.verdict == "met"
+
+    @property
+    def restarts(self) -> tuple[int, int]:
+        """Polishes from designs apart that meet all, and those within a tenth of the best."""
+        if not (self.goals and self.best.is_feasible):
+            return 0, 0
+        best = np.array(self.problem.costs(self.best))
+        ends = [each for each in self.candidates if each.designs > 1 and each.is_feasible]
+        apart = [np.abs(np.array(self.problem.costs(each)) - best) for each in ends]
+        return len(ends), sum(bool((each <= NEAR * np.abs(best)).all()) for each in apart)
 
     @property
     def arm(self) -> Manipulator:
@@ -79,13 +96,8 @@ class Search:
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """Findings of the check; of a best that bounds rule out, what they prove of it.
-
-        Empty where no such arm can exist, or nothing holds it under its loads.
-        """
+        """Findings of the check; empty where no such arm can exist, or nothing holds it."""
         try:
-            if self.best.fidelity == "bounds":
-                return quick_excess(self.arm, self.problem.requirements)
             return self.check.findings
         except SoftreachError:
             return ()

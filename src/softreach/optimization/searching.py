@@ -46,6 +46,7 @@ _LEAST_OF_POLISH = 4  # designs, with which one begins
 _LAST_SHARE, _MOST_LAST = 0.2, 20  # of all designs, kept for the polish to full accuracy
 _APART = 0.08  # of the ranges, in the mean: designs nearer to each other lead to the same end
 _LAST = 3  # designs that are judged to full accuracy
+_FRONTS = 12  # of designs that polishes of several objectives begin with
 
 
 def search(
@@ -149,7 +150,7 @@ class _Run:
     ) -> None:
         self.problem, self._designs, self._polishes = problem, designs, polishes
         self._follow, self._progress = follow, progress
-        last = polishes and len(problem.goals) < 2 and problem.is_finer_on_finer_sets
+        last = polishes and (len(problem.goals) > 1 or problem.is_finer_on_finer_sets)
         self._kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
         self._spent = 0
         self._begun = time.perf_counter()
@@ -210,9 +211,9 @@ class _Run:
                 study.tell(trial, candidate)
                 self._note(candidate)
 
-    def _judged(self, values: Any) -> Candidate:
+    def _judged(self, values: Any, *, bounds: bool = True) -> Candidate:
         with parallel.undivided():
-            return self.problem.judge(values)
+            return self.problem.judge(values, bounds=bounds)
 
     def _polish(self, study: Study) -> None:
         """Local optima next to the best designs that no polish has begun at."""
@@ -230,23 +231,26 @@ class _Run:
             self._note(candidate)
             self._starts.append(self._place(candidate))
 
-    def _polished(self, start: Candidate, designs: int) -> Polished:
+    def _polished(self, start: Candidate, designs: int, accuracy: float | None = None) -> Polished:
         with parallel.undivided():
             if len(self.problem.goals) < 2:
-                return polished(self.problem, start, designs=designs)
+                return polished(self.problem, start, designs=designs, accuracy=accuracy)
             # One goal at a time, in turn, while the others stay as good as they are.
             moving = [k for k, goal in enumerate(self.problem.goals) if goal.name != "actuators"]
             goal = (moving or [0])[len(self._starts) % max(1, len(moving))]
             floors = self.problem.costs(start) if start.is_feasible else ()
-            return polished(self.problem, start, goal=goal, floors=floors, designs=designs)
+            more = {"goal": goal, "floors": floors, "designs": designs, "accuracy": accuracy}
+            return polished(self.problem, start, **more)
 
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best designs that lie apart from each other and from ends of polishes."""
-        if len(self.problem.goals) > 1:
-            ordered = self.problem.front(candidates)
-        else:
-            judged = [each for each in candidates if each.fidelity != "bounds"]
-            ordered = sorted(judged, key=self.problem.score)
+        judged = [each for each in candidates if each.fidelity != "bounds"]
+        ordered = sorted(judged, key=self.problem.score)
+        if len(self.problem.goals) > 1:  # the front, that of the others, and so on
+            ordered = []
+            for _ in range(_FRONTS):
+                ordered += (front := self.problem.front(judged))
+                judged = [each for each in judged if all(each is not one for one in front)]
         chosen: list[Candidate] = []
         for candidate in ordered:
             place = self._place(candidate)
@@ -274,15 +278,32 @@ class _Run:
         self._progress(candidate.designs)
 
     def _at_full_accuracy(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """The best, polished on finer sets and judged as they are reported."""
-        problem, several = self.problem, len(self.problem.goals) > 1
-        best = problem.front(candidates)
-        if not several:
-            judged = [each for each in candidates if np.isfinite(each.excess)]
-            best = sorted(judged, key=problem.score)[:_LAST] or list(candidates[:1])
-            left = min(MOST_DESIGNS, self._designs - self._spent)
-            if self._polishes and best and left >= _LEAST_OF_POLISH:
-                end = polished(problem, best[0], accuracy=problem.accuracy, designs=left)
-                best.append(end.candidate)
-                self._spent += end.designs
+        """The best, polished on finer sets and judged as they are reported: none by bounds."""
+        problem, known = self.problem, self._beyond_bounds(candidates)
+        best = problem.front(known)
+        if len(problem.goals) < 2 or not (best and best[0].is_feasible):
+            finite = [each for each in known if np.isfinite(each.excess)]
+            best = sorted(finite, key=problem.score)[:_LAST] or list(candidates[:1])
+        left = min(MOST_DESIGNS, self._designs - self._spent)
+        if self._polishes and left >= _LEAST_OF_POLISH:
+            end = self._polished(best[0], left, problem.accuracy)
+            best.append(end.candidate)
+            self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]
+
+    def _beyond_bounds(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Candidates without those that bounds discard.
+
+        What bounds prove of a design is less than it misses: where no design meets all, those of
+        which they prove less than the best misses are judged as the others are.
+        """
+        known = [each for each in candidates if each.fidelity != "bounds"]
+        least = min((each.excess for each in known if not each.fault), default=np.inf)
+        bounds = [each for each in candidates if each.fidelity == "bounds" and not each.fault]
+        waiting = sorted(bounds, key=self.problem.score)
+        while waiting and waiting[0].excess < least:
+            values, waiting = [each.values for each in waiting[:_BATCH]], waiting[_BATCH:]
+            tasks = (partial(self._judged, each, bounds=False) for each in values)
+            known += (found := list(parallel.in_order(tasks)))
+            least = min([least, *(each.excess for each in found if not each.fault)])
+        return known

@@ -201,9 +201,9 @@ class Study:
         """Values that the samplers minimize: objectives, or the excess over requirements first."""
         if candidate.is_feasible and self.problem.goals:
             return [*self.problem.costs(candidate)]
-        if not self.problem.goals and not candidate.fault:
-            return [candidate.excess]
         missed = min(_MISSED * (1.0 + candidate.excess), _NEVER)
+        if candidate.fidelity == "bounds":  # what is missed is no less: worse than all judged
+            missed += 0.5 * _NEVER
         return [missed] * max(1, len(self.problem.goals))
 
 

@@ -43,6 +43,8 @@ class _Check(Protocol):
     def nearest(self) -> Array: ...
     @property
     def regions(self) -> Sequence[tuple[str, Any]]: ...
+    @property
+    def findings(self) -> Sequence[Any]: ...
     def shapes(self, count: int) -> xr.Dataset | None: ...
 
 
@@ -57,7 +59,8 @@ def plot_check(
     """Draw an arm at the places that it must reach, and the regions that it must keep to.
 
     Places that are reached under every payload are green dots; those that are missed are red
-    crosses, each with a line to the nearest tip.
+    crosses, each with a line to the nearest tip. The legend says which kinds of regions are missed
+    or undecided.
 
     Args:
         check: What `check` returned.
@@ -97,7 +100,10 @@ def plot_check(
         panel = Panel.opened(np.concatenate(points), counted, ax, view, None)
         draw_arms(panel, arm, shapes, range(arm.bundles), _FADE)
         for kind, each in lines.items():
-            _draw_lines(panel, each, {"linewidth": 0.9, **_REGIONS[kind]})
+            style = {"linewidth": 0.9, **_REGIONS[kind]}
+            words = {each.verdict for each in check.findings if each.kind == kind} - {"met"}
+            style["label"] = ": ".join([str(style["label"]), *sorted(words)])
+            _draw_lines(panel, each, style)
         _draw_places(panel, check)
         if panel.ax.get_legend_handles_labels()[1]:
             panel.ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)

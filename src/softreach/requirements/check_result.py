@@ -1,4 +1,4 @@
-"""Result of a check: every requirement met or missed, with the poses at all places."""
+"""Result of a check: every requirement met, missed or undecided, with the poses at all places."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.requirements.findings import Finding
+from softreach.requirements.findings import Finding, Verdict
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.kinematics import configuration
@@ -65,9 +65,15 @@ class Check:
     """Tips of these poses [m], shape (payload, place, 3)."""
 
     @property
+    def verdict(self) -> Verdict:
+        """Missed if one requirement is, else undecided if one is."""
+        every = {finding.verdict for finding in self.findings}
+        return "missed" if "missed" in every else "undecided" if "undecided" in every else "met"
+
+    @property
     def met(self) -> bool:
         """True if every requirement is met."""
-        return all(finding.met for finding in self.findings)
+        return self.verdict == "met"
 
     @property
     def excess(self) -> float:
@@ -117,15 +123,17 @@ class Check:
         return shapes.isel(sample=held) if held.any() else None
 
     def __repr__(self) -> str:
-        missed = sum(not finding.met for finding in self.findings)
-        count = len(self.findings)
-        verdict = f"missed, {missed} of {count}" if missed else f"met, all {count}"
+        own = [finding.verdict for finding in self.findings]
+        parts = [f"{word}, {own.count(word)} of {len(own)}" for word in ("missed", "undecided")]
+        kept = [part for part in parts if part.split(",")[0] in own]
+        verdict = "; ".join(kept) or f"met, all {len(own)}"
         size = self.arm.length_unit.text(self.arm.length)
         lines = [f"Requirements of an arm of {size}: {verdict}"]
+        space = 9 if "undecided" in own else 6
         width = max((len(finding.name) for finding in self.findings), default=0)
         for finding in self.findings:
-            verdict = "met" if finding.met else "MISSED"
-            lines.append(f"  {verdict:<6}  {finding.name:<{width}}  {finding.text}")
+            word = finding.verdict if finding.met else finding.verdict.upper()
+            lines.append(f"  {word:<{space}}  {finding.name:<{width}}  {finding.text}")
         return "\n".join(lines)
 
     def to_dataset(self) -> xr.Dataset:
@@ -146,6 +154,7 @@ class Check:
                 "nearest": ((*at, "axis"), self.nearest, {"units": "m"}),
                 "effort": (at, self.effort, {"units": "1"}),
                 "met": ("finding", [finding.met for finding in findings]),
+                "verdict": ("finding", np.array([f.verdict for f in findings], dtype=str)),
                 "excess": ("finding", [finding.excess for finding in findings], {"units": "1"}),
                 "text": ("finding", np.array([finding.text for finding in findings], dtype=str)),
                 "share": ("coverage", [each.share for each in self.coverages], {"units": "1"}),

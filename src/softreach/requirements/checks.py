@@ -1,4 +1,4 @@
-"""A design against requirements: met or missed, by how much, and what it would take."""
+"""A design against requirements: the verdict, by how much, and what it would take."""
 
 from __future__ import annotations
 
@@ -58,12 +58,18 @@ def check(
         The findings, which print themselves.
 
     Raises:
-        InvalidInput: Arguments of another kind.
+        InvalidInput: Arguments of another kind, or requirements that ask for nothing.
         InvalidDesign: A payload or a limit of mass needs a modulus or a density that is not there.
+
+    Warns:
+        SoftreachWarning: The error of a reachable set is larger than asked.
     """
     arm = a_manipulator("arm", arm)
     needs = as_instance("requirements", requirements, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.2))
+    if not (needs.targets or needs.keeps or needs.limits.given or needs.measures):
+        allowed = "a target, a region to keep to, a limit or a measure, or several"
+        raise InvalidInput("requirements", "nothing that an arm could miss", allowed)
     return checked(arm, needs, accuracy, sets_to(accuracy), as_progress(progress))
 
 
@@ -74,19 +80,20 @@ def quick_check(
 
     A place that these do not reach counts as missed, although another pose may reach it.
     """
-    sets = sets_to(accuracy) if sets is None else sets
+    sets = sets_to(accuracy, quiet=True) if sets is None else sets
     return checked(arm, requirements, accuracy, sets, choose=descended)
 
 
-def sets_to(accuracy: float) -> Sets:
-    """Reachable sets to a relative error of volumes, each computed once and without warnings."""
+def sets_to(accuracy: float, *, quiet: bool = False) -> Sets:
+    """Reachable sets to a relative error of volumes, each computed once; `quiet` without warnings.
 
-    @cache
-    @no_warnings()
+    Those on the way of a search are quiet.
+    """
+
     def set_of(arm: Manipulator) -> ReachableSet:
         return reachable_set(arm, accuracy=accuracy)
 
-    return set_of
+    return cache(no_warnings()(set_of) if quiet else set_of)
 
 
 def checked(

@@ -12,7 +12,8 @@ from softreach.inverse.prepared import prepared_map
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.check_result import TOL
-from softreach.requirements.poses import PoseRules, some_corners
+from softreach.requirements.poses import PoseRules
+from softreach.rod.bending import some_corners
 from softreach.rod.rods import tip_map
 from softreach.rod.view import stable_tips
 from softreach.sampling import sample_cube

@@ -4,26 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from softreach.arm.load_number import load_number, mass
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.summary import load_number, mass
 from softreach.arm.tables import ends_over, quadrature, tables
 from softreach.atlas.intermediates import Intermediates
+from softreach.atlas.metric import Need
 from softreach.atlas.metrics import known_metric
 from softreach.requirements.parts import LIMIT_UNITS
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.support.arguments import as_instance
 from softreach.support.errors import counted, no_warnings
+from softreach.support.quantity import quantity
 
 if TYPE_CHECKING:
     from softreach.workspace import ReachableSet
 
-__all__ = ["Finding", "quick_excess"]
+__all__ = ["Finding", "Verdict", "quick_excess", "verdict_of"]
 
-_SAMPLES = 2**15
+Verdict = Literal["met", "missed", "undecided"]
+"""A requirement is undecided where its margin is smaller than the error of that."""
+
+_SAMPLES, _FEWER = 2**15, 8
+"""Samples of clouds, and how many times fewer another has, which is farther off by as much at least
+as this one is: errors of extents and hulls fall with the cube root of their number or faster."""
+_ERRORS: dict[str, Callable[[ReachableSet], float]] = {
+    "exact_volume": lambda reached: reached.volume_error,
+    "exact_convex_volume": lambda reached: reached.convex_volume_error,
+    "exact_unreachability": lambda reached: reached.unreachability_error,
+    "multiplicity": lambda reached: getattr(reached, "multiplicity_error", 0.0) / reached.volume,
+    "multiple_volume": lambda reached: getattr(reached, "multiplicity_error", 0.0),
+    "fold_volume": lambda reached: getattr(reached, "fold_volume_error", 0.0),
+}
+"""Metrics of the reachable set with their errors; of others of it none are known."""
 _PIECES = 8
 _ROUNDING = 1e-9
 _WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": "actuators"}
@@ -31,20 +47,33 @@ _WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": 
 
 @dataclass(frozen=True)
 class Finding:
-    """One requirement: met or missed, and by how much."""
+    """One requirement: met, missed or undecided, and by how much."""
 
     name: str
     """The target, region, limit or measure."""
     kind: str
     """"reach", "cover", "stay_inside", "avoid", "limit" or "measure"."""
-    met: bool
+    verdict: Verdict
     excess: float
-    """0 where it is met; else gaps and distances over L, and limits by their share [-]."""
+    """0 where it is met; else gaps and distances over L, and limits by their share [-]. Where it is
+    undecided, what is missed if there were no error."""
     text: str
     """In words, with units."""
 
+    @property
+    def met(self) -> bool:
+        """True where it is met by more than the error."""
+        return self.verdict == "met"
+
     def __str__(self) -> str:
-        return f"{'met' if self.met else 'missed'}  {self.name}: {self.text}"
+        return f"{self.verdict}  {self.name}: {self.text}"
+
+
+def verdict_of(margin: float, error: float = 0.0) -> Verdict:
+    """Met by a margin of 0 or more, missed by one below; undecided where its error is larger."""
+    if abs(margin) < error:
+        return "undecided"
+    return "met" if margin >= 0.0 else "missed"
 
 
 def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding, ...]:
@@ -92,9 +121,9 @@ def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
             continue
         if gap > 1e-6 * arm.length:
             if target.region is None:
-                yield Finding(target.name, "reach", False, gap / arm.length, text)
+                yield Finding(target.name, "reach", "missed", gap / arm.length, text)
             else:
-                yield Finding(target.name, "cover", False, target.share, text)
+                yield Finding(target.name, "cover", "missed", target.share, text)
 
 
 def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:
@@ -111,7 +140,7 @@ def limit_finding(name: str, value: float, most: float, arm: Manipulator, where:
     else:
         texts = [f"{x:.4g} {symbol}".strip() for x in (value, most)]
     text = f"{texts[0]} of at most {texts[1]}{where}"
-    return Finding(_WORDS.get(name, name), "limit", excess == 0.0, excess, text)
+    return Finding(_WORDS.get(name, name), "limit", verdict_of(-excess), excess, text)
 
 
 def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
@@ -136,26 +165,40 @@ def measure_findings(
     if not needs.measures:
         return
     metrics = [metric for name in needs.measures if (metric := known_metric(name))]
+    if any(Need.REACHABLE_SET in metric.needs for metric in metrics):
+        known()  # with its warnings
     with no_warnings():
-        source = Intermediates.of_one(arm, _SAMPLES, accuracy, known)
+        fine, coarse = (
+            Intermediates.of_one(arm, samples, accuracy, known)
+            for samples in (_SAMPLES, _SAMPLES // _FEWER)
+        )
         for metric in metrics:
-            low, high = needs.measures[metric.name]
-            value = float(metric.value(source, {}))
-            yield _measure(metric.name, metric.unit, value, low, high)
+            value = float(metric.value(fine, {}))
+            if Need.REACHABLE_SET in metric.needs:
+                error = _ERRORS.get(metric.name, lambda _: 0.0)(known())
+            else:
+                error = abs(value - float(metric.value(coarse, {})))
+            yield _measure(metric.name, metric.unit, value, error, *needs.measures[metric.name])
 
 
-def _measure(name: str, unit: str, value: float, low: float | None, high: float | None) -> Finding:
-    unit = "" if unit == "1" else f" {unit}"
+def _measure(
+    name: str, unit: str, value: float, error: float, low: float | None, high: float | None
+) -> Finding:
     ends = [("at least", low, 1.0), ("at most", high, -1.0)]
-    texts, excess = [], 0.0
+    texts, margin, excess = [], np.inf, 0.0
+    error = float(np.nan_to_num(error))
     for words, end, sign in ends:
         if end is not None:
-            texts.append(f"{words} {end:.6g}{unit}")
-            short = sign * (end - value) / (abs(end) or 1.0)
-            excess = max(excess, 1.0 if np.isnan(short) else short)
+            texts.append(f"{words} {end:.6g} {unit}".removesuffix(" 1"))
+            own, size = sign * (value - end), abs(end) or 1.0
+            margin = min(margin, own if own < -_ROUNDING * size else max(own, 0.0))
+            excess = max(excess, -own / size)
+    if np.isnan(value):
+        margin, excess = -np.inf, 1.0
     excess = excess if excess > _ROUNDING else 0.0
-    text = f"{value:.6g}{unit}, {' and '.join(texts) or 'anything allowed'}"
-    return Finding(name, "measure", excess == 0.0, excess, text)
+    shown = quantity(value, "" if unit == "1" else unit, error)
+    text = f"{shown}, {' and '.join(texts) or 'anything allowed'}"
+    return Finding(name, "measure", verdict_of(margin, error), excess, text)
 
 
 def places_text(count: int, of: int) -> str:

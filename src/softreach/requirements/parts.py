@@ -88,7 +88,8 @@ class Keep:
     """True to stay inside, False to avoid it."""
     _: dataclasses.KW_ONLY
     of: Literal["tip", "arm"] = "arm"
-    """The tip alone, or the body from base to tip with its radius before activation."""
+    """The tip alone, or the arm from base to tip as wide as the widest of its body and its bundles
+    before activation: tendons outside of the body run through disks of at least that radius."""
     when: Literal["targets", "always"] = "targets"
     """In the poses that are used at the targets, or in every pose within the bounds, among which
     the worst is searched for: samples and a polish, no proof."""
@@ -121,8 +122,8 @@ class Limits:
     """Upper limits of an arm; None for no limit.
 
     Those of poses (shortening, force, pressure, stroke, bending) are judged in the poses that are
-    used at the targets; where there are no targets, over all of the bounds. The others follow from
-    the design alone.
+    used at the targets; where there are no targets, over all of the bounds: bending exactly where
+    strains are affine in the inputs, all else by a search. The others follow from the design alone.
 
     Raises:
         InvalidInput: A number out of range.
@@ -131,8 +132,7 @@ class Limits:
     actuators: int | None = None
     """Number of inputs that can move."""
     shortening: float | None = None
-    """Share of its length before activation by which the line of a bundle shortens [-]; without
-    targets at all corners of the bounds."""
+    """Share of its length before activation by which the line of a bundle shortens [-]."""
     force: float | None = None
     """Pull or push of a bundle that is driven by force, and tension of a tendon driven by length
     [N]."""
@@ -145,7 +145,8 @@ class Limits:
     load_number: float | None = None
     """Λ, theory (79), under the largest payload [-]."""
     bending: float | None = None
-    """κ R2 anywhere along the arm [-]; its inner side folds at 1."""
+    """κ R2 anywhere along the arm [-], κ of the centerline as it is under all loads, R2 before
+    activation; its inner side folds at 1."""
 
     def __post_init__(self) -> None:
         for name, value in self.given.items():

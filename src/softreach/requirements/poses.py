@@ -8,17 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.arm.bending import sharpest_bending
+from softreach.arm.bending import bending_stations
 from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import strain_stations
 from softreach.requirements.parts import POSE_LIMITS, Keep, Limits
 from softreach.requirements.regions import HalfSpace
+from softreach.rod.bending import worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.sampling import sample_cube
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 
@@ -28,9 +27,6 @@ _LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""
 _BLOCK = 256  # poses at once
 _SAFETY = 1.2  # of speeds and turns between stations, which are known at these
-_MOST_CORNERS = 10  # bundles of which all corners are tried
-_SAMPLES = 2048
-_STARTS, _AROUND, _ROUNDS, _SHRINK = 4, 32, 12, 0.6
 _SIZES = {"N": "force", "Pa": "pressure", "m": "stroke"}
 
 
@@ -100,7 +96,8 @@ class PoseRules:
         most = [0.0] * len(self.keeps) + list(self.limits.values())
         excess = np.maximum((value - most) / scale, 0.0)
         # What rounding alone makes of a bound that is met to the last bit is no excess.
-        return Judged(value, np.where(excess > 1e-9, excess, 0.0), np.nan_to_num(error))
+        error = np.where(error > 1e-9 * self.arm.length, error, 0.0)
+        return Judged(value, np.where(excess > 1e-9, excess, 0.0), error)
 
     def _kept(self, gamma: Array) -> tuple[Array, Array]:
         """Distances by which regions are missed [m], and what may come on top, (n, keep) each."""
@@ -126,7 +123,7 @@ class PoseRules:
     def _limited(self, name: str, gamma: Array) -> Array:
         """Value of a limit in poses, shape (n,)."""
         if name == "bending":
-            z = strain_stations(self.arm.inner)
+            z = bending_stations(self.arm).ravel()
             u = self.rod.strains(gamma, z).curvature
             return (np.hypot(u[..., 0], u[..., 1]) * self.rod.radius(z)).max(axis=1)
         if not self.arm.bundles:
@@ -152,11 +149,9 @@ class PoseRules:
         return line_lengths(self.arm.replace(loads=None), np.zeros((1, self.arm.inputs)))
 
     def of_bounds(self, name: str) -> float:
-        """Value of a limit over all of the bounds; see `Limits`."""
-        if name == "bending":
-            return sharpest_bending(self.arm).value
-        corners = some_corners(self.rod)
-        return float(np.nan_to_num(self._limited(name, corners)).max())
+        """Value of a limit of poses other than bending over all of the bounds, by search."""
+        _, worst = worst_inputs(self.rod, lambda gamma: self._limited(name, gamma)[:, None])
+        return float(worst[0])
 
 
 class Body(NamedTuple):
@@ -167,7 +162,8 @@ class Body(NamedTuple):
     tangent: Array
     """Shape (n, station, 3)."""
     radius: Array
-    """Before activation, shape (n, station) [m]."""
+    """Of what is widest before activation, body, tendons and the disks that hold these, shape
+    (n, station) [m]."""
     between: Array
     """Farthest that a point of the body is from those of the two sections that it lies between,
     both ways together [m], shape (n, station - 1)."""
@@ -181,7 +177,7 @@ class Body(NamedTuple):
     def of(cls, rod: TipMap, gamma: Array, parts: int) -> Body:
         """The sections between so many parts."""
         z = np.linspace(0.0, rod.length, parts + 1)
-        frames, strains, radius = rod.frames(gamma, z), rod.strains(gamma, z), rod.radius(z)
+        frames, strains, radius = rod.frames(gamma, z), rod.strains(gamma, z), _widest(rod.arm, z)
         turn = np.linalg.norm(strains.curvature, axis=2) * np.maximum(strains.extension, 1.0)
         speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z))
         step = rod.length / parts
@@ -205,12 +201,26 @@ class Body(NamedTuple):
         seen = missed.max(axis=1)
         if (keep.inside and keep.region.convex) or isinstance(keep.region, HalfSpace):
             # Along a straight line the distance from such a region is largest at an end.
-            between = np.maximum(missed[:, 1:], missed[:, :-1]) + self.bulge[rows]
+            # The bulge is that of a parabola, which a slope from end to end takes from its top.
+            slope, bulge = np.abs(np.diff(missed, axis=1)), np.maximum(self.bulge[rows], 1e-300)
+            top = np.maximum(4.0 * bulge - slope, 0.0) ** 2 / (16.0 * bulge)
+            between = np.maximum(missed[:, 1:], missed[:, :-1]) + top
         else:
             between = 0.5 * (missed[:, 1:] + missed[:, :-1] + self.between[rows])
         bound = np.maximum(between.max(axis=1), seen)
         seen[self.lost[rows]] = bound[self.lost[rows]] = np.nan
         return seen, bound
+
+
+def _widest(arm: Manipulator, z: Array) -> Array:
+    """Radius of what is farthest from the axis, body or bundles, at ascending stations Z [m]."""
+    radius = arm.profile.radius(z)
+    if not arm.bundles:
+        return radius
+    outline = arm.outline(z)
+    held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
+    held = held[2:] | held[1:-1] | held[:-2]
+    return radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
 
 
 def _tips_missed(keep: Keep, tips: Array) -> Array:
@@ -230,31 +240,8 @@ class Worst(NamedTuple):
 
 
 def worst_pose(rules: PoseRules) -> Worst:
-    """The pose within the bounds that misses the one region of some rules by most.
-
-    A search: samples, corners and faces of the activation box, then the neighborhood of the worst,
-    ever closer. It proves nothing.
-    """
-    box = rules.rod.box
-    rng = np.random.default_rng(0)
-    inside = box.from_cube(sample_cube("sobol", _SAMPLES, box.bundles))
-    faces = box.from_cube(rng.random((_SAMPLES // 2, box.bundles)).round(0))
-    mixed = np.where(rng.random(faces.shape) < 0.5, faces, inside[: len(faces)])
-    gamma = np.concatenate([inside, some_corners(rules.rod), mixed])
-    value = _coarse(rules, gamma)
-    worst = np.argsort(-value, kind="stable")[:_STARTS]
-    gamma, value = gamma[worst], value[worst]
-    width = 0.25
-    for _ in range(_ROUNDS):
-        around = rng.normal(size=(_AROUND, len(gamma), box.bundles)) * width * box.widths
-        tried = box.clip(gamma + around)
-        values = _coarse(rules, tried.reshape(-1, box.bundles)).reshape(_AROUND, -1)
-        best = values.argmax(axis=0)
-        better = values[best, range(len(gamma))] > value
-        gamma = np.where(better[:, None], tried[best, range(len(gamma))], gamma)
-        value = np.where(better, values[best, range(len(gamma))], value)
-        width *= _SHRINK
-    worst = gamma[[int(value.argmax())]]
+    """The pose within the bounds that misses the one region of some rules by most, by search."""
+    worst, _ = worst_inputs(rules.rod, lambda gamma: _coarse(rules, gamma)[:, None])
     return Worst(worst[0], rules.judged(worst))
 
 
@@ -269,15 +256,3 @@ def _coarse(rules: PoseRules, gamma: Array) -> Array:
         values = [body.missed(keep, np.arange(len(body.lost)))[0] for body in bodies]
         values = np.concatenate(values)
     return np.nan_to_num(values, nan=-np.inf)
-
-
-def some_corners(rod: TipMap) -> Array:
-    """Corners of the activation box, and each input at its bounds alone, shape (n, inputs)."""
-    box = rod.box
-    alone = np.tile(box.clip(np.zeros(box.bundles)), (2 * box.bundles, 1))
-    each = np.arange(box.bundles)
-    alone[each, each], alone[box.bundles + each, each] = box.low, box.high
-    if box.bundles <= _MOST_CORNERS:
-        return np.unique(np.concatenate([box.corners(), alone]), axis=0)
-    pushed = np.random.default_rng(0).random((2**_MOST_CORNERS, box.bundles)).round()
-    return np.concatenate([np.stack([box.low, box.high]), box.from_cube(pushed), alone])

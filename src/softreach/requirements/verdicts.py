@@ -15,9 +15,11 @@ from softreach.requirements.findings import (
     design_limits,
     limit_finding,
     places_text,
+    verdict_of,
 )
 from softreach.requirements.parts import Keep
 from softreach.requirements.poses import PoseRules, worst_pose
+from softreach.rod.bending import bending_over_bounds
 from softreach.support.arrays import Array
 from softreach.support.units import LengthUnit
 
@@ -55,7 +57,7 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
             effort = float(made.effort[:, own].max())
             near = f" to {unit.text(target.within)}" if target.within else ""
             yield Finding(
-                target.name, "reach", True, 0.0, f"{met} reached{near}, effort up to {effort:.3g}"
+                target.name, "reach", "met", 0.0, f"{met} reached{near}, effort up to {effort:.3g}"
             )
             continue
         gap, number = float(gaps[load, place]), int(np.flatnonzero(own)[place])
@@ -80,7 +82,7 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
         ]
         if held:
             more += f"; all reached with {max(held):.4g} kg"
-        yield Finding(target.name, "reach", False, excess, text + more)
+        yield Finding(target.name, "reach", "missed", excess, text + more)
 
 
 def _length(value: float, unit: LengthUnit, digits: int = 4) -> str:
@@ -93,12 +95,14 @@ def _cover_findings(made: Check) -> Iterator[Finding]:
             continue
         own = [each for each in made.coverages if each.name == target.name]
         worst = min(own, key=lambda each: each.share)
-        met = worst.share >= target.share
+        # Where every place is reached that was tried, no share is left to be in doubt.
+        error = worst.error if worst.share < 1.0 else 0.0
+        verdict = verdict_of(worst.share - target.share, error)
         text = (
             f"{100 * worst.share:.2f} ± {100 * worst.error:.2g} % covered of at least "
             f"{100 * target.share:.4g} %{_under(worst.payload)}"
         )
-        yield Finding(target.name, "cover", met, max(target.share - worst.share, 0.0), text)
+        yield Finding(target.name, "cover", verdict, max(target.share - worst.share, 0.0), text)
 
 
 def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
@@ -117,8 +121,9 @@ def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Ite
 def _kept_at_targets(made: Check, keep: Keep, value: Array, error: Array, excess: Array) -> Finding:
     unit = made.arm.length_unit
     if not value.size:
-        return Finding(keep.name, keep.kind, True, 0.0, "counted in what is covered")
-    load, place = np.unravel_index(int(value.argmax()), value.shape)
+        return Finding(keep.name, keep.kind, "met", 0.0, "counted in what is covered")
+    decides = value if value.max() > 0.0 or (value + error).max() <= 0.0 else value + error
+    load, place = np.unravel_index(int(decides.argmax()), value.shape)
     where = f"at place {place + 1}{_under(made.payloads[load])}"
     return _kept(
         keep, float(value[load, place]), float(error[load, place]), float(excess.max()), where, unit
@@ -144,6 +149,7 @@ def _kept(
     """Distance by which a region is missed, or kept to."""
     of = "the tip" if keep.of == "tip" else "the arm"
     close = f" (to {_length(error, unit, 2)})" if keep.of == "arm" else ""
+    verdict = "missed" if excess > 0.0 else verdict_of(max(-value, 0.0), error)
     if excess > 0.0:
         beyond = "outside" if keep.inside else "inside or too near"
         text = f"{of} is {_length(value, unit)}{close} {beyond} {where}"
@@ -151,7 +157,7 @@ def _kept(
         text = "no pose to judge"
     else:
         text = f"{of} keeps {_length(-value, unit)}{close} to spare {where}"
-    return Finding(keep.name, keep.kind, excess == 0.0, excess, text)
+    return Finding(keep.name, keep.kind, verdict, excess, text)
 
 
 def _limit_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
@@ -165,6 +171,11 @@ def _limit_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> It
             where = f", at place {place + 1}{_under(made.payloads[load])}"
         elif needs.targets:
             value, where = 0.0, ", counted in what is covered"
+        elif name == "bending":
+            bending = [bending_over_bounds(each.arm) for each in rules]
+            value = max(each.sharpest.value for each in bending)
+            where = ", over all bounds" + ", by search" * (not bending[0].exact)
         else:
-            value, where = max(each.of_bounds(name) for each in rules), ", over all bounds"
+            value = max(each.of_bounds(name) for each in rules)
+            where = ", over all bounds, by search"
         yield limit_finding(name, value if np.isfinite(value) else 0.0, most, made.arm, where)

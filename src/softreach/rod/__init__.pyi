@@ -10,6 +10,8 @@ from .loaded.shapes import Shapes as Shapes
 from .loaded.shooting import Equilibria as Equilibria
 from .loaded.shooting import Rung as Rung
 from .rods import tip_map as tip_map
+from .summary import DesignSummary as DesignSummary
+from .summary import describe as describe
 from .tip_map import Frames as Frames
 from .tip_map import StrainRange as StrainRange
 from .tip_map import Strains as Strains

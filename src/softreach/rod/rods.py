@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache, partial
 
+from softreach.arm.load_number import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.driven import DrivenRod
 from softreach.rod.free import FreeRod

@@ -160,11 +160,12 @@ def reach_text(check: Check, finding: Finding) -> str:
 
 
 def verdict_text(check: Check) -> str:
-    """Number of needs that are met, and the worst that is missed, in words."""
+    """Number of needs that are met, and the worst that is not, in words."""
     missed = [finding for finding in check.findings if not finding.met]
     text = f"needs: {len(check.findings) - len(missed)} of {len(check.findings)} met"
     if not missed:
         return text
     worst = max(missed, key=lambda finding: finding.excess)
     more = f" {reach_text(check, worst)}" if worst.kind == "reach" else ""
+    more += " undecided" if worst.verdict == "undecided" else ""
     return f"{text} · {worst.name}{more}"

@@ -9,11 +9,11 @@ import numpy as np
 from softreach.arm.actuators.ring_integrals import ring_integrals
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import describe
 from softreach.paper import printed
 from softreach.paper.claims import Finding, Numbers, Verdict, judged
 from softreach.paper.notebook import Notebook, Settings
 from softreach.rod.rods import tip_map
+from softreach.rod.summary import describe
 from softreach.support.errors import InvalidDesign
 from softreach.workspace import reachable_set
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import describe
 from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
 from softreach.rod.kinematics import tip_positions
+from softreach.rod.summary import describe
 
 
 def model(settings: Settings, folder: Path, notes: Notebook) -> None:

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.load_number import load_number
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import load_number
 from softreach.arm.tables import both_sides, ends_over, tables
 from softreach.support.errors import InvalidInput
 

@@ -12,12 +12,14 @@ if TYPE_CHECKING:
 
     from softreach.requirements import Check
 
-__all__ = ["MISSED", "REACHED", "draw_needs"]
+__all__ = ["COLORS", "draw_needs"]
 
 Array = NDArray[np.float64]
 
-REACHED, MISSED = (0, 150, 90), (215, 30, 50)
+REACHED, MISSED, UNDECIDED = (0, 150, 90), (215, 30, 50), (200, 130, 0)
 """Colors of places, RGB; a ball is reached and a cross missed, for who cannot tell them apart."""
+COLORS = {"met": REACHED, "missed": MISSED, "undecided": UNDECIDED}
+"""Colors of verdicts."""
 _BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # [L]
 _REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
 _MOST_LABELS = 20  # more would hide each other
@@ -38,15 +40,18 @@ def draw_needs(api: SceneApi, check: Check | None, around: Array) -> None:
         return
     if len(check.places):
         _draw_places(api, check)
-    length, met = check.arm.length, {(f.kind, f.name): f.met for f in check.findings}
+    length = check.arm.length
+    verdicts = {(f.kind, f.name): f.verdict for f in check.findings}
     needs = check.requirements
     named = [(keep.kind, keep.name, keep.region) for keep in needs.keeps]
     named += [("cover", t.name, t.region) for t in needs.targets if t.region is not None]
     for k, (kind, name, region) in enumerate(named):
-        broken = not met.get((kind, name), True)
+        verdict = verdicts.get((kind, name), "met")
         lines = [line / length for line in region.wireframe(around * length)]
         pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
-        color, width = (MISSED, _BROAD) if broken else (_REGION[kind], _FINE)
+        color, width = _REGION[kind], _FINE
+        if verdict != "met":
+            color, width = COLORS[verdict], _BROAD
         _add_lines(api, f"{_PATH}/region {k}", np.concatenate(pieces), color, width)
 
 

@@ -23,7 +23,7 @@ from softreach.studio.needs import (
     with_place,
     with_shortening,
 )
-from softreach.studio.scene.needs import MISSED, REACHED
+from softreach.studio.scene.needs import COLORS
 from softreach.studio.widgets import Line, number_of, show_where
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import text_of
@@ -205,7 +205,10 @@ def _numbers(text: str, count: int) -> list[float]:
     return numbers
 
 
+_SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
+
+
 def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
-    color, sign = (REACHED, "\N{CHECK MARK}") if finding.met else (MISSED, "\N{MULTIPLICATION X}")
+    mark, sign = Swatch(COLORS[finding.verdict]), _SIGNS[finding.verdict]
     text = reach_text(check, finding) if finding.kind == "reach" else finding.text
-    return Swatch(color), f" {sign} ", Term(finding.name, finding.text), f": {text}"
+    return mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"

@@ -12,30 +12,24 @@ from numpy.typing import NDArray
 
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
-from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.lines import line_strains
-from softreach.arm.loads import GRAVITY, Loads
+from softreach.arm.load_number import (
+    VERIFIED_LOAD_NUMBER,
+    is_overloaded,
+    load_number,
+    load_number_faults,
+    mass,
+)
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.scale import body_mass, scale_warnings
+from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
-from softreach.support.errors import Fault, InvalidDesign
+from softreach.rod.bending import bending_over_bounds
+from softreach.support.errors import Fault
 
-__all__ = [
-    "VERIFIED_LOAD_NUMBER",
-    "DesignSummary",
-    "describe",
-    "design_warnings",
-    "is_overloaded",
-    "load_number",
-    "load_number_faults",
-    "mass",
-]
+__all__ = ["DesignSummary", "describe", "design_warnings"]
 
 Array = NDArray[np.float64]
-
-VERIFIED_LOAD_NUMBER = 12.0
-"""Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +51,12 @@ class DesignSummary:
     extension: tuple[float, float]
     """Smallest and largest ζ in the activation box [-]."""
     curvature: tuple[float, float]
-    """Smallest and largest bending curvature times L, in the box and along the arm [-]."""
+    """Smallest and largest bending κ times L, in the box and along the arm, loads included [-]."""
     bundle_extension: Array
     """Smallest and largest ζ that each activation reaches alone [-], shape (bundle, 2)."""
     bundle_bending: Array
-    """Smallest and largest |κ| R2 that each activation reaches alone [-], shape (bundle, 2)."""
+    """Smallest and largest |κ| R2 that each activation reaches alone, without loads [-], shape
+    (bundle, 2)."""
     bundle_strain: Array
     """Smallest and largest change of length of each bundle by its own activation alone [-], along
     its middle line, shape (bundle, 2): negative where it shortens."""
@@ -90,7 +85,8 @@ def describe(arm: Manipulator) -> DesignSummary:
     """
     check_extension(a_manipulator("arm", arm))
     tip_radius = float(arm.profile.radius(arm.length))
-    body, alone = (arm.profile, arm.section), list(_alone(arm))
+    body, bending = (arm.profile, arm.section), bending_over_bounds(arm)
+    alone = list(_alone(arm))
     limits = (f"{part.default_name}: {part.validity}" for part in arm.actuators if part.validity)
     return DesignSummary(
         helical_angles=np.array([_angle_at_start(fiber, arm) for fiber in arm.fibers]),
@@ -100,10 +96,7 @@ def describe(arm: Manipulator) -> DesignSummary:
         radius_ratio=arm.section.inner_ratio,
         taper_ratio=float(arm.profile.radius(0.0)) / tip_radius,
         extension=extension_range(arm),
-        curvature=(
-            smallest_bending(arm).value * arm.length,
-            largest_bending(arm).value * arm.length,
-        ),
+        curvature=(bending.least * arm.length, bending.largest * arm.length),
         bundle_extension=np.array([extension_range(each) for each in alone]).reshape(-1, 2),
         bundle_bending=np.array([_slender_bending(each) for each in alone]).reshape(-1, 2),
         bundle_strain=line_strains(arm),
@@ -136,9 +129,9 @@ def _lacking(what: str, faults: list[Fault], known: str) -> Iterator[str]:
 
 
 def _alone(arm: Manipulator) -> Iterator[Manipulator]:
-    """For each activation, the arm whose other activations stay zero, without their actuators."""
+    """For each activation, the arm without loads whose other activations stay zero."""
     for actuator in arm.actuators:
-        bare = arm.replace(actuators=(actuator,), drives=())
+        bare = arm.replace(actuators=(actuator,), drives=(), loads=None)
         for bundle in range(bare.bundles):
             bounds = np.zeros_like(bare.bounds)
             bounds[bundle] = bare.bounds[bundle]
@@ -147,62 +140,14 @@ def _alone(arm: Manipulator) -> Iterator[Manipulator]:
 
 def _slender_bending(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest |κ| R2 anywhere along the arm [-]."""
-    if ((arm.bounds[:, 0] <= 0) & (arm.bounds[:, 1] >= 0)).all():
-        return 0.0, sharpest_bending(arm).value
-    z = both_sides(arm, np.linspace(0.0, arm.length, 101))
-    smallest = bending_at(arm, z)[0] * arm.profile.radius(z)
-    return float(smallest.min()), sharpest_bending(arm).value
+    bending = bending_over_bounds(arm)
+    return bending.gentlest, bending.sharpest.value
 
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
     angle = fiber.helical_angle_on(arm.profile, arm.section)
     start, _ = fiber.span_over_length(arm.length)
     return float(angle(start)) if isinstance(angle, AlongArm) else angle
-
-
-def mass(arm: Manipulator) -> float:
-    """Mass of the arm [kg].
-
-    Raises:
-        InvalidDesign: A layer without a density.
-    """
-    return body_mass(arm.profile, arm.section)
-
-
-def load_number(arm: Manipulator) -> float:
-    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-], theory (79).
-
-    Without loads, w is the weight per length at the base under g = 9.81 m/s², and P is 0: Λ is
-    ρ g L³/(E R2²) for a solid arm of one material, and an upright cylinder buckles under its own
-    weight at 1.96. With loads, w is the weight under their gravity and the force per length beside
-    it, P the sum of all other forces, payload included, and of all moments over L. Sizes are added
-    whatever their directions, so that Λ bounds what bends the arm.
-
-    Raises:
-        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
-    """
-    if faults := load_number_faults(arm):
-        raise InvalidDesign(faults)
-    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
-    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
-    stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
-    return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
-
-
-def is_overloaded(arm: Manipulator) -> bool:
-    """The load number is above what was verified, by more than rounding.
-
-    Raises:
-        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
-    """
-    return load_number(arm) > VERIFIED_LOAD_NUMBER * (1 + 1e-9)
-
-
-def load_number_faults(arm: Manipulator) -> list[Fault]:
-    """Faults that keep the load number from being known."""
-    faults = arm.section.modulus_faults("where weight counts")
-    weighs = arm.loads is None or any(arm.loads.gravity)
-    return faults + (arm.section.density_faults("where weight counts") if weighs else [])
 
 
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
@@ -218,7 +163,7 @@ def design_warnings(arm: Manipulator) -> tuple[str, ...]:
 
 
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:
-    sharpest = sharpest_bending(arm)
+    sharpest = bending_over_bounds(arm).sharpest
     if sharpest.value >= 1:
         place = f"Z = {sharpest.station / arm.length:.2f} L"
         yield (

@@ -1,0 +1,134 @@
+"""Extremes of bending over the bounds of any arm: exact where there is a way, by search else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.arm.bending import (
+    Extreme,
+    bending_at,
+    bending_stations,
+    has_exact_bending,
+    largest_bending,
+    sharpest_bending,
+    smallest_bending,
+)
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
+from softreach.sampling import sample_cube
+from softreach.support.arrays import Array
+
+__all__ = ["BendingRange", "bending_over_bounds", "some_corners", "worst_inputs"]
+
+_MOST_CORNERS = 10  # inputs of which all corners are tried
+_OF_BENDING = 256  # samples for which bending is looked at, which loads make dear
+_AROUND, _ROUNDS, _SHRINK = 32, 12, 0.6
+
+
+class BendingRange(NamedTuple):
+    """Range of the bending κ of the centerline as it is, in the bounds and along the arm."""
+
+    least: float
+    """κ [1/m]."""
+    largest: float
+    """κ [1/m]."""
+    gentlest: float
+    """κ R2, R2 before activation [-]."""
+    sharpest: Extreme
+    """κ R2 [-], and where it is."""
+    exact: bool
+    """False of what a search found, which may miss more."""
+
+
+@lru_cache(maxsize=64)
+def bending_over_bounds(arm: Manipulator) -> BendingRange:
+    """Range of bending over all inputs within the bounds, under the loads of the arm.
+
+    Exact where `has_exact_bending`, else by `worst_inputs`.
+
+    Raises:
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+    stations = bending_stations(arm).ravel()
+    radius = arm.profile.radius(stations)
+    if has_exact_bending(arm):
+        least, largest = smallest_bending(arm).value, largest_bending(arm).value
+        gentlest = float((bending_at(arm, stations)[0] * radius).min()) if least else 0.0
+        return BendingRange(least, largest, gentlest, sharpest_bending(arm), exact=True)
+    rod = tip_map(arm, warn=False)
+    strains_of = rod.strains_at(stations)
+
+    def bending(gamma: Array) -> Array:
+        curvature = strains_of(gamma).curvature
+        return np.hypot(curvature[..., 0], curvature[..., 1])
+
+    def ends(gamma: Array) -> Array:
+        kappa = bending(gamma)
+        return np.stack([-kappa.min(axis=1), kappa.max(axis=1), (kappa * radius).max(axis=1)], 1)
+
+    gamma, value = worst_inputs(rod, ends, _OF_BENDING)
+    least, largest, sharpest = np.where(np.isfinite(value), np.abs(value), 0.0).tolist()
+    gentlest, _, relative = np.nan_to_num(bending(gamma) * radius)
+    place = Extreme(sharpest, float(stations[relative.argmax()]))
+    return BendingRange(least, largest, float(gentlest.min()), place, exact=False)
+
+
+def worst_inputs(
+    rod: TipMap, measure: Callable[[Array], Array], samples: int = 2048
+) -> tuple[Array, Array]:
+    """The inputs within the bounds at which each of some measures is largest, by search.
+
+    Samples, corners and faces of the box, then the neighborhood of the worst: it proves nothing.
+
+    Args:
+        rod: The tip map.
+        measure: Inputs (n, inputs) -> values (n, k); NaN where there is no arm.
+        samples: Number of samples, a power of two, and half as many on faces.
+
+    Returns:
+        Inputs, shape (k, inputs), and values there, shape (k,); -inf where no arm was found.
+    """
+    box = rod.box
+
+    def of(gamma: Array) -> Array:
+        return np.nan_to_num(measure(gamma), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+
+    rng = np.random.default_rng(0)
+    inside = box.from_cube(sample_cube("sobol", samples, box.bundles))
+    faces = box.from_cube(rng.random((samples // 2, box.bundles)).round(0))
+    mixed = np.where(rng.random(faces.shape) < 0.5, faces, inside[: len(faces)])
+    every = np.concatenate([inside, some_corners(rod), mixed])
+    values = of(every)
+    best = []
+    for column in range(values.shape[1]):
+        worst = np.argsort(-values[:, column], kind="stable")[: 4 if samples > _OF_BENDING else 2]
+        gamma, value, width = every[worst], values[worst, column], 0.25
+        row = np.arange(len(gamma))
+        for _ in range(_ROUNDS):
+            around = rng.normal(size=(_AROUND, *gamma.shape)) * width * box.widths
+            tried = box.clip(gamma + around)
+            found = of(tried.reshape(-1, box.bundles))[:, column].reshape(_AROUND, -1)
+            top = found.argmax(axis=0)
+            better = found[top, row] > value
+            gamma = np.where(better[:, None], tried[top, row], gamma)
+            value = np.where(better, found[top, row], value)
+            width *= _SHRINK
+        best.append((gamma[value.argmax()], value.max()))
+    return np.array([each for each, _ in best]), np.array([top for _, top in best])
+
+
+def some_corners(rod: TipMap) -> Array:
+    """Corners of the activation box, and each input at its bounds alone, shape (n, inputs)."""
+    box = rod.box
+    alone = np.tile(box.clip(np.zeros(box.bundles)), (2 * box.bundles, 1))
+    each = np.arange(box.bundles)
+    alone[each, each], alone[box.bundles + each, each] = box.low, box.high
+    if box.bundles <= _MOST_CORNERS:
+        return np.unique(np.concatenate([box.corners(), alone]), axis=0)
+    pushed = np.random.default_rng(0).random((2**_MOST_CORNERS, box.bundles)).round()
+    return np.concatenate([np.stack([box.low, box.high]), box.from_cube(pushed), alone])
