@@ -447,7 +447,7 @@ NUMBERS = ("rings[0].material.young_modulus=1MPa", "rings[0].material.density=10
 
 def saved(folder, *arguments):
     """The design that `softreach design ... --out` writes."""
-    assert run(["design", *arguments, "--out", "a.toml"]) == 0
+    assert run(["design", *arguments, "--out", "a.toml", "--overwrite"]) == 0
     return sr.Manipulator.load("a.toml")
 
 
