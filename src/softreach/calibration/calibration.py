@@ -24,7 +24,7 @@ from softreach.calibration.errors import (
     misses,
     repeatability,
 )
-from softreach.calibration.exchanged import Exchange, exchanged_columns
+from softreach.calibration.exchanged import exchanged_columns
 from softreach.calibration.fit import Fit, fitted, robust_width, started
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
@@ -225,8 +225,8 @@ class Calibration:
     uncertainty: Uncertainty
     rivals: tuple[Rival, ...]
     """Other laws on the same samples."""
-    exchange: Exchange | None
-    """Columns by whose exchange the same numbers would fit far better."""
+    exchange: tuple[str, float] | None
+    """Columns by whose exchange the same numbers would fit far better, and the error then [m]."""
     seconds: float
     date: str
 
@@ -292,11 +292,11 @@ class Calibration:
         far = np.isin(self.data.rows, self.outliers)
         said = ""
         if self.exchange is not None:
-            less = 1e3 * misses(self.exchange.fit.residuals).rms
+            columns, less = self.exchange
             said = (
-                f"{self.exchange.columns} seem to be exchanged, or counted the other way round: "
+                f"{columns} seem to be exchanged, or counted the other way round: "
                 f"the same numbers then fit to "
-                f"{less:.3g} mm rms instead of {1e3 * self.train.rms:.3g} mm"
+                f"{1e3 * less:.3g} mm rms instead of {1e3 * self.train.rms:.3g} mm"
             )
         repeated = self.repeatability
         return judged(self.data, self.residuals, repeated, f"{name} error", rows, far, said)

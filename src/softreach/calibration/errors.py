@@ -15,7 +15,7 @@ __all__ = ["Misses", "Repeatability", "Verdict", "judged", "misses", "repeatabil
 Array = NDArray[np.float64]
 
 _NEAR = (0.05, 0.1)
-"""Distances of inputs, over their ranges, within which two samples count as repeated."""
+"""Distances of inputs, over their ranges, within which two samples are near."""
 _FEW = 8
 _NOISE = 1.5
 """Held-out error over what the data repeats, up to which noise is all."""
@@ -73,12 +73,10 @@ class Repeatability(NamedTuple):
     """Of a place about its mean [m]; NaN where no inputs are repeated."""
     pairs: int
     """Pairs of samples that it is of."""
-    exact: bool
-    """True if their inputs are equal, else near."""
 
 
 def repeatability(data: Measurements, residuals: Array) -> Repeatability:
-    """From pairs of samples with the same inputs, or near ones (5 % of their ranges, or 10 %).
+    """From pairs of samples with the same inputs, or with near ones.
 
     Residuals are compared and not places, so that the arm's own motion between near inputs does not
     count.
@@ -90,20 +88,21 @@ def repeatability(data: Measurements, residuals: Array) -> Repeatability:
     spans = np.ptp(data.inputs, axis=0)
     moving = spans > 0
     if not moving.any() or len(data) < 2:
-        return Repeatability(np.nan, 0, False)
+        return Repeatability(np.nan, 0)
     from scipy.spatial import KDTree
 
     scaled = data.inputs[:, moving] / spans[moving]
     distances, near = (np.asarray(values) for values in KDTree(scaled).query(scaled, k=2))
     itself = near[:, 0] == np.arange(len(data))  # of two copies either may come first
     distance, partner = distances[:, 1], np.where(itself, near[:, 1], near[:, 0])
-    for limit in (1e-9, *_NEAR):
+    many = len(data) >= 10 * (1 + 3 * moving.sum())  # so that laws of the inputs are judged too
+    for limit in (1e-9, *_NEAR[: 1 + many]):
         rows = np.flatnonzero(distance <= limit)
         square = ((residuals[rows] - residuals[partner[rows]]) ** 2).sum(axis=2)
         square = square[np.isfinite(square)]
         if len(square) >= _FEW:
-            return Repeatability(float(np.sqrt(0.5 * square.mean())), len(rows), limit < _NEAR[0])
-    return Repeatability(np.nan, 0, False)
+            return Repeatability(float(np.sqrt(0.5 * square.mean())), len(rows))
+    return Repeatability(np.nan, 0)
 
 
 @dataclass(frozen=True)
@@ -113,9 +112,6 @@ class Verdict:
     limit: str
     """"noise", "memory", "physics" or "columns"; "data" where there is too little to tell."""
     sentence: str
-    memory: float
-    """Share of the squared residuals that the last command explains beyond every law of the inputs,
-    by cross-validation [-]."""
 
 
 def judged(
@@ -151,29 +147,30 @@ def judged(
     text = f"({text}){finding and '; '}{finding}"
     law, share = _explained(data, residuals)
     if exchanged:
-        return Verdict("columns", f"{exchanged} {text}", share)
-    if share > _MEMORY and not finding:
+        return Verdict("columns", f"{exchanged} {text}")
+    if share > max(_MEMORY, law) and not finding:
         said = (
             f"limited by memory: the commands before explain {100 * share:.0f} % of what is left "
             "(friction, creep or slack of the drives), which no law of the inputs alone does"
         )
-        return Verdict("memory", f"{said} {text}", share)
+        return Verdict("memory", f"{said} {text}")
     if known and error <= _NOISE * repeated.rms and law < _LAW and not finding:
         said = "limited by noise: the error is that of the data itself"
-        return Verdict("noise", f"{said} {text}", share)
+        return Verdict("noise", f"{said} {text}")
     if len(data) < _FEW:
-        return Verdict("data", f"too few samples to say what limits the fit {text}", share)
+        return Verdict("data", f"too few samples to say what limits the fit {text}")
     if law >= _LAW:
         said = f"a law of the inputs explains {100 * law:.0f} % of what is left, such as another "
         said += "geometry or inputs that saturate"
+        said += f", and the commands before {100 * share:.0f} % beyond" if share > _MEMORY else ""
     elif known:
         said = "the error is beyond what the data repeats"
     elif not finding:
         said = "limited by missing physics, or by noise: no inputs are repeated, so nothing tells"
-        return Verdict("data", f"{said} {text}", share)
+        return Verdict("data", f"{said} {text}")
     else:
         said = "samples far off are no slips"
-    return Verdict("physics", f"limited by missing physics: {said} {text}", share)
+    return Verdict("physics", f"limited by missing physics: {said} {text}")
 
 
 def _finding(data: Measurements, far: NDArray[np.bool_]) -> str:

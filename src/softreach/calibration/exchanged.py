@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from softreach.calibration.model import MarkerModel, exchanged_inputs
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress
 
-__all__ = ["Exchange", "exchanged_columns"]
+__all__ = ["exchanged_columns"]
 
 Array = NDArray[np.float64]
 
@@ -28,14 +27,6 @@ _ALIKE = 1.2
 """Factor between errors that nothing tells apart."""
 
 
-class Exchange(NamedTuple):
-    """Columns by whose exchange the same numbers fit far better."""
-
-    columns: str
-    fit: Fit
-    """With them exchanged."""
-
-
 def exchanged_columns(
     fit: Fit,
     model: MarkerModel,
@@ -44,21 +35,14 @@ def exchanged_columns(
     robust: bool,
     noise: float | None,
     progress: Progress,
-) -> Exchange | None:
-    """The exchange of two columns that halves the error of a fit at least, if there is one.
+) -> tuple[str, float] | None:
+    """The exchange of two columns that halves the error of a fit at least, and its error, rms [m].
 
-    Args:
-        fit: The fit with the columns as they are.
-        model: Its model.
-        places: Measured places [m], shape (n, marker, 3).
-        robust: As in `fitted`.
-        noise: As in `fitted`.
-        progress: Called with 1 for each step.
+    Arguments are those of `fitted` and the fit with the columns as they are.
     """
     some = slice(None, None, -(-len(places) // _SAMPLES))
     few, seen = replace(model, inputs=model.inputs[some]), places[some]
     least, best = _BETTER * misses(fit.residuals).rms, None
-    tried: set[str] = set()
     for values in (model.free.start, fit.values):
         own = few.predict(values).places
         each = {text: (order, None) for text, order in exchanged_inputs(model.free.arm)}
@@ -68,14 +52,11 @@ def exchanged_columns(
             other = few if inputs is None else replace(few, inputs=few.inputs[:, inputs])
             predicted = own if inputs is None else other.predict(values).places
             found[text] = moved_miss(model.free, predicted, _ordered(seen, columns))
-        first = min(found, key=found.__getitem__, default="")
-        if not first or found[first] > _PROMISING * moved_miss(model.free, own, seen):
+        first = min(found, key=found.__getitem__)
+        if found[first] > _PROMISING * moved_miss(model.free, own, seen):
             continue
         alike = [text for text, miss in found.items() if miss <= _ALIKE * found[first]]
         inputs, columns = each[first]
-        if first in tried:
-            continue
-        tried.add(first)
         other = model if inputs is None else replace(model, inputs=model.inputs[:, inputs])
         moved = _ordered(places, columns)
         try:
@@ -84,7 +65,7 @@ def exchanged_columns(
         except InvalidInput:
             continue
         if (error := misses(again.residuals).rms) < least:
-            least, best = error, Exchange(" or ".join(alike[:4]), again)
+            least, best = error, (" or ".join(alike[:4]), error)
     return best
 
 

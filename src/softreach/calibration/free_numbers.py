@@ -163,11 +163,6 @@ class FreeNumbers:
         )
         return replace(self, numbers=numbers)
 
-    def without(self, names: Sequence[str]) -> FreeNumbers:
-        """The same with some held where they are."""
-        kept = tuple(number for number in self.numbers if number.name not in names)
-        return replace(self, numbers=kept)
-
 
 def free_numbers(
     arm: Manipulator, free: Sequence[str], prior: Mapping[str, Any] | None = None

@@ -144,7 +144,7 @@ def read_measurements(
             arm has: tensions below 0, inputs 100 times its bounds, markers 4 lengths away.
 
     Warns:
-        SoftreachWarning: Markers that were never seen; inputs below a hundredth of the bounds.
+        SoftreachWarning: Markers that were never seen.
     """
     arm = a_manipulator("arm", arm)
     if isinstance(data, Measurements):
@@ -177,7 +177,7 @@ def read_measurements(
         places = places[:, seen.any(axis=0)]
         chosen = {name: start for name, start in chosen.items() if name not in lost}
     _refuse_far(arm, places, [triples[start] for start in chosen.values()])
-    _check_inputs(arm, values, sources)
+    _refuse_inputs(arm, values, sources)
     runs, run_names = _runs(table, run)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
@@ -300,8 +300,8 @@ def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]
     raise InvalidInput(f"{name} in row {row}", given, allowed)
 
 
-def _check_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
-    """Refuse tensions that push, and inputs far beyond the bounds; warn of ones far below."""
+def _refuse_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
+    """Refuse tensions that push, and inputs far beyond the bounds."""
     bundles = [*[None] * len(arm.drives), *(arm.undriven if arm.drives else range(arm.bundles))]
     most = np.abs(arm.input_bounds).max(axis=1)
     for unit in dict.fromkeys(arm.input_units):
@@ -317,11 +317,6 @@ def _check_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> No
                 f"near the bounds of the design, {bound:.4g} {unit}: look at the column's unit"
             )
             raise InvalidInput(f"{name} in row {row}", reached, allowed)
-        if size.max() < bound / _HARD:
-            warn(
-                f"{name} reaches {reached} and no input of its kind more, where the design bears "
-                f"{bound:.4g} {unit}: look at the column's unit"
-            )
         for j in own:
             actuator = None if bundles[j] is None else arm.bundle_actuators[bundles[j]]
             row = int(values[:, j].argmin())
