@@ -165,3 +165,24 @@ def test_verdicts_tell_noise_memory_and_missing_physics_apart():
     assert _verdict(noise).limit == "noise"
     assert _verdict(memory).limit == "memory"
     assert _verdict(physics).limit == "physics"
+
+
+def test_samples_far_off_are_slips_if_they_are_few_and_of_different_inputs():
+    arm = hanging_tentacle()
+    corners = np.stack(np.meshgrid(*[[0.0, 2.0]] * 3), axis=-1).reshape(-1, 3)
+    inputs = np.tile(corners, (15, 1))
+    left = 1e-3 * np.random.default_rng(0).standard_normal((len(inputs), 2, 3))
+    data = read_measurements(arm, columns(arm, inputs, marker_positions(arm, inputs) - left))
+
+    def verdict(rows):
+        far = np.isin(np.arange(len(inputs)), rows)
+        off = left + 0.05 * far[:, None, None]
+        every = np.ones(len(inputs), bool)
+        return judged(data, off, repeatability(data, left), "error", every, far)
+
+    slips, many, one = verdict([3, 52]), verdict(range(0, 99, 9)), verdict(range(5, 120, 8))
+    assert slips.limit == "noise"
+    assert "mm without the rows far off" in slips.sentence
+    assert "11 of 120 rows are far off, more than slips would be" in many.sentence
+    assert "15 of 15 rows with inputs such as" in one.sentence
+    assert {many.limit, one.limit} == {"physics"}
