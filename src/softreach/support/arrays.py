@@ -33,6 +33,7 @@ __all__ = [
     "check_finite",
     "joined",
     "joined_by",
+    "labeled",
     "read_only",
     "rows",
 ]
@@ -94,6 +95,22 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
     raise InvalidInput(name, _described(values, array), allowed)
 
 
+def labeled(name: str, values: Any, labels: Sequence[str]) -> Any:
+    """An xarray array with the columns that have these labels, in their order; others as given.
+
+    Raises:
+        InvalidInput: Some label has no column.
+    """
+    dims = [dim for dim in getattr(values, "dims", ()) if dim in ("axis", "bundle")]
+    if len(dims) != 1 or dims[0] not in values.coords:
+        return values
+    known = [str(label) for label in values.coords[dims[0]].values]
+    if sorted(known) != sorted(labels):
+        raise InvalidInput(f"{name}.{dims[0]}", ", ".join(known), f"labeled {', '.join(labels)}")
+    columns = [known.index(label) for label in labels]
+    return values.isel({dims[0]: columns}).transpose(..., dims[0])
+
+
 def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
     """Finite numbers of shape (n, columns); one row may stand alone."""
     rows = as_floats(name, values, allowed)
@@ -106,7 +123,7 @@ def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
 def as_points(name: str, values: object) -> Points:
     """Finite positions [m], shape (n, 3); one may stand alone, and an empty array is none."""
     allowed = "of shape (n, 3), positions in m"
-    points = as_floats(name, values, allowed)
+    points = as_floats(name, labeled(name, values, ("x", "y", "z")), allowed)
     if points.size == 0 and points.ndim <= 2:
         return points.reshape(0, 3)
     return as_rows(name, points, 3, allowed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -65,6 +66,18 @@ class InvalidInput(SoftreachError, ValueError):
         super().__init__(f"{message}; {hint}" if hint else message)
 
 
+def check_date() -> None:
+    """Refuse a date of files in the environment that NumPy and Matplotlib cannot read.
+
+    Raises:
+        InvalidInput: `SOURCE_DATE_EPOCH` is no time of a calendar.
+    """
+    date = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not (date.isascii() and date.isdigit() and len(date) < 12):
+        allowed = "a whole number of seconds since 1970, or left out"
+        raise InvalidInput("SOURCE_DATE_EPOCH", repr(date), allowed)
+
+
 class Range(NamedTuple):
     """The numbers that a quantity may take."""
 
@@ -83,7 +96,7 @@ class Range(NamedTuple):
             return False
         above = value > self.low or (value == self.low and not self.open_low)
         below = value < self.high or (value == self.high and not self.open_high)
-        return above and below and math.isfinite(value)
+        return above and below and abs(value) <= sys.float_info.max
 
     def in_degrees(self) -> Range:
         """The same range of an angle, for files and the command line."""

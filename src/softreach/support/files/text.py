@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import stat
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from softreach.support.errors import InvalidInput
 
-__all__ = ["MEGABYTE", "read_text"]
+__all__ = ["MEGABYTE", "read_text", "tables_of"]
 
 MEGABYTE = 1_000_000
 
@@ -34,6 +37,35 @@ def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
     if (place := text.find("\0")) >= 0:
         raise _no_text(name, path, f"character {place} is NUL")
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
+    """The tables of TOML text.
+
+    Args:
+        text: TOML.
+        number: Maker of the value of a number with a point or an exponent.
+
+    Raises:
+        ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
+    """
+    try:
+        tables = tomllib.loads(text, parse_float=number)
+        if not _fit_64_bits(tables):
+            raise OverflowError
+    except tomllib.TOMLDecodeError:
+        raise
+    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
+        raise ValueError("a whole number has more than 64 bits") from None
+    except RecursionError:
+        raise ValueError("lists or tables are nested too deep") from None
+    return tables
+
+
+def _fit_64_bits(value: Any) -> bool:
+    if isinstance(value, dict | list):
+        return all(map(_fit_64_bits, value.values() if isinstance(value, dict) else value))
+    return not isinstance(value, int) or -(2**63) <= value < 2**63
 
 
 def _bytes_of(name: str, path: str | os.PathLike[str], most: int) -> bytes:
