@@ -45,6 +45,9 @@ several that are none of these."""
 _NEAREST = 1e-12
 """Z/L by which stations differ at least: less is rounding."""
 
+_NOTHING = 1e-30
+"""Size up to which a component of a vector is 0: its powers would be."""
+
 _SENSE: Mapping[str, tuple[float, float]] = {
     "L": (1e-6, 1e3),
     "m": (1e-9, 1e3),
@@ -180,7 +183,9 @@ class Number:
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
-        if self.shape in ("triple", "series", "stations", "several"):
+        if self.shape == "triple":
+            return tuple(x if abs(x) > _NOTHING else 0.0 for x in as_numbers(value).tolist())
+        if self.shape in ("series", "stations", "several"):
             return tuple(np.asarray(value, float).tolist())
         if value is None or (self.along is not None and isinstance(value, self.along)):
             return value
@@ -207,7 +212,9 @@ class Number:
         ]
 
     def _allowed_instead_of(self, value: Any, limits: Range | None) -> Range | str:
-        if limits and (self.along is None or self.shape == "single" and isinstance(value, int | float)):
+        if limits and (
+            self.along is None or (self.shape == "single" and isinstance(value, int | float))
+        ):
             return limits
         functions = f"{self.along.__name__} along the arm"
         functions = f"two at its ends, or {functions}" if self.pair else functions

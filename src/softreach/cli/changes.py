@@ -232,7 +232,9 @@ def _unchanged(text: str) -> Manipulator:
     if path.suffix.lower() in _POINTS:
         allowed = "a .toml file, a built-in design, or a .zarr cloud where a command takes one"
         hint = "for the volume of points of your own: softreach.concave_hull(points, alpha=0.05)"
-        raise InvalidInput("design", text, allowed, f"{hint} in Python, points in m of shape (n, 3)")
+        raise InvalidInput(
+            "design", text, allowed, f"{hint} in Python, points in m of shape (n, 3)"
+        )
     is_named = path.exists() and not path.is_dir() and path.suffix != ".json"
     if is_named or path.suffix == ".toml":
         return Manipulator.load(text)  # which refuses what is no file, such as a pipe

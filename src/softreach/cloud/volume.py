@@ -13,10 +13,10 @@ from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import Hull
-from softreach.schema import is_stable
+from softreach.schema import AXES, is_stable
 from softreach.support import parallel
 from softreach.support.arguments import POSITIVE, as_flag, as_given, plain
-from softreach.support.arrays import Mask, as_floats, as_points
+from softreach.support.arrays import Mask, as_floats, as_points, labeled
 from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
@@ -154,9 +154,7 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
 
     Of an arm under loads those tips that are stable equilibria.
     """
-    array = as_floats("points", points)
-    if getattr(points, "dims", None) == ("axis", "sample"):
-        array = array.T
+    array = as_floats("points", labeled("points", points, AXES))
     if not isinstance(points, np.ndarray) and "status" in getattr(points, "coords", ()):
         array = array[is_stable(points)]
     return as_points("points", array)

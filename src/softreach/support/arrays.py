@@ -102,13 +102,14 @@ def labeled(name: str, values: Any, labels: Sequence[str]) -> Any:
         InvalidInput: Some label has no column.
     """
     dims = [dim for dim in getattr(values, "dims", ()) if dim in ("axis", "bundle")]
-    if len(dims) != 1 or dims[0] not in values.coords:
+    if len(dims) != 1:
         return values
-    known = [str(label) for label in values.coords[dims[0]].values]
-    if sorted(known) != sorted(labels):
-        raise InvalidInput(f"{name}.{dims[0]}", ", ".join(known), f"labeled {', '.join(labels)}")
-    columns = [known.index(label) for label in labels]
-    return values.isel({dims[0]: columns}).transpose(..., dims[0])
+    if (dim := dims[0]) in values.coords:
+        known = [str(label) for label in values.coords[dim].values]
+        if sorted(known) != sorted(labels):
+            raise InvalidInput(f"{name}.{dim}", ", ".join(known), f"labeled {', '.join(labels)}")
+        values = values.isel({dim: [known.index(label) for label in labels]})
+    return values.transpose(..., dim)
 
 
 def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
