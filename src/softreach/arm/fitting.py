@@ -163,8 +163,8 @@ def _far_faults(actuator: Actuator, profile: Profile) -> Iterator[Fault]:
     radius = float(np.max(profile.radius(np.linspace(0.0, profile.length, 65))))
     allowed = f"must be at most the length of the arm, {profile.length:g} m"
     for name in ("distance", "distance_ratio", "radius", "radius_ratio"):
-        value = getattr(actuator, name, None)
-        values = getattr(value, "values", value)
+        value: Any = getattr(actuator, name, None)
+        values: Any = getattr(value, "values", value)
         scale = radius if name.endswith("ratio") else 1.0
         if value is not None and scale * np.max(values) > profile.length:
             yield Fault(name, values, allowed)

@@ -163,7 +163,7 @@ class Number:
             return self._refused((k, each) for k, each in elements if math.isfinite(each))
         if self.shape == "several":
             elements = as_numbers(value)
-            if elements.ndim != 1 or len(elements) != np.size(value):
+            if elements.ndim != 1 or elements.shape != np.shape(value):  # pyright: ignore[reportArgumentType]
                 return [Fault(self.field, value, "must be a sequence of numbers")]
             return self._refused(enumerate(elements.tolist()))
         if self.shape == "triple":
@@ -212,10 +212,9 @@ class Number:
         ]
 
     def _allowed_instead_of(self, value: Any, limits: Range | None) -> Range | str:
-        if limits and (
-            self.along is None or (self.shape == "single" and isinstance(value, int | float))
-        ):
-            return limits
+        is_number = self.shape == "single" and isinstance(value, int | float)
+        if self.along is None or (is_number and limits):
+            return limits or self.allowed
         functions = f"{self.along.__name__} along the arm"
         functions = f"two at its ends, or {functions}" if self.pair else functions
         single = f"{self.allowed.text}, or " if self.shape == "single" else ""

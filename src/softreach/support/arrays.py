@@ -53,6 +53,7 @@ Points = NDArray[np.float64]
 Faces = NDArray[np.integer]
 """Triangles as rows of three vertices, shape (n, 3)."""
 
+_FARTHEST = 1e9  # of positions [m]: their powers must be numbers
 _NUMBERS = "an array of numbers"
 
 Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
@@ -127,7 +128,12 @@ def as_points(name: str, values: object) -> Points:
     points = as_floats(name, labeled(name, values, ("x", "y", "z")), allowed)
     if points.size == 0 and points.ndim <= 2:
         return points.reshape(0, 3)
-    return as_rows(name, points, 3, allowed)
+    points = as_rows(name, points, 3, allowed)
+    if max(-points.min(), points.max()) > _FARTHEST:
+        raise InvalidInput(
+            name, f"up to {np.abs(points).max():g} m", f"at most {_FARTHEST:g} m far"
+        )
+    return points
 
 
 def check_finite(name: str, values: Array) -> Array:
