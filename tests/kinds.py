@@ -182,6 +182,7 @@ def driven(arm: Manipulator, sharpness: float = 3.0) -> Manipulator:
     bend = np.linalg.norm(table.curvature, axis=1).max(axis=0) * arm.length / sharpness
     largest = 1.0 / np.maximum(np.maximum(stretch, bend), 1e-29) / arm.bundles
     pulls = np.array([isinstance(one, Tendon) for one in arm.actuators for _ in range(one.bundles)])
+    largest = np.minimum(largest, 1e15)
     return arm.with_bounds(np.stack([np.where(pulls, 0.0, -largest), largest], axis=1))
 
 

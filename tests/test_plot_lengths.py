@@ -43,7 +43,7 @@ def si(label: str, numbers: object) -> np.ndarray:
     """Numbers on an axis in powers of m, as its label says: "x / L", "V [m³]", "0.1 L", "κL"."""
     if label == "":
         return np.asarray(numbers, float)
-    if label in ("κL", "$u_3$L"):
+    if label in ("κL", "u₃L"):
         return np.asarray(numbers, float) / LENGTH
     if "[1/m]" in label:
         return np.asarray(numbers, float)
@@ -282,7 +282,7 @@ def sheet(of, draw) -> Iterator[Shown]:
     yield "y / L", panel.get_ylim(), seen[:, 1]
     margin = figure.axes[-1]
     (bar,) = margin.lines
-    assert margin.texts[0].get_text() == "$L/2$"
+    assert margin.texts[0].get_text() == "L/2"
     ends = bar.get_xdata()
     ends = np.clip(ends, *margin.get_xlim()) if bar.get_clip_on() else ends  # as far as it shows
     inches = np.ptp(ends) / np.ptp(margin.get_xlim()) * margin.get_position().width

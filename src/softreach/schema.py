@@ -143,7 +143,15 @@ def configuration_dataset(
 
 def a_cloud(name: str, value: object) -> xr.Dataset:
     """A dataset that looks like a cloud; `check_cloud` looks closer."""
-    return as_dataset(name, value, "tip", "activation", what="a cloud")
+    return _along_axes(name, as_dataset(name, value, "tip", "activation", what="a cloud"))
+
+
+def _along_axes(name: str, cloud: xr.Dataset) -> xr.Dataset:
+    """The cloud itself, if its axes are labeled x, y, z or not at all."""
+    labels = tuple(map(str, cloud["axis"].values))
+    if "axis" in cloud.coords and labels != AXES:
+        raise InvalidInput(f"{name}.axis", ", ".join(labels), "x, y, z in this order")
+    return cloud
 
 
 def a_configuration(name: str, value: object) -> xr.Dataset:
@@ -169,7 +177,7 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     version = cloud.attrs.get("schema_version")
     if version != SCHEMA_VERSION:
         raise InvalidInput("cloud.attrs['schema_version']", version, str(SCHEMA_VERSION))
-    return cloud
+    return _along_axes("cloud", cloud)
 
 
 def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:

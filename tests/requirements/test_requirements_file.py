@@ -228,6 +228,6 @@ def test_a_mesh_with_holes_is_refused_with_their_number(tmp_path):
     box.update_faces(np.arange(12) > 1)
     box.export(tmp_path / "open.stl")
     with pytest.raises(InvalidInput, match=r"open\.stl = a mesh with holes: 4 open edges"):
-        Mesh.load(tmp_path / "open.stl")
+        Mesh.load(tmp_path / "open.stl", unit="m")
     with pytest.raises(InvalidInput, match="exists"):
         sr.requirements.Mesh.load(tmp_path / "none.stl")

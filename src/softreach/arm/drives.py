@@ -10,16 +10,16 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.number import Number, is_path_name, number
+from softreach.arm.number import MOST, Number, is_path_name, number
 from softreach.arm.part import Part
-from softreach.support.arguments import plain
-from softreach.support.errors import Fault, Range
+from softreach.support.arguments import as_given, plain
+from softreach.support.errors import Fault, InvalidInput, Range
 
 __all__ = ["BundleNumbers", "Drive", "drive_faults"]
 
 Array = NDArray[np.float64]
 
-_FINITE = Range()
+_FINITE = Range(-MOST, MOST)
 
 
 class BundleNumbers(Mapping[str, float]):
@@ -101,7 +101,12 @@ class Drive(Part):
             offset: Activation of both at u = 0, such as a pretension.
             unit: Of u.
             dead_zone: Largest |u| without effect [unit].
+
+        Raises:
+            InvalidInput: Both bundles are the same.
         """
+        if pulls == releases:
+            raise InvalidInput("releases", as_given(releases), "another bundle than it pulls")
         offsets = {pulls: offset, releases: offset} if offset else {}
         gains = {pulls: gain, releases: -gain}
         return cls(
@@ -168,7 +173,7 @@ class Drive(Part):
         is_pair = isinstance(self.bounds, Sequence | np.ndarray) and len(self.bounds) == 2
         bounds = [plain(bound) for bound in self.bounds] if is_pair else []
         if not is_pair or not all(map(_FINITE.admits, bounds)) or bounds[0] > bounds[1]:
-            allowed = "must be a pair (lower, upper) of finite numbers, lower <= upper"
+            allowed = f"must be a pair (lower, upper) of numbers up to {MOST:g}, lower <= upper"
             yield Fault("bounds", self.bounds, allowed)
         for field in ("gains", "offsets"):
             numbers = getattr(self, field)

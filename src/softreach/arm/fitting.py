@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from softreach.arm.actuators import (
-    Actuator,
-)
-from softreach.arm.actuators.actuator import MOST_BUNDLES
+import numpy as np
+
+from softreach.arm.actuators import Actuator
+from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads
 from softreach.arm.marker import Marker
@@ -134,21 +135,35 @@ def fit_faults(arm: Manipulator) -> Iterator[Fault]:
     for owner, part in others.items():
         for fault in part.place_faults(arm.length):
             yield _renamed(fault, f"{owner}.{fault.path}")
+    rest = arm.rest.curvature(np.linspace(0.0, 1.0, 65))
+    turn = arm.length * float(np.linalg.norm(rest, axis=1).mean())
+    if turn > MOST_TURN:
+        most = f"{MOST_TURN / math.tau:g} turns, {MOST_TURN / arm.length:.4g} 1/m"
+        yield Fault("rest", f"{turn / math.tau:.4g} turns", f"must wind the arm by at most {most}")
     if arm.loads is not None:
         yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:
         parts = arm.profile, arm.section
         faults = actuator.place_faults(arm.length) or actuator.section_faults(*parts)
-        distance = getattr(actuator, "distance", None)
-        if isinstance(distance, float) and distance > arm.length:  # millimeters taken for meters
-            allowed = f"must be at most the length of the arm, {arm.length:g} m"
-            faults = [*faults, Fault("distance", distance, allowed)]
+        faults = [*faults, *_far_faults(actuator, arm.profile)]
         yield from (
             fault
             if fault.path.startswith(("rings", "core"))
             else fault._replace(path=f"{actuator.name}.{fault.path}")
             for fault in faults
         )
+
+
+def _far_faults(actuator: Actuator, profile: Profile) -> Iterator[Fault]:
+    """Distances and radii beyond the length of the arm: millimeters taken for meters."""
+    radius = float(np.max(profile.radius(np.linspace(0.0, profile.length, 65))))
+    allowed = f"must be at most the length of the arm, {profile.length:g} m"
+    for name in ("distance", "distance_ratio", "radius", "radius_ratio"):
+        value: Any = getattr(actuator, name, None)
+        values: Any = getattr(value, "values", value)
+        scale = radius if name.endswith("ratio") else 1.0
+        if value is not None and scale * np.max(values) > profile.length:
+            yield Fault(name, values, allowed)
 
 
 def named_actuators(actuators: Sequence[Actuator]) -> Iterator[Actuator]:

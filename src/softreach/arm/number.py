@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass
 from functools import cache
 from types import MappingProxyType
@@ -25,6 +25,7 @@ from softreach.support.arrays import as_floats
 from softreach.support.errors import Fault, InvalidInput, Range
 
 __all__ = [
+    "MOST",
     "Number",
     "Shape",
     "Station",
@@ -44,6 +45,24 @@ several that are none of these."""
 
 _NEAREST = 1e-12
 """Z/L by which stations differ at least: less is rounding."""
+
+_NOTHING = 1e-30
+"""Size up to which a component of a vector is 0: its powers would be."""
+
+_SENSE: Mapping[str, tuple[float, float]] = {
+    "L": (1e-6, 1e3),
+    "m": (1e-9, 1e3),
+    "rad": (1e-6, 1e6),
+    "1/m": (1e-6, 1e6),
+    "kg": (1e-15, 1e9),
+    "Pa": (1e-3, 1e15),
+    "N/m": (1e-6, 1e12),
+    "N m²": (1e-30, 1e15),
+}
+"""Symbol or unit -> smallest size above 0 and largest that a number of an arm has [unit]."""
+
+MOST = 1e15
+"""The largest size of numbers of an arm in other units, and of activations."""
 
 _PLAIN = re.compile(r"(float|int)(\|None)?|tuple\[float(,(float|\.\.\.))*\]")
 """Types of fields that are numbers without a declaration, blanks left out."""
@@ -124,36 +143,49 @@ class Number:
         """Key in design files: the field with its unit."""
         return self.field + unit_suffix(self.unit)
 
+    def refusal(self, value: object) -> Range | None:
+        """The limits that one number is beyond: its own, or the sizes that no arm has; else None.
+
+        Every number of a design passes here, from files, Python and the command line alike.
+        """
+        declared = self.allowed
+        least, most = _SENSE.get(self.symbol) or _SENSE.get(self.unit, (1.0 / MOST, MOST))
+        low = least if declared.low == 0.0 and declared.open_low else max(declared.low, -most)
+        sense = declared._replace(low=low, high=min(declared.high, most), open_low=False)
+        return next((limits for limits in (declared, sense) if not limits.admits(value)), None)
+
     def faults(self, value: Any) -> list[Fault]:
         """Everything wrong with a value by itself, but for what `series_faults` judges."""
         if self.shape == "stations" or (value is None and self.optional) or self._is_name(value):
             return []
         if self.shape == "series":
-            return [
-                Fault(f"{self.field}[{k}]", element, self.allowed)
-                for k, element in enumerate(as_numbers(value).ravel().tolist())
-                if math.isfinite(element) and not self.allowed.admits(element)
-            ]
+            elements = enumerate(as_numbers(value).ravel().tolist())
+            return self._refused((k, each) for k, each in elements if math.isfinite(each))
         if self.shape == "several":
-            return self._faults_of_several(value)
+            elements = as_numbers(value)
+            if elements.ndim != 1 or elements.shape != np.shape(value):  # pyright: ignore[reportArgumentType]
+                return [Fault(self.field, value, "must be a sequence of numbers")]
+            return self._refused(enumerate(elements.tolist()))
         if self.shape == "triple":
-            numbers = as_numbers(value)
-            sound = numbers.shape == (3,) and np.isfinite(numbers).all()
-            return [] if sound else [Fault(self.field, value, "must be three finite numbers")]
+            triple = as_numbers(value).tolist()
+            if not isinstance(triple, list) or len(triple) != 3 or not np.isfinite(triple).all():
+                return [Fault(self.field, value, "must be three finite numbers")]
+            return self._refused(enumerate(triple))
         if self.along is not None and isinstance(value, self.along):
-            outside = [element for element in value.values if not self.allowed.admits(element)]  # pyright: ignore
-            return [Fault(self.field, element, self.allowed) for element in outside]
+            return self._refused((None, each) for each in value.values)  # pyright: ignore
         if self._is_pair(value):
-            outside = [end for end in as_numbers(value).tolist() if not self.allowed.admits(end)]
-            return [Fault(self.field, end, self.allowed) for end in outside]
+            return self._refused((None, end) for end in as_numbers(value).tolist())
         single = plain(value)
-        if self.shape == "single" and self.allowed.admits(single):
+        limits = self.refusal(single)
+        if self.shape == "single" and limits is None:
             return []
-        return [Fault(self.field, single, self._allowed_instead_of(single))]
+        return [Fault(self.field, single, self._allowed_instead_of(single, limits))]
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
-        if self.shape in ("triple", "series", "stations", "several") or self._is_pair(value):
+        if self.shape == "triple":
+            return tuple(x if abs(x) > _NOTHING else 0.0 for x in as_numbers(value).tolist())
+        if self.shape in ("series", "stations", "several") or self._is_pair(value):
             return tuple(np.asarray(value, float).tolist())
         is_function = self.along is not None and isinstance(value, self.along)
         if value is None or is_function or self._is_name(value):
@@ -166,19 +198,18 @@ class Number:
     def _is_pair(self, value: Any) -> bool:
         return self.pair and as_numbers(value).shape == (2,)
 
-    def _faults_of_several(self, value: Any) -> list[Fault]:
-        elements = as_numbers(value)
-        if elements.ndim != 1 or len(elements) != np.size(value):
-            return [Fault(self.field, value, "must be a sequence of numbers")]
+    def _refused(self, elements: Iterable[tuple[int | None, float]]) -> list[Fault]:
+        """A fault for each element that is beyond limits, with its place if that has a number."""
         return [
-            Fault(f"{self.field}[{k}]", element, self.allowed)
-            for k, element in enumerate(elements.tolist())
-            if not self.allowed.admits(element)
+            Fault(self.field if k is None else f"{self.field}[{k}]", element, limits)
+            for k, element in elements
+            if (limits := self.refusal(element))
         ]
 
-    def _allowed_instead_of(self, value: Any) -> Range | str:
-        if self.along is None or (self.shape == "single" and isinstance(value, int | float)):
-            return self.allowed
+    def _allowed_instead_of(self, value: Any, limits: Range | None) -> Range | str:
+        is_number = self.shape == "single" and isinstance(value, int | float)
+        if self.along is None or (is_number and limits):
+            return limits or self.allowed
         functions = f"{self.along.__name__} along the arm"
         functions = f"two at its ends, or {functions}" if self.pair else functions
         single = f"{self.allowed.text}, or " if self.shape == "single" else ""

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 # Enough for machine precision while a radius changes by less than tenfold between two stations.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEWTON_STEPS = 60
+_WIDEST = 100.0  # over L, of any radius
 _CHECKED = 65
 """Places at which a radius is seen to be positive."""
 
@@ -50,6 +51,9 @@ class Profile(Part, ABC):
         if not (radii > 0.0).all():
             allowed = "must be above 0 m all along the arm"
             raise InvalidDesign([Fault("radius", float(np.min(radii)), allowed)])
+        if not (radii <= (most := _WIDEST * self.length)).all():
+            allowed = f"must be at most {most:g} m, {_WIDEST:g} times the length of the arm"
+            raise InvalidDesign([Fault("radius", float(np.max(radii)), allowed)])
 
     @property
     def breakpoints(self) -> tuple[float, ...]:

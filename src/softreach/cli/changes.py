@@ -204,6 +204,10 @@ def say_limits(arm: Manipulator) -> None:
         warn(text)
 
 
+_POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".mat", ".ply", ".stl", ".obj")
+"""Suffixes of points, surfaces and tables, which are no designs."""
+
+
 def _unchanged(text: str) -> Manipulator:
     from softreach.arm import designs
     from softreach.arm.manipulator import Manipulator
@@ -211,6 +215,12 @@ def _unchanged(text: str) -> Manipulator:
     if text in designs.__all__:
         return getattr(designs, text)()
     path = Path(text)
+    if path.suffix.lower() in _POINTS:
+        allowed = "a .toml file, a built-in design, or a .zarr cloud where a command takes one"
+        hint = "for the volume of points of your own: softreach.concave_hull(points, alpha=0.05)"
+        raise InvalidInput(
+            "design", text, allowed, f"{hint} in Python, points in m of shape (n, 3)"
+        )
     is_named = path.exists() and not path.is_dir() and path.suffix != ".json"
     if is_named or path.suffix == ".toml":
         return Manipulator.load(text)  # which refuses what is no file, such as a pipe

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import shutil
 import sys
 import warnings
@@ -28,6 +29,15 @@ if TYPE_CHECKING:
 _NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
 
 
+_COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+"""Characters that a terminal obeys: of names and paths that others gave."""
+
+
+def _printable(text: object) -> str:
+    """The text with such characters as backslash escapes."""
+    return _COMMANDS.sub(lambda match: ascii(match[0])[1:-1], str(text))
+
+
 class Console:
     """Everything that commands print goes through here.
 
@@ -46,7 +56,7 @@ class Console:
 
     def line(self, text: object) -> None:
         """A result in words."""
-        sys.stdout.write(f"{text}\n")
+        sys.stdout.write(f"{_printable(text)}\n")
 
     def json(self, value: Any, indent: int | None = None) -> None:
         """A result for machines; null where there is no number."""
@@ -106,7 +116,7 @@ class Console:
     def error(self, text: str) -> None:
         """A line on standard error."""
         with suppress(OSError, ValueError):  # nobody reads it
-            sys.stderr.write(f"{text}\n")
+            sys.stderr.write(f"{_printable(text)}\n")
 
     @contextmanager
     def listening(self) -> Iterator[None]:

@@ -113,6 +113,7 @@ def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
     for gamma, residual, condition, margin in rows:
         apart = lengths.text(residual, ".1e")
         quality = f"residual {apart}, condition {condition:.3g}, margin {margin:.3g}"
+        quality = quality if gamma.size else f"residual {apart}"
         console.line(f"  {activation_text(arm, gamma)}  ({quality})")
     if solution.unstable:
         left_out = counted(solution.unstable, "activation")

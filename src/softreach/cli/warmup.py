@@ -20,22 +20,30 @@ def warmup(
             help="Also what arms under loads need, for half a minute more.",
         ),
     ] = True,
-) -> None:
+) -> int:
     """Compile all kernels now, so that no later command has to.
 
     They are kept in a cache on disk; if it has them already, this takes seconds.
+    Exits with 1 if they cannot be kept.
 
     Example: softreach warmup --no-loads
     """
+    from softreach.kernels.compiler import not_kept
     from softreach.support.errors import no_warnings
     from softreach.support.progress import bar
 
     jobs = [*_free(), *(_loaded() if loads else ())]
     with bar("compiling", len(jobs)) as done, no_warnings():  # of clouds and grids too coarse
         for job in jobs:
-            job()
-            done(1)
+            if not not_kept:
+                job()
+                done(1)
+    if not_kept:
+        reason = f"nothing could be kept: {not_kept[0]}"
+        console.error(f"{reason}; set NUMBA_CACHE_DIR to a folder that can be written")
+        return 1
     console.line("all kernels are compiled" + ("" if loads else ", but for those of loads"))
+    return 0
 
 
 def _free() -> list[Callable[[], object]]:

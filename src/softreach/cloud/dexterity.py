@@ -52,6 +52,8 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
 
     check_cloud(cloud)
     rod, n = stable_tips(tip_map_of(cloud)), cloud.sizes["sample"]
+    if not rod.box.bundles:
+        raise InvalidInput("bundles", 0, "1 or more: nothing moves the tip")
     measure, condition = np.empty(n), np.empty(n)
     sign = np.empty(n, np.int8)
     for rows in parallel.blocks(n, 8 * BLOCK):

@@ -14,10 +14,10 @@ from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.flat import alpha_triangles, convex_edges, enclosed_area, plane_of
 from softreach.geometry.hull import Hull
-from softreach.schema import is_stable
+from softreach.schema import AXES, is_stable
 from softreach.support import parallel
 from softreach.support.arguments import POSITIVE, as_flag, as_given, plain
-from softreach.support.arrays import Mask, as_floats, as_points
+from softreach.support.arrays import Mask, as_floats, as_points, labeled
 from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
@@ -181,9 +181,7 @@ def volume_curve(points: np.ndarray | xr.DataArray, alphas: ArrayLike) -> np.nda
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
     """Points (n, 3), of an arm under loads the stable tips; labeled axes may be in either order."""
-    array = as_floats("points", points)
-    if getattr(points, "dims", None) == ("axis", "sample"):
-        array = array.T
+    array = as_floats("points", labeled("points", points, AXES))
     if not isinstance(points, np.ndarray) and "status" in getattr(points, "coords", ()):
         array = array[is_stable(points)]
     return as_points("points", array)

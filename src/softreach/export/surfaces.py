@@ -81,8 +81,8 @@ def export_mesh(
 
     A closed surface that touches itself along edges is parted there, by a thousandth of their
     length, so that it can be printed. STL and GLB keep single precision. glTF has y up: a GLB
-    holds our coordinates under one node that turns z up into y up. PLY and OBJ say the unit in a
-    comment; readers of GLB take all for meters.
+    holds our coordinates under one node that turns z up into y up. PLY, STL, OBJ and GLB say the
+    unit, which `Mesh.load` reads; other readers of GLB take all for meters.
 
     Args:
         mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
@@ -186,27 +186,32 @@ def _write_ply(scene: Scene, file: BufferedWriter) -> None:
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
     parts = [_colored(part) for part in scene.parts]
-    file.write(trimesh.util.concatenate(parts).export(file_type="stl"))
+    binary = trimesh.util.concatenate(parts).export(file_type="stl")
+    file.write(_said_unit(scene).encode().ljust(80) + binary[80:])
 
 
 def _write_obj(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
     meshes = trimesh.Scene([_colored(part) for part in scene.parts])
     # exact enough for an arm of a millimeter; a name of ours, not an address, in the first line
-    header = f"softreach, lengths in {scene.unit.name}"
-    options = {"include_normals": False, "digits": 12, "header": header}
+    options = {"include_normals": False, "digits": 12, "header": _said_unit(scene)}
     file.write(trimesh.exchange.obj.export_obj(meshes, **options).encode())
 
 
 def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
-    meshes = trimesh.Scene(base_frame="world")
+    meshes = trimesh.Scene(base_frame="world", metadata={"about": _said_unit(scene)})
     # as a node and not in the numbers, so that a reader gets back the vertices we have
     meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
     for part in scene.parts:
         names = {"node_name": part.name, "geom_name": part.name}
         meshes.add_geometry(_shiny(part), parent_node_name="z_up", **names)
     file.write(meshes.export(file_type="glb"))
+
+
+def _said_unit(scene: Scene) -> str:
+    """The unit in words that `Mesh.load` reads."""
+    return f"softreach, lengths in {scene.unit.name}"
 
 
 def _mesh(parts: Sequence[Part]) -> Any:

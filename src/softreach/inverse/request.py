@@ -11,7 +11,15 @@ from numpy.typing import ArrayLike
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
-from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
+from softreach.support.arrays import (
+    Array,
+    Index,
+    as_floats,
+    as_points,
+    as_rows,
+    check_finite,
+    labeled,
+)
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import unit_names
 from softreach.support.units import TYPED, lengths_in
@@ -56,7 +64,8 @@ def as_targets(name: str, targets: ArrayLike) -> Array:
     Raises:
         InvalidInput: Another shape, or values that are not finite.
     """
-    return as_rows(name, targets, 3, "of shape (t, 3), positions in m")
+    columns = labeled(name, targets, ("x", "y", "z"))
+    return as_points(name, as_rows(name, columns, 3, "of shape (t, 3), positions in m"))
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:

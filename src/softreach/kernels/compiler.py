@@ -19,9 +19,12 @@ from numba.core.dispatcher import Dispatcher
 
 from softreach.support.interruption import check_stopped
 
-__all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
+__all__ = ["FAST", "inline", "kernel", "not_kept", "pasted", "strict"]
 
 _LOG = logging.getLogger(__name__)
+
+not_kept: list[str] = []
+"""Reasons for which what this process compiled is compiled again by the next."""
 
 FAST = {"contract", "reassoc", "nsz", "arcp", "nnan", "ninf"}
 """Freedoms of the compiler in `kernel` and `inline`.
@@ -98,6 +101,7 @@ def _cached(function: Any) -> Any:
         try:
             function._cache = _Cache(function.py_func)  # pyright: ignore[reportAttributeAccessIssue]
         except RuntimeError as error:  # no folder can be written
+            not_kept.append(str(error))
             _LOG.info("not cached: %s", error)
     return function
 
@@ -130,6 +134,7 @@ class _Cache(FunctionCache):
         try:
             write(*arguments)
         except Exception as error:
+            not_kept.append(str(error))
             _LOG.info("%r cannot be written: %s: %s", self, type(error).__name__, error)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -26,6 +25,7 @@ from softreach.optimization.study import SAMPLERS
 from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_flag, as_integer, as_number, as_one_of
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, did_you_mean
+from softreach.support.files.text import tables_of
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.workspace.reach import ACCURACIES
 
@@ -96,7 +96,7 @@ def read_search(
         InvalidDesign: All faults, of the requirements too, in the words of the file.
     """
     try:
-        document = tomllib.loads(text)
+        document = tables_of(text)
     except ValueError:
         document = {}  # for which the requirements are refused
     reader = _Reader(document.get("search", {}), given or {}, folder, design_from)
@@ -336,9 +336,9 @@ class _Names:
             raise ValueError(value)
         if key in self.written:
             return from_written(read_quantity(str(value), "1"), unit)
-        if not isinstance(value, str):
+        if not isinstance(value, str) and value != 0:
             raise ValueError(value)
-        return read_quantity(value, unit)
+        return read_quantity(str(value), unit)
 
     def allowed(self, key: str) -> str:
         """Kind of value allowed under a key, in words."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_curvature"]
 
 _COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
-_SYMBOLS = {"bending": "κ", "torsion": "$u_3$", "extension": "ζ"}
+_SYMBOLS = {"bending": "κ", "torsion": "u₃", "extension": "ζ"}
 _BINS = 64
 
 

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 _UNITS = {"rad": "°", "1": ""}
 _INDEXED = re.compile(r"(?<![a-z])([ERZaρθ])([0-9tc])")
 _METRICS = {
-    "volume": "$V/L^3$ (α-shape)",
-    "exact_volume": "$V/L^3$ (exact)",
-    "convex_volume": "$V_{conv}/L^3$",
-    "exact_convex_volume": "$V_{conv}/L^3$ (exact)",
+    "volume": "V/L³ (α-shape)",
+    "exact_volume": "V/L³ (exact)",
+    "convex_volume": "convex V/L³",
+    "exact_convex_volume": "convex V/L³ (exact)",
     "unreachability": "UNR (α-shape)",
     "exact_unreachability": "UNR (exact)",
 }

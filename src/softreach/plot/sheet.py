@@ -272,7 +272,7 @@ def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
     # of a sheet of few columns it is longer than the margin is wide
     style = {"color": "0.2", "lw": 1.2, "solid_capstyle": "butt", "clip_on": False}
     ax.plot([start, start + 0.5], [start] * 2, **style)
-    ax.text(start + 0.5 + 0.04 * inch, start, "$L/2$", fontsize=7, va="center")
+    ax.text(start + 0.5 + 0.04 * inch, start, "L/2", fontsize=7, va="center")
     for name, direction in zip("xyz", view_axes(view)[:2].T, strict=True):
         x, y = center + 0.15 * inch * direction
         arrow = {"arrowstyle": "-|>,head_width=0.1,head_length=0.2", "lw": 0.6, "shrinkA": 0}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from softreach.picture.page import Figure3D
 from softreach.picture.projection import View, view_angles
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
-from softreach.support.errors import InvalidInput, MissingExtra, Range
+from softreach.support.errors import InvalidInput, MissingExtra, Range, check_date
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
 
@@ -48,6 +48,8 @@ _RC: dict[str, Any] = {
     "xtick.major.size": 2.5,
     "ytick.major.size": 2.5,
 }
+# names that others gave, such as $x_1$ or 50 %, are no mathematics and no LaTeX
+_TEXT: dict[str, Any] = {"text.parse_math": False, "text.usetex": False}
 # text stays text in vector files, so that a journal can set it in its own type
 _SAVING: dict[str, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none"}
 LENGTH = POSITIVE._replace(unit="m")
@@ -61,8 +63,9 @@ def pyplot() -> Any:
 
     Raises:
         MissingExtra: matplotlib is not installed.
-        InvalidInput: The environment names a backend that it does not have.
+        InvalidInput: The environment names a backend that it does not have, or no date.
     """
+    check_date()
     try:
         from matplotlib import pyplot as plt
     except ModuleNotFoundError as error:
@@ -75,8 +78,8 @@ def pyplot() -> Any:
 
 
 def figure_style(ax: Axes | None = None) -> AbstractContextManager[None]:
-    """Our defaults for a new figure; the caller's axes keep their own."""
-    return pyplot().rc_context(_RC) if ax is None else nullcontext()
+    """Our defaults for a new figure; the caller's axes keep theirs. Text is what it says."""
+    return pyplot().rc_context(_TEXT if ax is not None else _RC | _TEXT)
 
 
 def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:

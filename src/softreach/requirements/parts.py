@@ -151,7 +151,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name, value in self.given.items():
             if name == "actuators":
-                as_integer(name, value, 0)
+                as_integer(name, value, 0, 1_000_000)
                 continue
             allowed = Range(0.0, 1.0) if name == "shortening" else _NOT_NEGATIVE
             object.__setattr__(self, name, as_number(name, value, allowed))

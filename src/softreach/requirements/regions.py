@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
@@ -39,6 +40,9 @@ _STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
 """1/g, 1/g² and 1/g³ with g⁴ = g + 1: steps of a sequence that fills the cube evenly."""
 _BLOCK = 65_536  # points at once
 _MOST_PLACES = 1_000_000
+_MOST_FACES = 5_000_000  # of a file
+_MOST_BYTES = 256_000_000
+_FILES = (".stl", ".ply", ".obj", ".off", ".glb")
 _EMPTIEST = 1e-4  # share of its bounding box that a region fills at least, to draw places from it
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 49)
 _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
@@ -302,23 +306,34 @@ class Mesh(Region):
         object.__setattr__(self, "faces", read_only(np.ascontiguousarray(faces, np.int64)))  # pyright: ignore[reportArgumentType]
 
     @classmethod
-    def load(cls, path: str | PathLike[str], *, unit: str = "m") -> Self:
-        """The mesh of a file: STL, PLY, OBJ and what else trimesh reads.
+    def load(cls, path: str | PathLike[str], *, unit: str | None = None) -> Self:
+        """The mesh of an STL, PLY, OBJ, OFF or GLB, whose y points up and becomes z.
 
         Args:
             path: The file.
-            unit: Unit of length that the file counts in: "m", "cm" or "mm".
+            unit: Unit of length that the file counts in: "m", "cm" or "mm". None for that which
+                softreach wrote into it, and m for a GLB.
 
         Raises:
-            InvalidInput: No such file, no triangles in it, or a mesh with holes.
+            InvalidInput: No such file, too large a one, no triangles in it, a mesh with holes, or
+                no unit where the file says none.
             MissingExtra: trimesh is not installed.
         """
-        name, size = as_path("path", path), as_unit(unit)
-        if not Path(name).is_file():
-            raise InvalidInput("path", repr(name), "a file that exists")
+        name = as_path("path", path)
+        stated = _unit_of(name)
+        if unit is None and stated is None:
+            allowed = "m, cm or mm: the file of the mesh does not say in which it counts"
+            raise InvalidInput("unit", None, allowed)
+        size = as_unit(stated if unit is None else unit)
+        if stated not in (None, size.name):
+            raise InvalidInput("unit", size.name, f"{stated}, as {name} says")
         trimesh = load_library("trimesh")
         try:
-            mesh: Any = trimesh.load(name, force="mesh")
+            scene: Any = trimesh.load(name, force="scene")
+            parts = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
+            if (count := sum(len(getattr(part, "faces", ())) for part in parts)) > _MOST_FACES:
+                raise ValueError(f"{count:,} triangles are more than {_MOST_FACES:,}")
+            mesh: Any = scene.to_mesh()
             mesh.merge_vertices()
             load_library("trimesh.repair").fix_winding(mesh)
             vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
@@ -326,6 +341,8 @@ class Mesh(Region):
             raise InvalidInput("path", repr(name), f"a mesh that can be read: {error}") from None
         if not len(faces):
             raise InvalidInput("path", repr(name), "a file with triangles")
+        if name.lower().endswith(".glb"):  # whose y points up
+            vertices = vertices[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
         return cls(vertices * size.size, faces, name, size.name)
 
     def __repr__(self) -> str:
@@ -439,6 +456,26 @@ class Mesh(Region):
             feature = np.where(share[:, None] >= 1.0, of_end, feature)
             normal[rest[better]] = feature[better]
         return normal, foot
+
+
+def _unit_of(name: str) -> str | None:
+    """The unit that the beginning of the file of a mesh states, if it does.
+
+    Raises:
+        InvalidInput: No such file, one that is packed, or too large a one.
+    """
+    path = Path(name)
+    if not path.is_file():
+        raise InvalidInput("path", repr(name), "a file that exists")
+    if path.suffix.lower() not in _FILES:
+        raise InvalidInput("path", repr(name), f"a mesh of {', '.join(_FILES)}")
+    with path.open("rb") as file:
+        head, is_scene = file.read(65_536), path.suffix.lower() == ".glb"
+    size = int.from_bytes(head[12:16], "little") * 100 if is_scene else path.stat().st_size
+    if size > _MOST_BYTES:  # the list of parts of a scene, each of which may be a copy
+        raise InvalidInput("path", repr(name), f"a mesh of at most {_MOST_BYTES / 1e6:g} MB")
+    said = re.search(rb"(?:lengths in|comment units:) (mm|cm|m)\b", head)
+    return said[1].decode() if said else "m" if is_scene else None
 
 
 def _triple(name: str, value: object) -> Triple:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from softreach.inverse.request import positions_in
 from softreach.requirements.parts import LIMIT_UNITS, LONGEST, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
-from softreach.support.files.text import read_text
+from softreach.support.files.text import read_text, tables_of
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
 
@@ -66,7 +65,7 @@ def read(text: str, folder: Path, length: float | None, source: str) -> dict[str
     if len(text) > LONGEST:
         raise InvalidDesign([Fault("TOML", None, f"must be at most {LONGEST:,} long")], source)
     try:
-        document = tomllib.loads(text)
+        document = tables_of(text)
     except ValueError as error:
         raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
     reader = _Reader(folder, length)
@@ -156,8 +155,10 @@ class _Reader:
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
-                mesh = Mesh.load(self.folder / table, unit=raw.get("mesh_unit", "m"))
+                mesh = Mesh.load(self.folder / table, unit=raw.get("mesh_unit"))
             except InvalidInput as error:
+                if error.name == "unit":
+                    return self._refuse(f"{path}_unit", error.value, f"must be {error.allowed}")
                 return self._refuse(path, table, f"must be {error.allowed} ({error.value})")
             except SoftreachError as error:
                 return self._refuse(path, table, str(error))
@@ -295,7 +296,7 @@ class _Reader:
                 if unit == "m"
                 else read_quantity(value, unit)
             )
-        if not symbol and not plain:
+        if not symbol and not plain and value != 0:
             raise ValueError(value)
         if symbol in ("", unit):
             return value

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.kernels.box.box_projection import project
-from softreach.support.arrays import as_rows, read_only
+from softreach.support.arrays import as_rows, labeled, read_only
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
@@ -140,7 +140,8 @@ class ActivationBox:
             InvalidInput: Another shape, or values that are not finite.
         """
         allowed = f"an array of numbers of shape (n, {self.bundles}), one column per bundle"
-        return as_rows("activations", activations, self.bundles, allowed)
+        gamma = labeled("activations", activations, self.names)
+        return as_rows("activations", gamma, self.bundles, allowed)
 
     def clip(self, activations: Array) -> Array:
         """Activations (n, bundles) moved to the nearest bounds where they are outside."""

@@ -32,6 +32,8 @@ Frame = Literal["world", "base"]
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
 _SMALLEST_TOL = 1e-12
+_FARTHEST = 1e3  # of the bounds, of activations that mean anything
+_SLIGHT = 1e-2  # of the bounds, by which a tension may be negative, such as in a difference
 MOST_TURN_OF_STEP = 2.0
 """Rotation of one step [rad] up to which the series of the kernels of tips are good to 1e-10."""
 
@@ -186,6 +188,7 @@ class TipMap(ABC):
                 or an arm so bent that the steps do not follow it.
         """
         gamma = self.box.check(activations)
+        self._check_sense(name, gamma)
         if not len(wrong := np.flatnonzero(~self.has_arm(gamma))):
             return gamma
         first = gamma[wrong[:1]]
@@ -198,6 +201,20 @@ class TipMap(ABC):
         allowed = f"such that the arm has a shape, as from {lower} to {upper}"
         name = name if len(gamma) == 1 else f"{name}[{wrong[0]}]"
         raise InvalidInput(name, _listed(first[0]), allowed, why + count)
+
+    def _check_sense(self, name: str, gamma: Array) -> None:
+        """Refuse tensions that push, and what is a thousand times as large as the bounds."""
+        arm, box = self.arm, self.box
+        kinds = dict(zip(arm.bundle_names, arm.bundle_actuators, strict=True))
+        pulls = np.array([getattr(kinds.get(each), "least", -1.0) == 0.0 for each in box.names])
+        size = np.maximum(np.abs(box.low), np.abs(box.high))
+        size[size == 0.0] = 1.0
+        low = -np.where(pulls, _SLIGHT, _FARTHEST) * size
+        for row, k in np.argwhere((gamma < low) | (gamma > _FARTHEST * size))[:1]:
+            allowed = f"at most {_FARTHEST:g} times as large as its bounds"
+            if pulls[k] and gamma[row, k] < 0.0:
+                allowed = "at least 0: a tendon pulls and cannot push"
+            raise InvalidInput(f"{name}[{row}], {box.names[k]}", f"{gamma[row, k]:g}", allowed)
 
     def with_arms(self, gamma: Array) -> tuple[Array, NDArray[np.intp]]:
         """Activations (n, bundles), at the lower bounds where they leave no arm, and these rows."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
 from softreach.requirements import Box, Check, Finding, Keep, Requirements, Target
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
+from softreach.support.files.text import tables_of
 from softreach.support.units import LengthUnit
 
 __all__ = [
@@ -63,8 +63,8 @@ def _allowed(path: str) -> str:
 
 def _files_in(text: str) -> list[str]:
     try:
-        document = tomllib.loads(text)
-    except (ValueError, RecursionError):
+        document = tables_of(text)
+    except ValueError:
         return []  # which the reader refuses
     lists = {key: tables for key, tables in document.items() if isinstance(tables, list)}
     return [

@@ -33,6 +33,7 @@ __all__ = [
     "check_finite",
     "joined",
     "joined_by",
+    "labeled",
     "read_only",
     "rows",
 ]
@@ -52,6 +53,7 @@ Points = NDArray[np.float64]
 Faces = NDArray[np.integer]
 """Triangles as rows of three vertices, shape (n, 3)."""
 
+_FARTHEST = 1e9  # of positions [m]: their powers must be numbers
 _NUMBERS = "an array of numbers"
 
 Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
@@ -94,6 +96,23 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
     raise InvalidInput(name, _described(values, array), allowed)
 
 
+def labeled(name: str, values: Any, labels: Sequence[str]) -> Any:
+    """An xarray array with the columns that have these labels, in their order; others as given.
+
+    Raises:
+        InvalidInput: Some label has no column.
+    """
+    dims = [dim for dim in getattr(values, "dims", ()) if dim in ("axis", "bundle")]
+    if len(dims) != 1:
+        return values
+    if (dim := dims[0]) in values.coords:
+        known = [str(label) for label in values.coords[dim].values]
+        if sorted(known) != sorted(labels):
+            raise InvalidInput(f"{name}.{dim}", ", ".join(known), f"labeled {', '.join(labels)}")
+        values = values.isel({dim: [known.index(label) for label in labels]})
+    return values.transpose(..., dim)
+
+
 def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
     """Finite numbers of shape (n, columns); one row may stand alone."""
     rows = as_floats(name, values, allowed)
@@ -106,10 +125,15 @@ def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
 def as_points(name: str, values: object) -> Points:
     """Finite positions [m], shape (n, 3); one may stand alone, and an empty array is none."""
     allowed = "of shape (n, 3), positions in m"
-    points = as_floats(name, values, allowed)
+    points = as_floats(name, labeled(name, values, ("x", "y", "z")), allowed)
     if points.size == 0 and points.ndim <= 2:
         return points.reshape(0, 3)
-    return as_rows(name, points, 3, allowed)
+    points = as_rows(name, points, 3, allowed)
+    if max(-points.min(), points.max()) > _FARTHEST:
+        raise InvalidInput(
+            name, f"up to {np.abs(points).max():g} m", f"at most {_FARTHEST:g} m far"
+        )
+    return points
 
 
 def check_finite(name: str, values: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -63,6 +64,18 @@ class InvalidInput(SoftreachError, ValueError):
         self.name, self.value, self.allowed = name, value, allowed
         message = f"{name} = {in_short(value)}: must be {allowed}"
         super().__init__(f"{message}; {hint}" if hint else message)
+
+
+def check_date() -> None:
+    """Refuse a date of files in the environment that NumPy and Matplotlib cannot read.
+
+    Raises:
+        InvalidInput: `SOURCE_DATE_EPOCH` is no time of a calendar.
+    """
+    date = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not (date.isascii() and date.isdigit() and len(date) < 12):
+        allowed = "a whole number of seconds since 1970, or left out"
+        raise InvalidInput("SOURCE_DATE_EPOCH", repr(date), allowed)
 
 
 class Range(NamedTuple):

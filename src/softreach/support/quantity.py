@@ -120,6 +120,8 @@ def sizes_in(unit: str) -> dict[str, float]:
 def read_quantity(text: str, unit: str) -> float:
     """The value of a number with its unit, such as "200g" or "1.5 MPa", in an SI unit.
 
+    A zero needs no unit.
+
     Args:
         text: A number and one of `unit_names(unit)`.
         unit: SI unit of what is read; "1" for a plain number.
@@ -128,10 +130,12 @@ def read_quantity(text: str, unit: str) -> float:
         ValueError: No finite number, or another unit.
     """
     match = _NUMBER.fullmatch(text)
-    if match is None or match[2] not in (unit_names(unit) or ("",)):
+    if match is None:
         raise ValueError(text)
     number, symbol = match.groups()
     value = float(number)
+    if symbol not in (unit_names(unit) or ("",)) and (symbol or value):
+        raise ValueError(text)
     if symbol in _ANGLES:
         value = value if symbol == "rad" else math.radians(value)
     elif abs(value) < math.inf:  # decimals, so that 200 g are 0.2 kg to the last bit

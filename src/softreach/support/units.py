@@ -169,7 +169,7 @@ def read_length(text: str, length: float | None = None) -> float:
 
 
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
-    """Comma-separated lengths [m], each with its unit or all without.
+    """Comma-separated lengths [m], each with its unit or all without; a zero needs none.
 
     Args:
         text: What was typed.
@@ -180,12 +180,12 @@ def lengths_in(text: str, count: int, length: float | None = None) -> list[float
         The lengths; None if the text is anything else.
     """
     parts = text.split(",")
-    if len(parts) != count or len({_is_number(part) for part in parts}) != 1:
-        return None
     try:
-        return [read_length(part, length) for part in parts]
+        values = [read_length(part, length) for part in parts]
     except ValueError:
         return None
+    plain = {_is_number(part) for part, value in zip(parts, values, strict=True) if value}
+    return values if len(parts) == count and len(plain) < 2 else None
 
 
 def _is_number(text: str) -> bool:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.number import as_numbers, number
+from softreach.arm.number import MOST, as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span
@@ -208,8 +208,8 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
     pairs, allowed = as_numbers(bounds), ""
     if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
         allowed = "must be a pair (lower, upper), or one such pair for each bundle"
-    elif not np.isfinite(pairs).all():
-        allowed = "must hold finite numbers"
+    elif not (np.abs(pairs) <= MOST).all():
+        allowed = f"must hold finite numbers up to {MOST:g}"
     elif (pairs[..., 0] > pairs[..., 1]).any():
         allowed = "must have lower <= upper"
     elif pairs.ndim == 2 and bundles is not None and len(pairs) != bundles:

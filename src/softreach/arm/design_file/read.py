@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from os import PathLike
 from typing import Any, NamedTuple
@@ -36,7 +35,7 @@ from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import PLACE, Located, Stations, placed
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
-from softreach.support.files.text import read_text
+from softreach.support.files.text import read_text, tables_of
 from softreach.support.units import UNITS
 
 __all__ = ["LONGEST", "Parts", "document_of", "parse", "text_of"]
@@ -105,7 +104,7 @@ def document_of(
         allowed = f"must be at most {LONGEST:,} characters long, and has {len(text):,}"
         raise InvalidDesign([Fault("TOML", None, allowed)], source)
     try:
-        return tomllib.loads(text, parse_float=number)
+        return tables_of(text, number)
     except ValueError as error:
         raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
 

@@ -174,8 +174,8 @@ class TableReader:
             kind = "integer" if number.allowed.whole else "number"
             return self.refused(path, raw, f"must be a valid {kind}")
         value = radians(raw) if number.unit == "rad" else raw
-        if not number.allowed.admits(value):
-            return self.refused(path, raw, number.allowed)
+        if limits := number.refusal(value):
+            return self.refused(path, raw, limits)
         return int(value) if number.allowed.whole else float(value)
 
     def _all(self, number: Number, raw: list[Any], path: str) -> Any:

@@ -118,8 +118,8 @@ class OwnParameter(Parameter):
 
     def change(self, draft: Draft, value: float) -> None:
         """Change it; an element alone must be admitted, as its series names no places."""
-        if self.path.place and not self.range.admits(plain(value)):
-            draft.refuse(Fault(self.name, value, self.range))
+        if self.path.place and (limits := self.number.refusal(plain(value))):
+            draft.refuse(Fault(self.name, value, limits))
             return
         counted = self.whole and float(value).is_integer()
         draft.set(self.name, self.path, int(value) if counted else value)
@@ -184,8 +184,8 @@ class _OuterRadius(Parameter):
     def change(self, draft: Draft, value: float) -> None:
         radii: tuple[float, ...] = getattr(draft.arm.profile, "radii")  # noqa: B009
         scaled = [value if k == 0 else radius * value / radii[0] for k, radius in enumerate(radii)]
-        if not all(self.range.admits(plain(radius)) for radius in scaled):
-            draft.refuse(Fault(self.name, value, self.range))
+        for limits in filter(None, map(self.number.refusal, map(plain, scaled))):
+            draft.refuse(Fault(self.name, value, limits))
             return
         for k, radius in enumerate(scaled):
             draft.set(self.name, Path(("profile",), "radii", (k,)), radius)

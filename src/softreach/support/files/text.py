@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import stat
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from softreach.support.errors import InvalidInput
 
-__all__ = ["MEGABYTE", "read_text", "text_of"]
+__all__ = ["MEGABYTE", "read_text", "tables_of", "text_of"]
 
 MEGABYTE = 1_000_000
 
@@ -50,3 +53,32 @@ def text_of(name: str, shown: str, content: bytes, most: int) -> str:
         allowed = f"text in UTF-8, but character {place} is NUL: save it in that encoding"
         raise InvalidInput(name, shown, allowed)
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
+    """The tables of TOML text.
+
+    Args:
+        text: TOML.
+        number: Maker of the value of a number with a point or an exponent.
+
+    Raises:
+        ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
+    """
+    try:
+        tables = tomllib.loads(text, parse_float=number)
+        if not _fit_64_bits(tables):
+            raise OverflowError
+    except tomllib.TOMLDecodeError:
+        raise
+    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
+        raise ValueError("a whole number has more than 64 bits") from None
+    except RecursionError:
+        raise ValueError("lists or tables are nested too deep") from None
+    return tables
+
+
+def _fit_64_bits(value: Any) -> bool:
+    if isinstance(value, dict | list):
+        return all(map(_fit_64_bits, value.values() if isinstance(value, dict) else value))
+    return not isinstance(value, int) or -(2**63) <= value < 2**63
