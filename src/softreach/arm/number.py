@@ -163,7 +163,7 @@ class Number:
             return self._refused((k, each) for k, each in elements if math.isfinite(each))
         if self.shape == "several":
             elements = as_numbers(value)
-            if elements.ndim != 1 or elements.shape != np.shape(value):  # pyright: ignore[reportArgumentType]
+            if elements.ndim != 1 or elements.shape != np.shape(value):  # pyright: ignore
                 return [Fault(self.field, value, "must be a sequence of numbers")]
             return self._refused(enumerate(elements.tolist()))
         if self.shape == "triple":
