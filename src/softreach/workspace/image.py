@@ -195,8 +195,12 @@ class Image:
         near = np.flatnonzero((before > 0) != (counts[i, j, crossing.center] > 0))
         near = near[np.lexsort((crossing.height[near], crossing.center[near], j[near], i[near]))]
         i, j, k = i[near], j[near], crossing.center[near] - 1
-        after = before[near] + _running_sums(crossing.cover[near], _starts(i, j, k))
-        flips = (after > 0) != (after - crossing.cover[near] > 0)
+        cover = crossing.cover[near]
+        total, of_edge = np.cumsum(cover), np.stack([i, j, k])  # sums begin anew at every edge
+        starts = np.flatnonzero((np.diff(of_edge, prepend=-1) != 0).any(axis=0))
+        earlier = np.repeat((total - cover)[starts], np.diff(starts, append=len(cover)))
+        after = before[near] + total - earlier
+        flips = (after > 0) != (after - cover > 0)
         index = [i[flips], j[flips]]
         index.insert(axis, k[flips])
         return (index[0], index[1], index[2]), crossing.height[near][flips] - k[flips]
@@ -222,19 +226,6 @@ class Image:
 def _twice_area(a: Array, b: Array) -> Array:
     """Of triangles of the origin, a and b in the plane, shape (n,)."""
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-
-
-def _starts(*keys: Index) -> Mask:
-    """Mask of the places where a sorted list of keys changes."""
-    return np.any([np.diff(key, prepend=-1) != 0 for key in keys], axis=0)
-
-
-def _running_sums(values: Index, starts: Mask) -> Index:
-    """Cumulative sums that begin anew at every start."""
-    total = np.cumsum(values)
-    at = np.flatnonzero(starts)
-    offset = (total - values)[at]
-    return total - np.repeat(offset, np.diff(at, append=len(values)))
 
 
 def image_of(

@@ -153,8 +153,7 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    value, rough = (Estimate(_hull_volume(places), 0.0) for places in (points, fewer))
-    return extrapolated(value, rough)
+    return extrapolated(*(Estimate(_hull_volume(places), 0.0) for places in (points, fewer)))
 
 
 def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:

@@ -31,7 +31,8 @@ ENOUGH = 1e-3
 
 _CHUNK = 1 << 16  # places searched for at a time
 _FAR = 3.0  # cells, from which on distances are not told apart
-_CLEARLY = 0.02  # cells by which a tip must be closer to start another search
+CLEARLY = 0.02
+"""Cells by which a tip must be closer to start another search."""
 
 
 class Stop(NamedTuple):
@@ -99,18 +100,13 @@ class Flood:
 
     def add(self, gamma: Array, tips: Array) -> None:
         """Search around tips that come closer to a center than all before."""
-        cells, starts = self._improved(gamma, tips)
-        self.search(cells, starts)
-        self.grow(cells[self.gap[cells] == 0.0])
-
-    def _improved(self, gamma: Array, tips: Array) -> tuple[Index, Array]:
-        """Centers around tips that one of them is clearly closer to than `gap`, and which."""
         at = self.lattice.coordinates(tips)
         within = ((at >= 0) & (at < np.array(self.lattice.shape) - 1)).all(axis=1)
-        owner, closest = np.full(len(self.gap), -1), self.gap - _CLEARLY
+        owner, closest = np.full(len(self.gap), -1), self.gap - CLEARLY
         claim_corners(at[within], np.flatnonzero(within), self.steps, closest, owner)
         cells = np.flatnonzero(owner >= 0)
-        return cells, gamma[owner[cells]]
+        self.search(cells, gamma[owner[cells]])
+        self.grow(cells[self.gap[cells] == 0.0])
 
     def grow(self, cells: Index) -> None:
         """Search the neighbors of reached cells from there, and theirs, until none is new."""

@@ -16,13 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from softreach.geometry.surface import Surface, compact_surface
+from softreach.geometry.surface import Surface, compact_surface, level_set
 from softreach.picture.shading import vertex_normals
 from softreach.rod.driven import DrivenRod
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Faces, Mask
-from softreach.support.errors import MissingExtra
 from softreach.workspace.flux import box_slopes, face_triangles, grid_faces
 from softreach.workspace.grid import cube_grid
 from softreach.workspace.image import Image
@@ -201,23 +200,19 @@ def _zero(at_low: Array, at_high: Array) -> Array:
 
 def _fold(rod: TipMap) -> tuple[Array, Faces]:
     """The places where det J = 0, with triangles whose images look away from what is folded."""
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as error:
-        raise MissingExtra(("scikit-image", "surface")) from error
     n = _FOLD_CELLS
     dets = _dets(rod, cube_grid(n))
     if dets.min() >= 0 or dets.max() <= 0:
         return np.empty((0, 3)), np.empty((0, 3), np.int32)
     field = dets.reshape((n + 1,) * 3)
-    places, faces, _, _ = marching_cubes(field, 0.0, allow_degenerate=False)
+    places, faces = level_set(field, 0.0)
     ends = np.stack([np.floor(places), np.ceil(places)], axis=1).astype(int)
     numbers = np.stack(
         [np.ravel_multi_index(tuple(end.T), field.shape) for end in ends.swapaxes(0, 1)], axis=1
     ).astype(np.int32)
     grid = cube_grid(n)
     moved = numbers[:, 0] != numbers[:, 1]
-    cube = places.astype(float) / n
+    cube = places / n
     cube[moved] = _between(grid[numbers[moved]], _zeros(rod, grid, dets)(numbers[moved]))
     normals = _away(rod, cube)
     tips = _tips(rod, cube)
@@ -240,8 +235,6 @@ def _away(rod: TipMap, cube: Array) -> Array:
 
 
 class _Beside:
-    """Tells whether what is before a sheet is out of reach."""
-
     def __init__(self, rod: TipMap, image: Image) -> None:
         self._rod, self._image = rod, image
         self._n = round(len(image.vertices) ** (1 / 3)) - 1

@@ -236,7 +236,6 @@ class ReachableSolid(ReachableSet):
         return out
 
     def _repr_html_(self) -> str:
-        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Dots, Skin, html_card
 
         try:

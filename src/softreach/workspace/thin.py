@@ -12,7 +12,7 @@ from softreach.geometry.hull import convex_hull
 from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.box.simplices import chains, corner_steps
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Mask, as_points
+from softreach.support.arrays import Array, Index, Mask, as_points
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
@@ -81,7 +81,6 @@ class ReachableSurface(ReachableSet):
         return self.mapped_grid.distance(as_points("points", points))
 
     def _repr_html_(self) -> str:
-        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Skin, html_card
 
         return html_card(repr(self), Skin(self.mapped_grid.vertices, self.mapped_grid.faces))
@@ -145,13 +144,9 @@ class ReachableCurve(ReachableSet):
 
     @lazy
     def _chords(self) -> Surface:
-        """The chords as triangles that repeat a corner."""
-        start = np.flatnonzero(~self.left_out)
-        faces = np.stack([start, start + 1, start + 1], axis=1)
-        return Surface(vertices=np.nan_to_num(self.path), faces=faces)
+        return threads(np.nan_to_num(self.path), np.flatnonzero(~self.left_out))
 
     def _repr_html_(self) -> str:
-        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Dots, html_card
 
         return html_card(repr(self), Dots(_found(self.path)))
@@ -212,21 +207,35 @@ def thin_set(rod: TipMap) -> ReachableSet:
     return _KINDS[rod.box.dimension].of(rod)
 
 
+def threads(points: Array, first: Index) -> Surface:
+    """Lines from points to those that follow them, as triangles that repeat a corner.
+
+    Args:
+        points: [m], shape (n, 3).
+        first: Numbers of the points where lines begin, shape (m,).
+    """
+    return Surface(vertices=points, faces=np.stack([first, first + 1, first + 1], axis=1))
+
+
+def by_nodes(rod: TipMap) -> Estimate:
+    """Length [m] or area [m²] of the image, and by how much fewer Gauss nodes change it."""
+    fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
+    return Estimate(fine, abs(fine - rough))
+
+
 def _grid_tips(rod: TipMap, cells: int) -> Array:
     """Tips of a grid [m], on whose lines kinks are; even where some tips may be unstable."""
     return grid_tips(rod, cells, ticks=None if rod.supports_unstable else grid_ticks(rod, cells))
 
 
 def _measure(rod: TipMap, tips: Array, left_out: Mask) -> Estimate:
-    """Length or area of the image, and by how much fewer Gauss nodes change it.
+    """Length or area of the image, by Gauss nodes where it is smooth.
 
     Where cells are left out, it is that of the others and an estimate of the rest. Where the map
     has kinks it is that of cells, which err by O(1/n) there: three times what is removed is stated.
     """
-    if rod.is_smooth and not left_out.any():
-        fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
-        if np.isfinite([fine, rough]).all():
-            return Estimate(fine, abs(fine - rough))
+    if rod.is_smooth and not left_out.any() and np.isfinite(smooth := by_nodes(rod)).all():
+        return smooth
     return _of_cells(tips, left_out, 1.0 if rod.is_smooth else 3.0)
 
 
@@ -268,7 +277,6 @@ def _largest_neighbor(sizes: Array) -> Array:
 
 
 def _found(tips: Array) -> Array:
-    """Tips of stable equilibria."""
     return tips[np.isfinite(tips[:, 0])]
 
 
