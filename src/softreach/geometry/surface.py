@@ -158,12 +158,9 @@ def simplified(vertices: Points, faces: Faces, most: int) -> tuple[Points, Faces
         sums = [np.bincount(place, weights=axis) for axis in vertices.T]
         corners = place[faces]
         after = np.roll(corners, -1, axis=1)
-        coarse, fewer = (
-            np.stack(sums, axis=1) / count[:, None],
-            corners[(corners != after).all(axis=1)],
-        )
+        fewer = corners[(corners != after).all(axis=1)]
         if len(fewer) <= most:
-            return compact_surface(coarse, fewer)
+            return compact_surface(np.stack(sums, axis=1) / count[:, None], fewer)
         edge *= 1.2
     return vertices, faces
 

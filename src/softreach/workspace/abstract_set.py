@@ -18,7 +18,7 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Number", "ReachableSet"]
+__all__ = ["Number", "ReachableSet", "with_error"]
 
 
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -30,6 +30,14 @@ class Number(NamedTuple):
     value: float
     units: str
     long_name: str
+
+
+def with_error(name: str, value: float, error: float, unit: str, meaning: str) -> dict[str, Number]:
+    """A number and its error, as they are stored."""
+    return {
+        name: Number(value, unit, meaning),
+        f"{name}_error": Number(error, unit, f"error of the {meaning}"),
+    }
 
 
 class ReachableSet(ABC):
@@ -131,12 +139,11 @@ class ReachableSet(ABC):
         return self.volume, self.volume_error, self.convex_volume, self.convex_volume_error
 
     def _convex_numbers(self) -> dict[str, Number]:
-        convex, share = "convex hull's volume", "share of the convex hull out of reach"
+        convex = self.convex_volume, self.convex_volume_error
+        share = self.unreachability, self.unreachability_error
         return {
-            "convex_volume": Number(self.convex_volume, "m3", convex),
-            "convex_volume_error": Number(self.convex_volume_error, "m3", f"error of the {convex}"),
-            "unreachability": Number(self.unreachability, "1", share),
-            "unreachability_error": Number(self.unreachability_error, "1", f"error of the {share}"),
+            **with_error("convex_volume", *convex, "m3", "convex hull's volume"),
+            **with_error("unreachability", *share, "1", "share of the convex hull out of reach"),
         }
 
     def _convex_text(self) -> str:

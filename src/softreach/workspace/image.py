@@ -250,7 +250,10 @@ def image_of(
     """
     scaled = lattice.coordinates(points)
     gaps = np.zeros(cells, bool) if left_out is None else left_out
-    unit = _unit(scaled, gaps)
+    grid = scaled.reshape(*(n + 1 for n in cells), 3)
+    longest = max(float(np.sum([_longest_edge(grid, gaps, axis) for axis in range(3)])), 1.0)
+    # Determinants of the kernels are then exact, as rounding adds no more than 1 unit.
+    unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
     vertices = np.rint(scaled * unit)
     vertices[np.isnan(vertices)] = 0.0
     return Image(
@@ -259,14 +262,6 @@ def image_of(
         vertices=vertices,
         triangles=_critical_triangles(vertices, stretches, gaps, progress),
     )
-
-
-def _unit(scaled: Array, left_out: Mask) -> float:
-    """The largest power of two for which the kernels' determinants are exact."""
-    grid = scaled.reshape(*(n + 1 for n in left_out.shape), 3)
-    steps = [_longest_edge(grid, left_out, axis) for axis in range(3)]
-    longest = max(float(np.sum(steps)), 1.0)  # rounding adds at most 1 unit, hence the -1 below
-    return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
 
 
 def _longest_edge(grid: Array, left_out: Mask, axis: int) -> float:

@@ -19,7 +19,7 @@ from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number
+from softreach.workspace.abstract_set import Number, with_error
 from softreach.workspace.convex import HullCorners, climbed_hull
 from softreach.workspace.flux import box_slopes
 from softreach.workspace.grid import cube_grid
@@ -82,13 +82,8 @@ class ReachableRegion(ReachableSurface):
         ]
 
     def _numbers(self) -> dict[str, Number]:
-        return {
-            **super()._numbers(),
-            "convex_area": Number(self.convex_area, "m2", "convex hull's area"),
-            "convex_area_error": Number(
-                self.convex_area_error, "m2", "error of the convex hull's area"
-            ),
-        }
+        convex = self.convex_area, self.convex_area_error
+        return super()._numbers() | with_error("convex_area", *convex, "m2", "convex hull's area")
 
 
 @dataclass(frozen=True, repr=False)

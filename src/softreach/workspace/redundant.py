@@ -24,7 +24,7 @@ from softreach.workspace.convex import ConvexHull, climbed_hull
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
-from softreach.workspace.wrap import DISTANCE, Wrap, fits, spread, wrapped
+from softreach.workspace.wrap import DISTANCE, Wrap, spread, wrapped
 
 __all__ = [
     "Searched",
@@ -192,14 +192,14 @@ def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
     """
     flood.add(gamma, tips)
     for number in range(1, _CLOUDS):
-        while not flood.is_bounded:
+        while not flood.fits():
             flood = _wider(flood)
         before = np.count_nonzero(flood.gap == 0.0)
         flood.add(*cloud_on_faces(flood.rod, number))
-        if flood.is_bounded and np.count_nonzero(flood.gap == 0.0) == before:
+        if flood.fits() and np.count_nonzero(flood.gap == 0.0) == before:
             break
     spread(flood)
-    while not fits(flood):
+    while not flood.fits(DISTANCE):
         flood = _wider(flood)
         spread(flood)
     return flood
@@ -208,7 +208,7 @@ def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
 def _wider(flood: Flood) -> Flood:
     """The same on a lattice with room around what is reached."""
     lattice = flood.lattice
-    known = np.flatnonzero((flood.gap >= 0.0) & (flood.gap < DISTANCE))
+    known = np.flatnonzero(flood.near(DISTANCE))
     room = np.full(3, 4 + max(lattice.shape) // 8)
     room[2] *= not flood.is_flat
     nx, ny, nz = np.array(lattice.shape) + 2 * room

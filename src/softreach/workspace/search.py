@@ -87,11 +87,14 @@ class Flood:
         known = np.where(self.gap < 0.0, _FAR, self.gap)
         return np.minimum(known, _FAR).reshape(self.lattice.shape)
 
-    @property
-    def is_bounded(self) -> bool:
-        """True if all that is reached ends within the lattice."""
-        inside = self.reached[2:-2, 2:-2, 2:-2]
-        return int(np.count_nonzero(inside)) == int(np.count_nonzero(self.gap == 0.0))
+    def near(self, within: float = ENOUGH) -> Mask:
+        """Mask of centers with a tip nearer than so many cells, shape (cells,): reached ones."""
+        return (self.gap >= 0.0) & (self.gap < within)
+
+    def fits(self, within: float = ENOUGH) -> bool:
+        """True if these end within the lattice."""
+        near = self.near(within).reshape(self.lattice.shape)
+        return bool(np.count_nonzero(near) == np.count_nonzero(near[2:-2, 2:-2, 2:-2]))
 
     def centers(self, cells: Index) -> Array:
         """Places [m] of cells given by flat index, shape (n, 3)."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -158,7 +159,7 @@ def _parted_faces(rod: TipMap) -> tuple[Array, Faces]:
     """The faces of the box with outward triangles, each wholly of one sign of det J."""
     cube = grid_faces(_FACE_CELLS)
     faces, dets = face_triangles(cube, _FACE_CELLS), _dets(rod, cube)
-    cut = _zeros(rod, cube, dets)
+    cut = partial(_zeros, rod, cube, dets)
     positive, pairs, shares = clipped(faces, dets > 0, cut)
     negative, more, other = clipped(faces, dets <= 0, cut)
     # each part has its own copies: across the fold the surface does not go on
@@ -170,26 +171,19 @@ def _parted_faces(rod: TipMap) -> tuple[Array, Faces]:
     )
 
 
-def _zeros(rod: TipMap, cube: Array, dets: Array) -> Callable[[NDArray[np.int32]], Array]:
+def _zeros(rod: TipMap, cube: Array, dets: Array, pairs: NDArray[np.int32]) -> Array:
     """Shares of the way between vertices where det J = 0, by regula falsi (Illinois)."""
-
-    def cut(pairs: NDArray[np.int32]) -> Array:
-        low, high = np.zeros(len(pairs)), np.ones(len(pairs))
-        at_low, at_high = dets[pairs[:, 0]].copy(), dets[pairs[:, 1]].copy()
-        share = _zero(at_low, at_high)
-        for _ in range(_SECANTS):
-            value = _dets(rod, _between(cube[pairs], share))
-            beyond = np.sign(value) == np.sign(at_high)
-            high, at_high, at_low = (
-                np.where(beyond, share, high),
-                np.where(beyond, value, at_high / 2),
-                np.where(beyond, at_low / 2, value),
-            )
-            low = np.where(beyond, low, share)
-            share = low + (high - low) * _zero(at_low, at_high)
-        return share
-
-    return cut
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    at_low, at_high = dets[pairs].T
+    share = _zero(at_low, at_high)
+    for _ in range(_SECANTS):
+        value = _dets(rod, _between(cube[pairs], share))
+        beyond = np.sign(value) == np.sign(at_high)
+        low, high = np.where(beyond, low, share), np.where(beyond, share, high)
+        at_low = np.where(beyond, at_low / 2, value)
+        at_high = np.where(beyond, value, at_high / 2)
+        share = low + (high - low) * _zero(at_low, at_high)
+    return share
 
 
 def _zero(at_low: Array, at_high: Array) -> Array:
@@ -213,7 +207,7 @@ def _fold(rod: TipMap) -> tuple[Array, Faces]:
     grid = cube_grid(n)
     moved = numbers[:, 0] != numbers[:, 1]
     cube = places / n
-    cube[moved] = _between(grid[numbers[moved]], _zeros(rod, grid, dets)(numbers[moved]))
+    cube[moved] = _between(grid[numbers[moved]], _zeros(rod, grid, dets, numbers[moved]))
     normals = _away(rod, cube)
     tips = _tips(rod, cube)
     corners = tips[faces]

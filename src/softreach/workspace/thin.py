@@ -15,7 +15,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask, as_points
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, ReachableSet
+from softreach.workspace.abstract_set import Number, ReachableSet, with_error
 from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
 from softreach.workspace.grid import every_second, grid_ticks, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
@@ -90,8 +90,7 @@ class ReachableSurface(ReachableSet):
 
     def _numbers(self) -> dict[str, Number]:
         return {
-            "area": Number(self.area, "m2", "area"),
-            "area_error": Number(self.area_error, "m2", "error of the area"),
+            **with_error("area", self.area, self.area_error, "m2", "area"),
             **self._convex_numbers(),
         }
 
@@ -156,9 +155,9 @@ class ReachableCurve(ReachableSet):
         return [f"length {length}", self._convex_text()]
 
     def _numbers(self) -> dict[str, Number]:
+        length, error = self.curve_length, self.curve_length_error
         return {
-            "curve_length": Number(self.curve_length, "m", "length"),
-            "curve_length_error": Number(self.curve_length_error, "m", "error of the length"),
+            **with_error("curve_length", length, error, "m", "length"),
             **self._convex_numbers(),
         }
 
@@ -246,12 +245,15 @@ def _of_cells(tips: Array, left_out: Mask, share: float) -> Estimate:
     too, and a share of it is part of the error. A cell that is left out may still reach as much as
     its largest neighbor, and half of it is taken.
     """
+    from scipy.ndimage import maximum_filter
+
     cells, m = len(left_out), left_out.ndim
     sizes = np.where(left_out, 0.0, _sizes(tips, cells, m))
     lost = coarser(left_out)
     rough = np.where(lost, 0.0, _sizes(every_second(tips, cells, m), cells // 2, m))
     removed = (float(sizes[~finer(lost)].sum()) - float(rough.sum())) / 3.0
-    unknown = 0.5 * float(_largest_neighbor(sizes)[left_out].sum())
+    around = maximum_filter(sizes, 3, mode="constant")  # of a cell and those that touch it
+    unknown = 0.5 * float(around[left_out].sum())
     return Estimate(float(sizes.sum()) + removed + unknown, share * abs(removed) + unknown)
 
 
@@ -264,16 +266,6 @@ def _sizes(tips: Array, cells: int, m: int) -> Array:
     first, second, third = (corners[..., k, :] - corners[..., 0, :] for k in (1, 3, 2))
     pair = np.stack([np.cross(first, second), np.cross(second, third)])
     return np.linalg.norm(pair, axis=-1).sum(axis=0) / 2.0
-
-
-def _largest_neighbor(sizes: Array) -> Array:
-    """The largest of a cell and those that touch it."""
-    for axis in range(sizes.ndim):
-        none = np.zeros_like(np.take(sizes, [0], axis))
-        rows = np.concatenate([none, sizes, none], axis)
-        sizes = np.moveaxis(corner_values(corner_values(rows, [axis]).max(axis=-1), [axis]), -1, 0)
-        sizes = sizes.max(axis=0)
-    return sizes
 
 
 def _found(tips: Array) -> Array:

@@ -14,11 +14,11 @@ from softreach.geometry.surface import Surface, corner_areas, level_set
 from softreach.rod.activation_box import damped_steps
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace.search import CLEARLY, ENOUGH, Flood, Nearest, nearest_tips
 
-__all__ = ["DISTANCE", "Wrap", "drawn_tight", "fits", "spread", "wrapped"]
+__all__ = ["DISTANCE", "Wrap", "drawn_tight", "spread", "wrapped"]
 
 DISTANCE = 0.75
 """Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
@@ -116,12 +116,6 @@ def spread(flood: Flood) -> None:
         before = flood.gap[cells]
         flood.search(cells, flood.gamma[sources])
         front = cells[(flood.gap[cells] < before) & (flood.gap[cells] < DISTANCE)]
-
-
-def fits(flood: Flood) -> Mask:
-    """True if the level set ends within the lattice."""
-    near = ((flood.gap >= 0.0) & (flood.gap < DISTANCE)).reshape(flood.lattice.shape)
-    return np.count_nonzero(near) == np.count_nonzero(near[2:-2, 2:-2, 2:-2])
 
 
 def drawn_tight(flood: Flood, at: Array) -> Nearest:
