@@ -14,7 +14,7 @@ import numpy as np
 
 from softreach.support.arrays import Array, Index
 from softreach.workspace.cells import ReachedCells
-from softreach.workspace.image import Image, Spans
+from softreach.workspace.image import Image
 
 __all__ = ["BoundarySamples", "boundary_samples", "overlap_samples"]
 
@@ -82,24 +82,19 @@ def overlap_samples(image: Image, sense: int) -> BoundarySamples:
 
 def _of_image(image: Image, jump: Callable[[Index, Index], Index]) -> BoundarySamples:
     """Nodes where `jump` of the changes of reach (1, 0 or -1) and of the degree is not 0."""
-    rules = [_along(image, spans, axis, jump) for axis, spans in enumerate(image.spans)]
+    lattice, rules = image.lattice, []
+    for axis, spans in enumerate(image.spans):
+        reached = (spans.cover > 0).astype(np.int64)
+        jumps = jump(np.diff(reached, prepend=0), np.diff(spans.degree, prepend=0))
+        which = np.flatnonzero(jumps)
+        i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
+        at = np.empty((len(which), 3))
+        at[:, axis], at[:, (axis + 1) % 3], at[:, (axis + 2) % 3] = spans.start[which], i, j
+        area = np.zeros((len(which), 3))
+        area[:, axis] = -(lattice.cell**2) * jumps[which]
+        places = lattice.origin + lattice.cell * at
+        rules.append((image.cube_places(spans, axis, which), places, area, _group(axis, i, j)))
     return BoundarySamples(*(np.concatenate(parts) for parts in zip(*rules, strict=True)))
-
-
-def _along(
-    image: Image, spans: Spans, axis: int, jump: Callable[[Index, Index], Index]
-) -> tuple[Array, Array, Array, Index]:
-    reached = (spans.cover > 0).astype(np.int64)
-    jumps = jump(np.diff(reached, prepend=0), np.diff(spans.degree, prepend=0))
-    which = np.flatnonzero(jumps)
-    lattice = image.lattice
-    i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
-    at = np.empty((len(which), 3))
-    at[:, axis], at[:, (axis + 1) % 3], at[:, (axis + 2) % 3] = spans.start[which], i, j
-    area = np.zeros((len(which), 3))
-    area[:, axis] = -(lattice.cell**2) * jumps[which]
-    places = lattice.origin + lattice.cell * at
-    return image.cube_places(spans, axis, which), places, area, _group(axis, i, j)
 
 
 def _of_cells(cells: ReachedCells) -> BoundarySamples:

@@ -40,11 +40,8 @@ def boundary_edges(reached: Mask) -> Edges:
     for axis in range(3):
         before, after = np.moveaxis(reached, axis, 0)[:-1], np.moveaxis(reached, axis, 0)[1:]
         cells = np.moveaxis(flat, axis, 0)
-        for sense, mask, cell in (
-            (1, before & ~after, cells[:-1]),
-            (-1, after & ~before, cells[1:]),
-        ):
-            places = cell[mask]
+        leaving, entering = cells[:-1][before & ~after], cells[1:][after & ~before]
+        for sense, places in ((1, leaving), (-1, entering)):
             parts.append((places, np.full(len(places), axis), np.full(len(places), sense)))
     return Edges(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 

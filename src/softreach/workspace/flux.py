@@ -77,13 +77,13 @@ def _of_triangles(rod: TipMap, enough: float) -> Flux:
     A triangle's volume is linear in each corner, so that both grids together are nodes of one flux.
     """
     enough = max(enough, _ROUGH_ENOUGH * rod.supports_unstable)
-    coarse, fine = (_triangle_nodes(rod, cells) for cells in _KINKED[:2])
-    removed = (fine.value - coarse.value) / 3.0
-    for cells in _KINKED[2:]:
-        if not abs(removed) > enough * abs(fine.value):  # NaN too
-            break
+    coarse = fine = _triangle_nodes(rod, _KINKED[0])
+    removed = np.inf
+    for cells in _KINKED[1:]:
         coarse, fine = fine, _triangle_nodes(rod, cells)
         removed = (fine.value - coarse.value) / 3.0
+        if not abs(removed) > enough * abs(fine.value):  # NaN too
+            break
     return Flux(
         fine.value + removed,
         _KINKED_SHARE * abs(removed) + fine.error,

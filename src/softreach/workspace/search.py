@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -115,21 +114,12 @@ class Flood:
         """Search the neighbors of reached cells from there, and theirs, until none is new."""
         while len(cells):
             fresh = []
-            for neighbors, sources in self._frontier(cells):
-                known = self.gap[neighbors] > 0
-                neighbors, sources = neighbors[known], sources[known]
+            for step in (*self.steps, *-self.steps):
+                sources = cells[self.gap[cells + step] > 0]
+                neighbors = sources + step
                 self.search(neighbors, self.gamma[sources])
                 fresh.append(neighbors[self.gap[neighbors] == 0.0])
-            cells = np.unique(np.concatenate(fresh)) if fresh else cells[:0]
-
-    def _frontier(self, cells: Index) -> Iterator[tuple[Index, Index]]:
-        """Neighbors of cells that are not reached, and the cell each is a neighbor of."""
-        for step in (*self.steps, *-self.steps):
-            neighbors = cells + step
-            open_ = np.flatnonzero(self.gap[neighbors] > 0)
-            for first in range(0, len(open_), _CHUNK):
-                part = open_[first : first + _CHUNK]
-                yield neighbors[part], cells[part]
+            cells = np.unique(np.concatenate(fresh))
 
     def search(self, cells: Index, starts: Array) -> None:
         """Search for centers, and keep what comes closer."""
@@ -191,7 +181,11 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
     total, box = len(targets), rod.box
     bounds = box.low, box.high, box.scales
-    running, center = _room(min(total, _TOGETHER), box.bundles)
+    size, m = min(total, _TOGETHER), box.bundles
+    shapes = (), (), (3, m), (3,), (), (m,), (m,), (m,)
+    numbers = (np.zeros((size, *shape)) for shape in shapes)
+    running = Running(np.zeros(size, np.int64), np.zeros(size, np.int64), *numbers)
+    center = np.zeros((size, m))
     tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
     step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
     torn, begun, n = rod.supports_unstable, 0, 0
@@ -212,11 +206,3 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
         next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
     nowhere = nearest.distance >= NOWHERE
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
-
-
-def _room(count: int, m: int) -> tuple[Running, Array]:
-    """Place for as many searches side by side, and where their steps are centered."""
-    integers = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    numbers = [np.zeros(shape) for shape in ((count,), (count,), (count, 3, m), (count, 3))]
-    others = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
-    return Running(*integers, *numbers, *others), np.zeros((count, m))
