@@ -91,7 +91,7 @@ class Driving:
     def kinks(self) -> list[Array]:
         """Inputs at which a drive alone lets a tendon go slack, for each input in its unit."""
         low, high = self.arm.input_bounds.T
-        at_low, kinks = self._offsets + self.gains @ low, list[Array]()
+        at_low, kinks = self.offsets + self.gains @ low, list[Array]()
         free = (self.gains != 0.0) & (low < high)
         for k in range(self.arm.inputs):
             alone = np.flatnonzero(self._pulls & free[:, k] & (free.sum(axis=1) == 1))

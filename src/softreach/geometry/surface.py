@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.kernels.points.point_distances import distances_to_faces
 from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
+from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
@@ -81,6 +82,27 @@ class Surface:
         return np.argsort(corners, kind="stable") // 3, np.concatenate([[0], ends])
 
 
+def level_set(field: Array, level: float) -> tuple[Points, Faces]:
+    """Triangles where what is known at the vertices of a grid has a value, by marching cubes.
+
+    Args:
+        field: Shape (i, j, k).
+        level: The value; triangles are oriented toward larger ones.
+
+    Returns:
+        Places in edges of the grid, shape (v, 3), and triangles, shape (f, 3).
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError as error:
+        raise MissingExtra(("scikit-image", "surface")) from error
+    places, faces, _, _ = marching_cubes(field, level, allow_degenerate=False)
+    return places.astype(float), faces
+
+
 def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
     """The points that faces use, and the faces in their numbering."""
     used = np.zeros(len(points), bool)
@@ -136,12 +158,9 @@ def simplified(vertices: Points, faces: Faces, most: int) -> tuple[Points, Faces
         sums = [np.bincount(place, weights=axis) for axis in vertices.T]
         corners = place[faces]
         after = np.roll(corners, -1, axis=1)
-        coarse, fewer = (
-            np.stack(sums, axis=1) / count[:, None],
-            corners[(corners != after).all(axis=1)],
-        )
+        fewer = corners[(corners != after).all(axis=1)]
         if len(fewer) <= most:
-            return compact_surface(coarse, fewer)
+            return compact_surface(np.stack(sums, axis=1) / count[:, None], fewer)
         edge *= 1.2
     return vertices, faces
 
@@ -236,26 +255,14 @@ def _chained(pieces: NDArray[np.integer], count: int) -> list[list[int]]:
     for number, (start, end) in enumerate(pieces.tolist()):
         touching[start].append(number)
         touching[end].append(number)
-    used = np.zeros(len(pieces), bool)
-    order = sorted(range(count), key=lambda place: len(touching[place]) % 2 == 0)
-    curves = (_walk(place, pieces, touching, used) for place in order)
+    used, curves = np.zeros(len(pieces), bool), list[list[int]]()
+    for place in sorted(range(count), key=lambda place: len(touching[place]) % 2 == 0):
+        curve = [place]
+        while (ahead := next((k for k in touching[curve[-1]] if not used[k]), None)) is not None:
+            used[ahead] = True
+            curve.append(int(pieces[ahead].sum()) - curve[-1])  # its other end
+        curves.append(curve)
     return [curve for curve in curves if len(curve) > 1]
-
-
-def _walk(
-    place: int,
-    pieces: NDArray[np.integer],
-    touching: list[list[int]],
-    used: Mask,
-) -> list[int]:
-    """From a place along pieces that are not used yet, as far as they go."""
-    curve = [place]
-    while (ahead := next((k for k in touching[place] if not used[k]), None)) is not None:
-        used[ahead] = True
-        start, end = pieces[ahead].tolist()
-        place = end if start == place else start
-        curve.append(place)
-    return curve
 
 
 def unit_scale(points: Points) -> tuple[Points, int]:

@@ -18,7 +18,7 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Number", "ReachableSet"]
+__all__ = ["Number", "ReachableSet", "with_error"]
 
 
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -30,6 +30,14 @@ class Number(NamedTuple):
     value: float
     units: str
     long_name: str
+
+
+def with_error(name: str, value: float, error: float, unit: str, meaning: str) -> dict[str, Number]:
+    """A number and its error, as they are stored."""
+    return {
+        name: Number(value, unit, meaning),
+        f"{name}_error": Number(error, unit, f"error of the {meaning}"),
+    }
 
 
 class ReachableSet(ABC):
@@ -69,16 +77,18 @@ class ReachableSet(ABC):
 
     @property
     def unreachability(self) -> float:
-        """The part of the convex hull that is out of reach, 1 - V / V_convex [-]; NaN for 0/0."""
-        return 1.0 - self.volume / self.convex_volume if self.convex_volume > 0 else np.nan
+        """The part of the convex hull that is out of reach [-]; NaN for 0/0.
+
+        1 - V / V_convex, and of a region in a plane 1 - A / A_convex.
+        """
+        size, _, convex, _ = self._sizes()
+        return 1.0 - size / convex if convex > 0 else np.nan
 
     @property
     def unreachability_error(self) -> float:
-        """Error of `unreachability` by those of both volumes [-]; NaN for 0/0."""
-        if not self.convex_volume > 0:
-            return np.nan
-        share = self.volume / self.convex_volume
-        return (self.volume_error + share * self.convex_volume_error) / self.convex_volume
+        """Error of `unreachability` by those of both volumes or areas [-]; NaN for 0/0."""
+        size, error, convex, convex_error = self._sizes()
+        return (error + size / convex * convex_error) / convex if convex > 0 else np.nan
 
     @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
@@ -111,7 +121,6 @@ class ReachableSet(ABC):
         return "\n  ".join([f"{type(self).__name__}: {size}", *details, self._origin()])
 
     def _lost(self) -> dict[str, Number]:
-        """Share left out, for arms of which some activations may not be stable."""
         if not self.tip_map.supports_unstable:
             return {}
         meaning = "share of the activation box left out: no stable equilibrium, or torn"
@@ -125,21 +134,22 @@ class ReachableSet(ABC):
     def _numbers(self) -> dict[str, Number]:
         """Numbers to store."""
 
+    def _sizes(self) -> tuple[float, float, float, float]:
+        """Size and error of the set, and of its convex hull."""
+        return self.volume, self.volume_error, self.convex_volume, self.convex_volume_error
+
     def _convex_numbers(self) -> dict[str, Number]:
-        """The numbers about the convex hull."""
-        convex, share = "convex hull's volume", "share of the convex hull out of reach"
+        convex = self.convex_volume, self.convex_volume_error
+        share = self.unreachability, self.unreachability_error
         return {
-            "convex_volume": Number(self.convex_volume, "m3", convex),
-            "convex_volume_error": Number(self.convex_volume_error, "m3", f"error of the {convex}"),
-            "unreachability": Number(self.unreachability, "1", share),
-            "unreachability_error": Number(self.unreachability_error, "1", f"error of the {share}"),
+            **with_error("convex_volume", *convex, "m3", "convex hull's volume"),
+            **with_error("unreachability", *share, "1", "share of the convex hull out of reach"),
         }
 
     def _convex_text(self) -> str:
         return f"convex hull {quantity(self.convex_volume, 'm³', self.convex_volume_error)}"
 
     def _origin(self) -> str:
-        """A line on how the set was computed."""
         box, rod = self.tip_map.box, self.tip_map
         free = counted(box.dimension, "free bundle")
         power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach.geometry.surface import Surface, compact_surface
+from softreach.geometry.surface import Surface, compact_surface, level_set
 from softreach.support.arrays import Array
-from softreach.support.errors import MissingExtra
 from softreach.workspace.image import Image
 
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
@@ -49,34 +48,20 @@ def signed_field(image: Image) -> Array:
     """
     inverse_square = np.zeros(image.lattice.shape)
     for axis in range(3):
-        inverse_square += _axis_distances(image, axis) ** -2
+        along = np.full(image.lattice.shape, np.inf)  # beyond two cells from the boundary
+        index, behind = image.boundary_crossings(axis)
+        for step in (-1, 0, 1, 2):
+            shifted = list(index)
+            shifted[axis] = index[axis] + step
+            np.minimum.at(along, tuple(shifted), np.abs(behind - step).clip(_CLOSEST))
+        inverse_square += along**-2
     with np.errstate(divide="ignore"):
         distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
     return np.where(image.counts[0] > 0, -distance, distance)
 
 
-def _axis_distances(image: Image, axis: int) -> Array:
-    """Distance to the boundary along an axis, in cells; infinite beyond two of them."""
-    distance = np.full(image.lattice.shape, np.inf)
-    index, behind = image.boundary_crossings(axis)
-    for step in (-1, 0, 1, 2):
-        shifted = list(index)
-        shifted[axis] = index[axis] + step
-        away = np.abs(behind - step).clip(_CLOSEST)
-        np.minimum.at(distance, tuple(shifted), away)
-    return distance
-
-
 def _level_set(image: Image, field: Array, level: float) -> Surface:
-    """Surface where the field, in cells, has a value."""
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as error:
-        raise MissingExtra(("scikit-image", "surface")) from error
     if not (field < level).any():
         return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
-    vertices, faces, _, _ = marching_cubes(
-        field, level, gradient_direction="descent", allow_degenerate=False
-    )
-    lattice = image.lattice
-    return Surface(vertices=lattice.origin + lattice.cell * vertices.astype(float), faces=faces)
+    (vertices, faces), lattice = level_set(field, level), image.lattice
+    return Surface(vertices=lattice.origin + lattice.cell * vertices, faces=faces)

@@ -7,16 +7,16 @@ through the boundary, theory (98), and need no normals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from softreach.support.arrays import Array, Index
 from softreach.workspace.cells import ReachedCells
-from softreach.workspace.image import Image, Spans
+from softreach.workspace.image import Image
 
-__all__ = ["BoundarySamples", "boundary_samples", "joined_samples", "overlap_samples"]
+__all__ = ["BoundarySamples", "boundary_samples", "overlap_samples"]
 
 _CLASSES = 4  # every other line along both directions
 
@@ -61,16 +61,6 @@ class BoundarySamples:
         return np.einsum("ni,nip->np", area, slopes)
 
 
-def joined_samples(parts: Sequence[BoundarySamples]) -> BoundarySamples:
-    """All nodes of several rules."""
-    return BoundarySamples(
-        np.concatenate([part.cube for part in parts]),
-        np.concatenate([part.places for part in parts]),
-        np.concatenate([part.area for part in parts]),
-        np.concatenate([part.group for part in parts]),
-    )
-
-
 def boundary_samples(image: Image | ReachedCells) -> BoundarySamples:
     """Nodes on all of the boundary of an image; the vertices of what is wrapped."""
     if isinstance(image, ReachedCells):
@@ -91,34 +81,20 @@ def overlap_samples(image: Image, sense: int) -> BoundarySamples:
 
 
 def _of_image(image: Image, jump: Callable[[Index, Index], Index]) -> BoundarySamples:
-    """Nodes where something jumps along lines of sight.
-
-    Args:
-        image: Of three free bundles.
-        jump: Of what changes by as much when the set is entered (1), left (-1), or neither, and
-            when the degree changes.
-    """
-    return joined_samples([_along(image, image.spans[axis], axis, jump) for axis in range(3)])
-
-
-def _along(
-    image: Image, spans: Spans, axis: int, jump: Callable[[Index, Index], Index]
-) -> BoundarySamples:
-    reached = (spans.cover > 0).astype(np.int64)
-    jumps = jump(np.diff(reached, prepend=0), np.diff(spans.degree, prepend=0))
-    which = np.flatnonzero(jumps)
-    lattice = image.lattice
-    i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
-    at = np.empty((len(which), 3))
-    at[:, axis], at[:, (axis + 1) % 3], at[:, (axis + 2) % 3] = spans.start[which], i, j
-    area = np.zeros((len(which), 3))
-    area[:, axis] = -(lattice.cell**2) * jumps[which]
-    return BoundarySamples(
-        image.cube_places(spans, axis, which),
-        lattice.origin + lattice.cell * at,
-        area,
-        _group(axis, i, j),
-    )
+    """Nodes where `jump` of the changes of reach (1, 0 or -1) and of the degree is not 0."""
+    lattice, rules = image.lattice, []
+    for axis, spans in enumerate(image.spans):
+        reached = (spans.cover > 0).astype(np.int64)
+        jumps = jump(np.diff(reached, prepend=0), np.diff(spans.degree, prepend=0))
+        which = np.flatnonzero(jumps)
+        i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
+        at = np.empty((len(which), 3))
+        at[:, axis], at[:, (axis + 1) % 3], at[:, (axis + 2) % 3] = spans.start[which], i, j
+        area = np.zeros((len(which), 3))
+        area[:, axis] = -(lattice.cell**2) * jumps[which]
+        places = lattice.origin + lattice.cell * at
+        rules.append((image.cube_places(spans, axis, which), places, area, _group(axis, i, j)))
+    return BoundarySamples(*(np.concatenate(parts) for parts in zip(*rules, strict=True)))
 
 
 def _of_cells(cells: ReachedCells) -> BoundarySamples:

@@ -10,7 +10,7 @@ import numpy as np
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Lattice
-from softreach.workspace.search import ENOUGH, Flood, nearest_tips
+from softreach.workspace.search import ENOUGH, Flood, Nearest, nearest_tips
 
 __all__ = ["Crossings", "Edges", "boundary_edges", "swept_crossings"]
 
@@ -40,11 +40,8 @@ def boundary_edges(reached: Mask) -> Edges:
     for axis in range(3):
         before, after = np.moveaxis(reached, axis, 0)[:-1], np.moveaxis(reached, axis, 0)[1:]
         cells = np.moveaxis(flat, axis, 0)
-        for sense, mask, cell in (
-            (1, before & ~after, cells[:-1]),
-            (-1, after & ~before, cells[1:]),
-        ):
-            places = cell[mask]
+        leaving, entering = cells[:-1][before & ~after], cells[1:][after & ~before]
+        for sense, places in ((1, leaving), (-1, entering)):
             parts.append((places, np.full(len(places), axis), np.full(len(places), sense)))
     return Edges(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -111,22 +108,23 @@ class Crossings:
             t = np.where(guess, np.where(place > low + 0.5 * _PROBE, tangent, probe), probe)
             probed = t == probe
             start = np.where(probed[:, None], self.gamma[which], self.beyond[which])
-            reached = self._try(which, t, start)
+            reached, nearest = self._search(which, t, start)
+            no = which[~reached]
+            self.high[no], self.beyond[no] = t[~reached], nearest.gamma[~reached]
+            self._cut(no, nearest.tips[~reached])
             # A probe that is reached: the plane lied, and halving follows.
             lied = reached & probed
             self.place[which[lied]] = 0.5 * (self.low[which[lied]] + self.high[which[lied]])
             guess = ~reached | lied
 
-    def _try(self, which: Index, t: Array, start: Array) -> Mask:
-        """Search for places on edges; whether they are reached."""
-        cell = self.lattice.cell
-        nearest = nearest_tips(self.rod, start, self.points(which, t), ENOUGH * cell)
-        reached = nearest.distance <= ENOUGH * cell
-        yes, no = which[reached], which[~reached]
-        self.low[yes], self.gamma[yes] = t[reached], nearest.gamma[reached]
-        self.high[no], self.beyond[no] = t[~reached], nearest.gamma[~reached]
-        self._cut(no, nearest.tips[~reached])
-        return reached
+    def _search(self, which: Index, t: Array, start: Array) -> tuple[Mask, Nearest]:
+        """Search for places on edges, and keep those that are reached; which these are."""
+        enough = ENOUGH * self.lattice.cell
+        nearest = nearest_tips(self.rod, start, self.points(which, t), enough)
+        reached = nearest.distance <= enough
+        self.low[which[reached]] = t[reached]
+        self.gamma[which[reached]] = nearest.gamma[reached]
+        return reached, nearest
 
     def _cut(self, which: Index, tips: Array | None = None) -> None:
         """Cut the edges by the planes through the tips nearest to `high`, square to the way."""
@@ -143,14 +141,10 @@ class Crossings:
     def advance(self, which: Index, start: Array, by: float) -> Array:
         """Search beyond crossings from other activations; by how many cells each moved outward."""
         before = self.place[which].copy()
-        target = np.minimum(before + by, 1.0)
-        cell = self.lattice.cell
-        nearest = nearest_tips(self.rod, start, self.points(which, target), ENOUGH * cell)
-        reached = nearest.distance <= ENOUGH * cell
+        reached, _ = self._search(which, np.minimum(before + by, 1.0), start)
         yes = which[reached]
-        self.low[yes], self.gamma[yes] = target[reached], nearest.gamma[reached]
         self.high[yes] = np.maximum(self.high[yes], 1.0)
-        self.beyond[yes] = nearest.gamma[reached]
+        self.beyond[yes] = self.gamma[yes]
         self.place[yes] = 0.5 * (self.low[yes] + 1.0)
         self.enclose(yes)
         return self.place[which] - before
@@ -175,12 +169,6 @@ def swept_crossings(flood: Flood) -> tuple[Crossings, float]:
         gain = float(moved.clip(0.0).sum()) * volume
         beyond = np.flatnonzero(crossings.low >= 1.0)
         if len(beyond):
-            _reach_further(flood, crossings, beyond)
+            flood.add(crossings.gamma[beyond], crossings.points(beyond, crossings.low[beyond]))
             crossings = Crossings.of(flood)
     return crossings, gain
-
-
-def _reach_further(flood: Flood, crossings: Crossings, beyond: Index) -> None:
-    """Note that the far ends of edges are reached after all."""
-    gamma = crossings.gamma[beyond]
-    flood.add(gamma, crossings.points(beyond, crossings.low[beyond]))

@@ -77,13 +77,13 @@ def _of_triangles(rod: TipMap, enough: float) -> Flux:
     A triangle's volume is linear in each corner, so that both grids together are nodes of one flux.
     """
     enough = max(enough, _ROUGH_ENOUGH * rod.supports_unstable)
-    coarse, fine = (_triangle_nodes(rod, cells) for cells in _KINKED[:2])
-    removed = (fine.value - coarse.value) / 3.0
-    for cells in _KINKED[2:]:
-        if not abs(removed) > enough * abs(fine.value):  # NaN too
-            break
+    coarse = fine = _triangle_nodes(rod, _KINKED[0])
+    removed = np.inf
+    for cells in _KINKED[1:]:
         coarse, fine = fine, _triangle_nodes(rod, cells)
         removed = (fine.value - coarse.value) / 3.0
+        if not abs(removed) > enough * abs(fine.value):  # NaN too
+            break
     return Flux(
         fine.value + removed,
         _KINKED_SHARE * abs(removed) + fine.error,
@@ -166,7 +166,14 @@ def cross_products(a: Array, b: Array) -> Array:
 def gauss_faces(nodes: int) -> FaceNodes:
     """Gauss and Legendre's nodes on all six faces, as many along each side."""
     x, w = np.polynomial.legendre.leggauss(nodes)
-    return _on_faces((1.0 + x) / 2.0, w / 2.0)
+    a, b = (each.ravel() for each in np.meshgrid(*[(1.0 + x) / 2.0] * 2, indexing="ij"))
+    both, blocks = np.outer(w / 2.0, w / 2.0).ravel(), []
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            cube = np.empty((len(a), 3))
+            cube[:, axis], cube[:, (axis + 1) % 3], cube[:, (axis + 2) % 3] = side, a, b
+            blocks.append((cube, both, np.full(len(a), 2 * side - 1), np.full(len(a), axis)))
+    return FaceNodes(*(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
 
 
 def grid_faces(cells: int) -> Array:
@@ -191,21 +198,7 @@ def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:
     return tips, slopes[:, :, free] * rod.box.widths[free]
 
 
-def _on_faces(ticks: Array, weights: Array) -> FaceNodes:
-    a, b = (each.ravel() for each in np.meshgrid(ticks, ticks, indexing="ij"))
-    both = np.outer(weights, weights).ravel()
-    blocks = []
-    for axis in range(3):
-        for side in (0.0, 1.0):
-            cube = np.empty((len(a), 3))
-            cube[:, axis], cube[:, (axis + 1) % 3], cube[:, (axis + 2) % 3] = side, a, b
-            blocks.append((cube, both, np.full(len(a), 2 * side - 1), np.full(len(a), axis)))
-    cube, all_weights, sense, axis = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-    return FaceNodes(cube, all_weights, sense, axis)
-
-
 def _flux(rod: TipMap, nodes: int) -> Flux:
-    """By one rule."""
     faces = gauss_faces(nodes)
     tips, slopes = box_slopes(rod, faces.cube)
     return _flux_of(rod, faces.cube, tips, faces.area_vectors(slopes))

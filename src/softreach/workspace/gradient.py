@@ -212,7 +212,6 @@ def _swept(
 
 
 def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
-    """Derivatives of the volume of more than three bundles."""
     assert isinstance(solid.image, ReachedCells)
     if not solid.image.is_thick:
         wrap, coarse = (_sum(each, tips) for each in (solid.image.wrap, solid.image.coarse))

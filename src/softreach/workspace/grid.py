@@ -11,6 +11,7 @@ from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Mask
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
+from softreach.workspace.discontinuities import corner_values
 
 __all__ = [
     "corners_of",
@@ -163,15 +164,8 @@ def least_in_cells(values: Array, curved: Array) -> Array:
         values: At the vertices, shape (n + 1, n + 1, n + 1).
         curved: Second differences there, of the same shape.
     """
-    return _of_corners(np.minimum, values) - _MARGIN / 8.0 * _of_corners(np.maximum, curved)
-
-
-def _of_corners(choose: np.ufunc, values: Array) -> Array:
-    """One of the values at the eight corners of each cell, (n + 1)³ to n³."""
-    for axis in range(3):
-        values = np.moveaxis(values, axis, 0)
-        values = np.moveaxis(choose(values[1:], values[:-1]), 0, axis)
-    return values
+    largest = corner_values(curved).max(axis=-1)
+    return corner_values(values).min(axis=-1) - _MARGIN / 8.0 * largest
 
 
 def image_measure(rod: TipMap, nodes: int) -> float:

@@ -195,8 +195,12 @@ class Image:
         near = np.flatnonzero((before > 0) != (counts[i, j, crossing.center] > 0))
         near = near[np.lexsort((crossing.height[near], crossing.center[near], j[near], i[near]))]
         i, j, k = i[near], j[near], crossing.center[near] - 1
-        after = before[near] + _running_sums(crossing.cover[near], _starts(i, j, k))
-        flips = (after > 0) != (after - crossing.cover[near] > 0)
+        cover = crossing.cover[near]
+        total, of_edge = np.cumsum(cover), np.stack([i, j, k])  # sums begin anew at every edge
+        starts = np.flatnonzero((np.diff(of_edge, prepend=-1) != 0).any(axis=0))
+        earlier = np.repeat((total - cover)[starts], np.diff(starts, append=len(cover)))
+        after = before[near] + total - earlier
+        flips = (after > 0) != (after - cover > 0)
         index = [i[flips], j[flips]]
         index.insert(axis, k[flips])
         return (index[0], index[1], index[2]), crossing.height[near][flips] - k[flips]
@@ -224,19 +228,6 @@ def _twice_area(a: Array, b: Array) -> Array:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-def _starts(*keys: Index) -> Mask:
-    """Mask of the places where a sorted list of keys changes."""
-    return np.any([np.diff(key, prepend=-1) != 0 for key in keys], axis=0)
-
-
-def _running_sums(values: Index, starts: Mask) -> Index:
-    """Cumulative sums that begin anew at every start."""
-    total = np.cumsum(values)
-    at = np.flatnonzero(starts)
-    offset = (total - values)[at]
-    return total - np.repeat(offset, np.diff(at, append=len(values)))
-
-
 def image_of(
     points: Array,
     stretches: Array,
@@ -259,7 +250,10 @@ def image_of(
     """
     scaled = lattice.coordinates(points)
     gaps = np.zeros(cells, bool) if left_out is None else left_out
-    unit = _unit(scaled, gaps)
+    grid = scaled.reshape(*(n + 1 for n in cells), 3)
+    longest = max(float(np.sum([_longest_edge(grid, gaps, axis) for axis in range(3)])), 1.0)
+    # Determinants of the kernels are then exact, as rounding adds no more than 1 unit.
+    unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
     vertices = np.rint(scaled * unit)
     vertices[np.isnan(vertices)] = 0.0
     return Image(
@@ -268,14 +262,6 @@ def image_of(
         vertices=vertices,
         triangles=_critical_triangles(vertices, stretches, gaps, progress),
     )
-
-
-def _unit(scaled: Array, left_out: Mask) -> float:
-    """The largest power of two for which the kernels' determinants are exact."""
-    grid = scaled.reshape(*(n + 1 for n in left_out.shape), 3)
-    steps = [_longest_edge(grid, left_out, axis) for axis in range(3)]
-    longest = max(float(np.sum(steps)), 1.0)  # rounding adds at most 1 unit, hence the -1 below
-    return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
 
 
 def _longest_edge(grid: Array, left_out: Mask, axis: int) -> float:

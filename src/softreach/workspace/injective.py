@@ -8,6 +8,7 @@ cells, from samples with a margin for what may lie between them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +58,8 @@ def is_injective(rod: TipMap) -> bool:
             return False
         if cells == _RECOVERED and recovers(tips, slopes):
             return True
-        if cells == _CELLS[0] or not _keeps_sign(stretch):
+        least = least_in_cells(np.abs(stretch), second_differences(stretch))
+        if cells == _CELLS[0] or not least.min() > 0.0:  # det J may have a zero within a cell
             continue
         meet = faces_meet(rod, slopes)
         if meet is not None:
@@ -81,6 +83,12 @@ def solid_by_flux(
     flux, faces = signed_volume(rod), MappedFaces(rod, cells)
     progress(6 * cells**2 + 2)
     volume = abs(flux.value)
+
+    def image() -> Image:
+        tips, lattice = grid_tips(rod, cells), lattice_for(faces.tips)
+        stretches = grid_stretches(rod, tips, cells, np.zeros((cells,) * 3, bool))
+        return image_of(tips, stretches, (cells, cells, cells), lattice)
+
     return ReachableSolid(
         tip_map=rod,
         cells=cells,
@@ -92,25 +100,25 @@ def solid_by_flux(
         fold_volume_error=0.0,
         route="flux",
         measure_hull=faces.convex_volume,
-        rasterize=lambda: _rasterized(rod, cells, lattice_for(faces.tips)),
+        rasterize=image,
     )
 
 
+@dataclass(frozen=True, eq=False)
 class MappedFaces:
     """Vertices of a grid of n³ cells on the faces of the box, mapped when they are first needed."""
 
-    def __init__(self, rod: TipMap, cells: int) -> None:
-        """Nothing is mapped yet."""
-        self._rod, self._cells = rod, cells
+    rod: TipMap
+    cells: int
 
     @lazy
     def tips(self) -> Array:
         """Their tips [m], shape (6 n² + 2, 3)."""
-        return self._rod.tips(self._rod.box.from_free_cube(grid_faces(self._cells)))
+        return self.rod.tips(self.rod.box.from_free_cube(grid_faces(self.cells)))
 
     def convex_volume(self) -> Estimate:
         """Volume of the convex hull [m³]."""
-        even = (np.rint(grid_faces(self._cells) * self._cells) % 2 == 0).all(axis=1)
+        even = (np.rint(grid_faces(self.cells) * self.cells) % 2 == 0).all(axis=1)
         return extrapolated_hull(self.tips, self.tips[even])
 
 
@@ -137,7 +145,9 @@ def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
         patches = _patches(rod, which, side)
         left = ~_parted(patches, a, b, bend)
         first, second, a, b = first[left], second[left], a[left], b[left]
-        regular, hopeless = windows.hold(*_hull(patches, a, b))
+        low, high = patches.center - patches.half, patches.center + patches.half
+        both = np.minimum(low[a], low[b]), np.maximum(high[a], high[b])
+        regular, hopeless = windows.hold(*both)
         if hopeless.any():
             return None
         first, second = _halved(first[~regular], second[~regular], side)
@@ -297,7 +307,8 @@ def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     radius = np.linalg.norm(sides, axis=1).sum(axis=1) + bulge
     between = patches.tips[b] - patches.tips[a]
     mask = _lengths(between) > radius[a] + radius[b]
-    normal = _normals(patches)
+    rows, axis = np.arange(len(patches.half)), np.argmin(patches.half, axis=1)
+    normal = cross_products(*(patches.slopes[rows, :, (axis + k) % 3] for k in (1, 2)))
     # Along its own plane a patch reaches no farther than by its bend.
     for direction, of, tilted in ((between, None, (a, b)), (normal, a, (b,)), (normal, b, (a,))):
         left = np.flatnonzero(~mask)
@@ -321,18 +332,6 @@ def _lengths(vectors: Array) -> Array:
     return np.sqrt(_products(vectors, vectors))
 
 
-def _normals(patches: _Patches) -> Array:
-    rows, axis = np.arange(len(patches.half)), np.argmin(patches.half, axis=1)
-    first, second = (patches.slopes[rows, :, (axis + k) % 3] for k in (1, 2))
-    return cross_products(first, second)
-
-
-def _hull(patches: _Patches, a: Index, b: Index) -> tuple[Array, Array]:
-    """Lowest and highest corner of the boxes that hold both patches, shape (pairs, 3) each."""
-    low, high = patches.center - patches.half, patches.center + patches.half
-    return np.minimum(low[a], low[b]), np.maximum(high[a], high[b])
-
-
 def _halved(first: Index, second: Index, side: int) -> tuple[Index, Index]:
     """All pairs of the quarters of two patches, each once."""
     a, b = (_quarters(each, side) for each in (first, second))
@@ -346,15 +345,3 @@ def _quarters(which: Index, side: int) -> Index:
     rows = 2 * row[:, None] + np.array([0, 0, 1, 1])
     columns = 2 * column[:, None] + np.array([0, 1, 0, 1])
     return (face[:, None] * 2 * side + rows) * 2 * side + columns
-
-
-def _keeps_sign(stretch: Array) -> bool:
-    """True if det J has no zero within the cells either, shape (n + 1, n + 1, n + 1)."""
-    return bool(least_in_cells(np.abs(stretch), second_differences(stretch)).min() > 0.0)
-
-
-def _rasterized(rod: TipMap, cells: int, lattice: Lattice) -> Image:
-    """The image of the activation grid."""
-    tips = grid_tips(rod, cells)
-    stretches = grid_stretches(rod, tips, cells, np.zeros((cells,) * 3, bool))
-    return image_of(tips, stretches, (cells, cells, cells), lattice)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,6 @@ from softreach.workspace.crossings import Crossings
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.image import Image, Spans, covered_cubes
 
-T = TypeVar("T")
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
 SURE_ACCURACY = 3e-3  # down from which integrals are as exact as a raster can ever use
 FLUX_PART = 0.01  # of a larger accuracy: relative error of what flows through the faces
@@ -105,7 +104,12 @@ def multiply_covered(
     Returns:
         The volumes, and by how much their sum changes on half as fine a grid.
     """
-    covers = _of_each(_by_cover, fine, coarse, common)
+
+    def by_cover(spans: Spans) -> ArrayLike:
+        return np.bincount(spans.cover, spans.length)
+
+    images = (fine, fine if common is None else common, coarse)
+    covers = [_mean(image, by_cover) for image in images]
     size = max(*(len(cover) for cover in covers), 3)
     volumes, same, rough = (np.pad(v, (0, size - len(v)))[2:] for v in covers)
     error = float(abs(same.sum() - rough.sum()))
@@ -119,28 +123,15 @@ def multiply_covered(
     return dict(sorted(measures.items())), error
 
 
-def _by_cover(image: Image) -> Array:
-    """Volume that 0, 1, 2, ... activations reach, between the first and last crossings [m³]."""
-    return _mean(image, lambda spans: np.bincount(spans.cover, spans.length))
-
-
 def fold_volume(fine: Image, coarse: Image, common: Image | None = None) -> Estimate:
     """Volume reached with both orientations [m³], and its change by half as fine a grid."""
-    value, same, rough = _of_each(_folded, fine, coarse, common)
+
+    def folded(spans: Spans) -> float:
+        return spans.length[spans.cover > np.abs(spans.degree)].sum()
+
+    images = (fine, fine if common is None else common, coarse)
+    value, same, rough = (float(_mean(image, folded)) for image in images)
     return Estimate(value, abs(same - rough))
-
-
-def _folded(image: Image) -> float:
-    behind = _mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum())
-    return float(behind)
-
-
-def _of_each(
-    measure: Callable[[Image], T], fine: Image, coarse: Image, common: Image | None
-) -> tuple[T, T, T]:
-    """A measure of the fine image, of what it has in common with the coarse one, and of this."""
-    value = measure(fine)
-    return value, value if common is None else measure(common), measure(coarse)
 
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
@@ -153,8 +144,7 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    value, rough = (Estimate(_hull_volume(places), 0.0) for places in (points, fewer))
-    return extrapolated(value, rough)
+    return extrapolated(*(Estimate(_hull_volume(places), 0.0) for places in (points, fewer)))
 
 
 def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:

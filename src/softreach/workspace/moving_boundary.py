@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -96,9 +95,8 @@ class MovingBoundary:
 
     def mean_lost(self, deviations: Array) -> float:
         """Its mean over independent normal changes of these deviations: ∮ σ_n dA / √(2π) [m³]."""
-        return float(np.linalg.norm(self.swept * deviations, axis=1).sum()) / math.sqrt(
-            2.0 * math.pi
-        )
+        across = np.linalg.norm(self.swept * deviations, axis=1).sum()
+        return float(across / np.sqrt(2.0 * np.pi))
 
     @property
     def growth(self) -> Array:

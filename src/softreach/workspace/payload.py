@@ -83,8 +83,6 @@ class LargestPayload(NamedTuple):
 
 
 class _Volume(NamedTuple):
-    """Of a reachable set."""
-
     value: float
     error: float
     lost_share: float
@@ -177,7 +175,6 @@ class PayloadCurve:
         return "\n".join([f"PayloadCurve: {first} without payload", *rows])
 
     def _at(self, mass: float) -> _Volume:
-        """The volume under a payload, known or computed now."""
         rows = zip(self.payloads, self.volumes, self.volume_errors, self.lost_shares, strict=True)
         for payload, *volume in rows:
             if payload == mass:
@@ -213,25 +210,19 @@ def _narrowed(
     Secants between the ends, moved past the root by a fraction of the accuracy so that both ends
     come near to it, and halves where the bracket shrinks too slowly.
     """
-    at_low, at_high = function(low), function(high)
+    at_low, at_high, halve = function(low), function(high), False
     while high - low > accuracy * high:
         root = low + (high - low) * at_low / (at_low - at_high)
         nearer_low = root - low < high - root
         mass = root + (0.4 if nearer_low else -0.4) * accuracy * high
-        if not low < mass < high:
+        if halve or not low < mass < high:
             mass = 0.5 * (low + high)
         wide, value = high - low, function(mass)
         if value < 0:
             high, at_high = mass, value
         else:
             low, at_low = mass, value
-        if high - low > 0.5 * wide and high - low > accuracy * high:
-            mass = 0.5 * (low + high)
-            value = function(mass)
-            if value < 0:
-                high, at_high = mass, value
-            else:
-                low, at_low = mass, value
+        halve = not halve and high - low > 0.5 * wide
     return low, high
 
 

@@ -14,20 +14,26 @@ from softreach.geometry.surface import Surface, compact_surface
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import PlacedRod, stable_tips
 from softreach.sampling import cube_blocks
-from softreach.support.arrays import Array, Index, as_points
+from softreach.support.arrays import Array, as_points
 from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number
+from softreach.workspace.abstract_set import Number, with_error
 from softreach.workspace.convex import HullCorners, climbed_hull
 from softreach.workspace.flux import box_slopes
-from softreach.workspace.grid import cube_grid, image_measure
+from softreach.workspace.grid import cube_grid
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate
-from softreach.workspace.redundant import CLIMBERS, cloud_on_faces, flooded, lost_share
+from softreach.workspace.redundant import (
+    CLIMBERS,
+    cloud_on_faces,
+    flooded,
+    lost_share,
+    shifted_lattice,
+)
 from softreach.workspace.search import ENOUGH, Flood
-from softreach.workspace.thin import ReachableSurface
+from softreach.workspace.thin import ReachableSurface, by_nodes, threads
 from softreach.workspace.wrap import DISTANCE, drawn_tight
 
 __all__ = ["ReachableRegion", "planar_set", "plane_of_tips"]
@@ -38,8 +44,6 @@ _RULE = 2.5  # cells along the mean side, times the root of the accuracy
 _FEWEST = 24.0
 _MOST = 1024.0  # cells along the longer side
 _FINER = 1.5
-_SHIFT = np.array([0.31, 0.17, 0.0])  # of a cell, so that no tips lie on lines of the lattice
-_NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
 _SIGNS = 16  # cells of the grid that tells whether two bundles fold
 
 
@@ -54,19 +58,6 @@ class ReachableRegion(ReachableSurface):
     outline: tuple[Array, ...] = field(repr=False)
     """Closed curves of tips around the region and its holes [m], shape (n, 3) each."""
 
-    @property
-    def unreachability(self) -> float:
-        """The part of the convex hull that is out of reach, 1 - A / A_convex [-]; NaN for 0/0."""
-        return 1.0 - self.area / self.convex_area if self.convex_area > 0 else np.nan
-
-    @property
-    def unreachability_error(self) -> float:
-        """Error of `unreachability` by those of both areas [-]; NaN for 0/0."""
-        if not self.convex_area > 0:
-            return np.nan
-        share = self.area / self.convex_area
-        return (self.area_error + share * self.convex_area_error) / self.convex_area
-
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the region [m], never negative."""
         return np.minimum(
@@ -76,14 +67,11 @@ class ReachableRegion(ReachableSurface):
     @lazy
     def _curves(self) -> Surface:
         """The outline as triangles that repeat a corner: parts of it may enclose nothing."""
-        starts = np.cumsum([0, *(len(curve) for curve in self.outline)])[:-1]
-        pieces = [
-            start + np.arange(len(curve) - 1)
-            for start, curve in zip(starts, self.outline, strict=True)
-        ]
-        first = np.concatenate(pieces)
-        faces = np.stack([first, first + 1, first + 1], axis=1)
-        return Surface(vertices=np.concatenate(self.outline), faces=faces)
+        ends = np.cumsum([len(curve) for curve in self.outline])
+        return threads(np.concatenate(self.outline), np.delete(np.arange(ends[-1]), ends - 1))
+
+    def _sizes(self) -> tuple[float, float, float, float]:
+        return self.area, self.area_error, self.convex_area, self.convex_area_error
 
     def _lines(self) -> list[str]:
         convex = quantity(self.convex_area, "m²", self.convex_area_error)
@@ -94,13 +82,8 @@ class ReachableRegion(ReachableSurface):
         ]
 
     def _numbers(self) -> dict[str, Number]:
-        return {
-            **super()._numbers(),
-            "convex_area": Number(self.convex_area, "m2", "convex hull's area"),
-            "convex_area_error": Number(
-                self.convex_area_error, "m2", "error of the convex hull's area"
-            ),
-        }
+        convex = self.convex_area, self.convex_area_error
+        return super()._numbers() | with_error("convex_area", *convex, "m2", "convex hull's area")
 
 
 @dataclass(frozen=True, repr=False)
@@ -202,10 +185,8 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
 
 def _lattice(tips: Array, cell: float) -> Lattice:
     """Five layers of cells, the third in the plane."""
-    lattice = Lattice.around(tips * [1.0, 1.0, 0.0], cell)
-    origin = lattice.origin + cell * _SHIFT
-    origin[2] = -2.0 * cell
-    return Lattice(origin, cell, (*lattice.shape[:2], 5))
+    lattice = shifted_lattice(tips, cell)
+    return Lattice(np.array([*lattice.origin[:2], -2.0 * cell]), cell, (*lattice.shape[:2], 5))
 
 
 @dataclass(frozen=True)
@@ -220,7 +201,8 @@ class _Outline:
 
     @property
     def area(self) -> float:
-        return sum(enclosed_area(each, _edges(each)) for each in self.curves)
+        rows = (np.arange(len(each) - 1)[:, None] + [0, 1] for each in self.curves)
+        return sum(map(enclosed_area, self.curves, rows))
 
     @property
     def length(self) -> float:
@@ -229,22 +211,14 @@ class _Outline:
         )
 
 
-def _edges(curve: Array) -> Index:
-    row = np.arange(len(curve) - 1)
-    return np.stack([row, row + 1], axis=1)
-
-
 def _outline(flood: Flood) -> _Outline:
     try:
         from skimage.measure import find_contours
     except ImportError as error:
         raise MissingExtra(("scikit-image", "surface")) from error
-    curves, gamma = list[Array](), list[Array]()
-    for at in find_contours(flood.distances[:, :, 2], DISTANCE, positive_orientation="low"):
-        layer = np.full(len(at), 2.0)
-        drawn = drawn_tight(flood, np.column_stack([at, layer]))
-        curves.append(drawn.tips)
-        gamma.append(drawn.gamma)
+    places = find_contours(flood.distances[:, :, 2], DISTANCE, positive_orientation="low")
+    drawn = [drawn_tight(flood, np.insert(at, 2, 2.0, axis=1)) for at in places]
+    curves, gamma = [each.tips for each in drawn], [each.gamma for each in drawn]
     return _Outline(curves, gamma, flood.centers(np.flatnonzero(flood.gap == 0.0)))
 
 
@@ -254,9 +228,9 @@ def _smooth(rod: TipMap, flat: TipMap, area: Estimate) -> Estimate:
         return area
     grid = cube_grid(_SIGNS)[:, :2]
     sign = np.linalg.det(box_slopes(flat, grid)[1][:, :2])
-    fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
-    folds = sign.min() * sign.max() <= 0.0 or abs(fine - area.value) > area.error
-    return area if folds else Estimate(fine, abs(fine - rough))
+    smooth = by_nodes(rod)
+    folds = sign.min() * sign.max() <= 0.0 or abs(smooth.value - area.value) > area.error
+    return area if folds else smooth
 
 
 def _mesh(outline: _Outline, plane: Plane) -> Surface:

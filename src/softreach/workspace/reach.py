@@ -11,10 +11,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import effective, tip_map
 from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
-from softreach.support.arguments import (
-    POSITIVE,
-    as_number,
-)
+from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.memory import free_memory
@@ -115,7 +112,10 @@ def reachable_set(
         result = _of_many(rod, accuracy, cell, memory, progress)
         finer = "a smaller cell" if cell is not None else "more memory"
     if result.volume_error > accuracy * result.volume:
-        warn(_inaccurate(result, accuracy, finer))
+        warn(
+            f"volume {result.volume:.5g} m³ may be off by {result.volume_error:.2g} m³, more than "
+            f"{accuracy:g} of it; pass {finer}"
+        )
     return result
 
 
@@ -134,10 +134,17 @@ def rasterized_set(
         cell: Edge of a cell in space [m]; by the accuracy if None.
         accuracy: Relative error of the volume that the cell is chosen for.
         progress: Called with the number of grid vertices done since its last call.
+
+    Raises:
+        InvalidInput: All cells of the grid are left out, or memory does not hold those in space.
     """
     tips = grid_tips(rod, cells, progress)
     left_out = left_out_cells(rod, tips, cells)
-    lattice = lattice_for(_reached(tips, left_out), cell=cell, accuracy=accuracy)
+    used = corners_of(~left_out).ravel()
+    if not used.any():
+        fault = f"no cell of an activation grid of {cells}³ has a stable, untorn image"
+        raise loads_too_heavy(fault)
+    lattice = lattice_for(tips[used], cell=cell, accuracy=accuracy)
     stretches = grid_stretches(rod, tips, cells, left_out)
     grid = _Grid(tips, stretches, left_out)
     fine, coarse = grid.image(lattice, progress), grid.every_second().image(lattice)
@@ -191,25 +198,18 @@ def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
     return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
 
 
-def is_settled(solid: ReachableSolid, accuracy: float) -> bool:
-    """True if a finer grid would hardly change the volume or how much of it is reached twice."""
-    return solid.volume_error <= accuracy * solid.volume
-
-
 def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
-    """True if grids that memory holds may be fine enough.
+    """True if the volume errs by more than asked, and grids that memory holds may be fine enough.
 
     Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
     """
+    if solid.volume_error <= accuracy * solid.volume:
+        return False
     cells = 2 * solid.cells
     while solid.lost_share > 0.0 and solid.volume_error > accuracy * solid.volume * (
         cells / solid.cells
     ):
         cells *= 2
-    return _fits(cells)
-
-
-def _fits(cells: int) -> bool:
     return (cells + 1) ** 3 <= _MOST_VERTICES
 
 
@@ -223,7 +223,7 @@ def _of_three(
             lattice(MappedFaces(rod, cells).tips)
         return solid_by_flux(rod, cells, lattice, progress)
     solid = rasterized_set(rod, cells, cell, accuracy, progress)
-    while not is_settled(solid, accuracy) and is_worthwhile(solid, accuracy):
+    while is_worthwhile(solid, accuracy):
         solid = rasterized_set(rod, 2 * solid.cells, cell, accuracy, progress)
     return solid
 
@@ -326,24 +326,4 @@ def _overlaps(
         {1: volume.value - sum(several.values()), **several},
         volume.error + change,
         *measure.fold_volume(fine, coarse, common),
-    )
-
-
-def _reached(tips: Array, left_out: Mask) -> Array:
-    """Tips of the corners of cells that are not left out [m], shape (n, 3).
-
-    Raises:
-        InvalidInput: All are.
-    """
-    used = corners_of(~left_out).ravel()
-    if not used.any():
-        fault = f"no cell of an activation grid of {len(left_out)}³ has a stable, untorn image"
-        raise loads_too_heavy(fault)
-    return tips[used]
-
-
-def _inaccurate(solid: ReachableSolid, accuracy: float, finer: str) -> str:
-    return (
-        f"volume {solid.volume:.5g} m³ may be off by {solid.volume_error:.2g} m³, more than "
-        f"{accuracy:g} of it; pass {finer}"
     )

@@ -24,7 +24,7 @@ from softreach.workspace.convex import ConvexHull, climbed_hull
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
-from softreach.workspace.wrap import DISTANCE, Wrap, fits, spread, wrapped
+from softreach.workspace.wrap import DISTANCE, Wrap, spread, wrapped
 
 __all__ = [
     "Searched",
@@ -32,6 +32,7 @@ __all__ = [
     "flooded",
     "lost_share",
     "searched_set",
+    "shifted_lattice",
     "smallest_memory",
 ]
 
@@ -42,7 +43,7 @@ _CLOUDS = 8  # at most
 _RULE = 2.5  # cells along the mean side of the bounding box, times the root of the accuracy
 _FEWEST = 16.0
 _FINER = 1.5
-_SHIFT = (0.31, 0.17, 0.43)  # of a cell: lines on a plane of symmetry would all err alike
+_SHIFT = np.array([0.31, 0.17, 0.43])  # of a cell: lines on a plane of symmetry would all err alike
 _MOST_ALONG = 96.0
 _THINNEST = 128.0  # cells along the mean side: below are no sheets
 _MOST_CELLS = 2.0**26
@@ -86,7 +87,7 @@ def searched_set(
     edge = float(max(target, smallest, sides.max() / 1024.0)) if cell is None else cell
 
     def of_cells(edge: float) -> Flood:
-        return flooded(Flood(rod, _lattice(tips, edge), progress), *cloud)
+        return flooded(Flood(rod, shifted_lattice(tips, edge), progress), *cloud)
 
     coarse = wrapped(of_cells(_FINER * edge))
     begin = rod.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))[:, rod.box.free]
@@ -125,15 +126,15 @@ def cells_of(rod: TipMap, cell: float) -> ReachedCells:
     """
     cloud = cloud_on_faces(rod, 0)
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
-    flood = flooded(Flood(rod, _lattice(cloud[1], edge)), *cloud)
+    flood = flooded(Flood(rod, shifted_lattice(cloud[1], edge)), *cloud)
     wrap = wrapped(flood)
     return ReachedCells(flood, cloud, wrap, wrap, None)
 
 
-def _lattice(tips: Array, cell: float) -> Lattice:
-    """A lattice around tips that shares no plane of symmetry with them."""
+def shifted_lattice(tips: Array, cell: float) -> Lattice:
+    """A lattice around tips [m], shape (n, 3), that shares no plane of symmetry with them."""
     lattice = Lattice.around(tips, cell)
-    return lattice._replace(origin=lattice.origin + cell * np.array(_SHIFT))
+    return lattice._replace(origin=lattice.origin + cell * _SHIFT)
 
 
 def smallest_memory(rod: TipMap) -> float:
@@ -191,14 +192,14 @@ def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
     """
     flood.add(gamma, tips)
     for number in range(1, _CLOUDS):
-        while not flood.is_bounded:
+        while not flood.fits():
             flood = _wider(flood)
         before = np.count_nonzero(flood.gap == 0.0)
         flood.add(*cloud_on_faces(flood.rod, number))
-        if flood.is_bounded and np.count_nonzero(flood.gap == 0.0) == before:
+        if flood.fits() and np.count_nonzero(flood.gap == 0.0) == before:
             break
     spread(flood)
-    while not fits(flood):
+    while not flood.fits(DISTANCE):
         flood = _wider(flood)
         spread(flood)
     return flood
@@ -207,7 +208,7 @@ def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
 def _wider(flood: Flood) -> Flood:
     """The same on a lattice with room around what is reached."""
     lattice = flood.lattice
-    known = np.flatnonzero((flood.gap >= 0.0) & (flood.gap < DISTANCE))
+    known = np.flatnonzero(flood.near(DISTANCE))
     room = np.full(3, 4 + max(lattice.shape) // 8)
     room[2] *= not flood.is_flat
     nx, ny, nz = np.array(lattice.shape) + 2 * room

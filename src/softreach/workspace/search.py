@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -31,7 +30,8 @@ ENOUGH = 1e-3
 
 _CHUNK = 1 << 16  # places searched for at a time
 _FAR = 3.0  # cells, from which on distances are not told apart
-_CLEARLY = 0.02  # cells by which a tip must be closer to start another search
+CLEARLY = 0.02
+"""Cells by which a tip must be closer to start another search."""
 
 
 class Stop(NamedTuple):
@@ -86,11 +86,14 @@ class Flood:
         known = np.where(self.gap < 0.0, _FAR, self.gap)
         return np.minimum(known, _FAR).reshape(self.lattice.shape)
 
-    @property
-    def is_bounded(self) -> bool:
-        """True if all that is reached ends within the lattice."""
-        inside = self.reached[2:-2, 2:-2, 2:-2]
-        return int(np.count_nonzero(inside)) == int(np.count_nonzero(self.gap == 0.0))
+    def near(self, within: float = ENOUGH) -> Mask:
+        """Mask of centers with a tip nearer than so many cells, shape (cells,): reached ones."""
+        return (self.gap >= 0.0) & (self.gap < within)
+
+    def fits(self, within: float = ENOUGH) -> bool:
+        """True if these end within the lattice."""
+        near = self.near(within).reshape(self.lattice.shape)
+        return bool(np.count_nonzero(near) == np.count_nonzero(near[2:-2, 2:-2, 2:-2]))
 
     def centers(self, cells: Index) -> Array:
         """Places [m] of cells given by flat index, shape (n, 3)."""
@@ -99,38 +102,24 @@ class Flood:
 
     def add(self, gamma: Array, tips: Array) -> None:
         """Search around tips that come closer to a center than all before."""
-        cells, starts = self._improved(gamma, tips)
-        self.search(cells, starts)
-        self.grow(cells[self.gap[cells] == 0.0])
-
-    def _improved(self, gamma: Array, tips: Array) -> tuple[Index, Array]:
-        """Centers around tips that one of them is clearly closer to than `gap`, and which."""
         at = self.lattice.coordinates(tips)
         within = ((at >= 0) & (at < np.array(self.lattice.shape) - 1)).all(axis=1)
-        owner, closest = np.full(len(self.gap), -1), self.gap - _CLEARLY
+        owner, closest = np.full(len(self.gap), -1), self.gap - CLEARLY
         claim_corners(at[within], np.flatnonzero(within), self.steps, closest, owner)
         cells = np.flatnonzero(owner >= 0)
-        return cells, gamma[owner[cells]]
+        self.search(cells, gamma[owner[cells]])
+        self.grow(cells[self.gap[cells] == 0.0])
 
     def grow(self, cells: Index) -> None:
         """Search the neighbors of reached cells from there, and theirs, until none is new."""
         while len(cells):
             fresh = []
-            for neighbors, sources in self._frontier(cells):
-                known = self.gap[neighbors] > 0
-                neighbors, sources = neighbors[known], sources[known]
+            for step in (*self.steps, *-self.steps):
+                sources = cells[self.gap[cells + step] > 0]
+                neighbors = sources + step
                 self.search(neighbors, self.gamma[sources])
                 fresh.append(neighbors[self.gap[neighbors] == 0.0])
-            cells = np.unique(np.concatenate(fresh)) if fresh else cells[:0]
-
-    def _frontier(self, cells: Index) -> Iterator[tuple[Index, Index]]:
-        """Neighbors of cells that are not reached, and the cell each is a neighbor of."""
-        for step in (*self.steps, *-self.steps):
-            neighbors = cells + step
-            open_ = np.flatnonzero(self.gap[neighbors] > 0)
-            for first in range(0, len(open_), _CHUNK):
-                part = open_[first : first + _CHUNK]
-                yield neighbors[part], cells[part]
+            cells = np.unique(np.concatenate(fresh))
 
     def search(self, cells: Index, starts: Array) -> None:
         """Search for centers, and keep what comes closer."""
@@ -192,7 +181,11 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
     total, box = len(targets), rod.box
     bounds = box.low, box.high, box.scales
-    running, center = _room(min(total, _TOGETHER), box.bundles)
+    size, m = min(total, _TOGETHER), box.bundles
+    shapes = (), (), (3, m), (3,), (), (m,), (m,), (m,)
+    numbers = (np.zeros((size, *shape)) for shape in shapes)
+    running = Running(np.zeros(size, np.int64), np.zeros(size, np.int64), *numbers)
+    center = np.zeros((size, m))
     tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
     step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
     torn, begun, n = rod.supports_unstable, 0, 0
@@ -213,11 +206,3 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
         next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
     nowhere = nearest.distance >= NOWHERE
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
-
-
-def _room(count: int, m: int) -> tuple[Running, Array]:
-    """Place for as many searches side by side, and where their steps are centered."""
-    integers = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    numbers = [np.zeros(shape) for shape in ((count,), (count,), (count, 3, m), (count, 3))]
-    others = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
-    return Running(*integers, *numbers, *others), np.zeros((count, m))

@@ -10,19 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from softreach.geometry.surface import Surface, compact_surface
+from softreach.geometry.surface import Surface, compact_surface, level_set
 from softreach.picture.shading import vertex_normals
 from softreach.rod.driven import DrivenRod
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Faces, Mask
-from softreach.support.errors import MissingExtra
 from softreach.workspace.flux import box_slopes, face_triangles, grid_faces
 from softreach.workspace.grid import cube_grid
 from softreach.workspace.image import Image
@@ -159,7 +159,7 @@ def _parted_faces(rod: TipMap) -> tuple[Array, Faces]:
     """The faces of the box with outward triangles, each wholly of one sign of det J."""
     cube = grid_faces(_FACE_CELLS)
     faces, dets = face_triangles(cube, _FACE_CELLS), _dets(rod, cube)
-    cut = _zeros(rod, cube, dets)
+    cut = partial(_zeros, rod, cube, dets)
     positive, pairs, shares = clipped(faces, dets > 0, cut)
     negative, more, other = clipped(faces, dets <= 0, cut)
     # each part has its own copies: across the fold the surface does not go on
@@ -171,26 +171,19 @@ def _parted_faces(rod: TipMap) -> tuple[Array, Faces]:
     )
 
 
-def _zeros(rod: TipMap, cube: Array, dets: Array) -> Callable[[NDArray[np.int32]], Array]:
+def _zeros(rod: TipMap, cube: Array, dets: Array, pairs: NDArray[np.int32]) -> Array:
     """Shares of the way between vertices where det J = 0, by regula falsi (Illinois)."""
-
-    def cut(pairs: NDArray[np.int32]) -> Array:
-        low, high = np.zeros(len(pairs)), np.ones(len(pairs))
-        at_low, at_high = dets[pairs[:, 0]].copy(), dets[pairs[:, 1]].copy()
-        share = _zero(at_low, at_high)
-        for _ in range(_SECANTS):
-            value = _dets(rod, _between(cube[pairs], share))
-            beyond = np.sign(value) == np.sign(at_high)
-            high, at_high, at_low = (
-                np.where(beyond, share, high),
-                np.where(beyond, value, at_high / 2),
-                np.where(beyond, at_low / 2, value),
-            )
-            low = np.where(beyond, low, share)
-            share = low + (high - low) * _zero(at_low, at_high)
-        return share
-
-    return cut
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    at_low, at_high = dets[pairs].T
+    share = _zero(at_low, at_high)
+    for _ in range(_SECANTS):
+        value = _dets(rod, _between(cube[pairs], share))
+        beyond = np.sign(value) == np.sign(at_high)
+        low, high = np.where(beyond, low, share), np.where(beyond, share, high)
+        at_low = np.where(beyond, at_low / 2, value)
+        at_high = np.where(beyond, value, at_high / 2)
+        share = low + (high - low) * _zero(at_low, at_high)
+    return share
 
 
 def _zero(at_low: Array, at_high: Array) -> Array:
@@ -201,24 +194,20 @@ def _zero(at_low: Array, at_high: Array) -> Array:
 
 def _fold(rod: TipMap) -> tuple[Array, Faces]:
     """The places where det J = 0, with triangles whose images look away from what is folded."""
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as error:
-        raise MissingExtra(("scikit-image", "surface")) from error
     n = _FOLD_CELLS
     dets = _dets(rod, cube_grid(n))
     if dets.min() >= 0 or dets.max() <= 0:
         return np.empty((0, 3)), np.empty((0, 3), np.int32)
     field = dets.reshape((n + 1,) * 3)
-    places, faces, _, _ = marching_cubes(field, 0.0, allow_degenerate=False)
+    places, faces = level_set(field, 0.0)
     ends = np.stack([np.floor(places), np.ceil(places)], axis=1).astype(int)
     numbers = np.stack(
         [np.ravel_multi_index(tuple(end.T), field.shape) for end in ends.swapaxes(0, 1)], axis=1
     ).astype(np.int32)
     grid = cube_grid(n)
     moved = numbers[:, 0] != numbers[:, 1]
-    cube = places.astype(float) / n
-    cube[moved] = _between(grid[numbers[moved]], _zeros(rod, grid, dets)(numbers[moved]))
+    cube = places / n
+    cube[moved] = _between(grid[numbers[moved]], _zeros(rod, grid, dets, numbers[moved]))
     normals = _away(rod, cube)
     tips = _tips(rod, cube)
     corners = tips[faces]
@@ -240,8 +229,6 @@ def _away(rod: TipMap, cube: Array) -> Array:
 
 
 class _Beside:
-    """Tells whether what is before a sheet is out of reach."""
-
     def __init__(self, rod: TipMap, image: Image) -> None:
         self._rod, self._image = rod, image
         self._n = round(len(image.vertices) ** (1 / 3)) - 1

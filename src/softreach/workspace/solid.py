@@ -16,7 +16,7 @@ from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, ReachableSet
+from softreach.workspace.abstract_set import Number, ReachableSet, with_error
 from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
@@ -236,7 +236,6 @@ class ReachableSolid(ReachableSet):
         return out
 
     def _repr_html_(self) -> str:
-        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Dots, Skin, html_card
 
         try:
@@ -330,8 +329,7 @@ class ReachableSolid(ReachableSet):
 
     def _numbers(self) -> dict[str, Number]:
         numbers = {
-            "volume": Number(self.volume, "m3", "volume"),
-            "volume_error": Number(self.volume_error, "m3", "error of the volume"),
+            **with_error("volume", self.volume, self.volume_error, "m3", "volume"),
             **self._convex_numbers(),
         }
         for name, size, unit in (("area", 0, "m2"), ("thickness", 1, "m")):
@@ -341,10 +339,9 @@ class ReachableSolid(ReachableSet):
                 numbers[f"shell_{name}_error"] = Number(error, unit, f"error of the {name}")
         if not self.multiplicity:
             return numbers
-        fold = "volume reached with both orientations"
         again = "error of the volume reached more than once"
+        fold = self.fold_volume, self.fold_volume_error
         return numbers | {
             "multiplicity_error": Number(self.multiplicity_error, "m3", again),
-            "fold_volume": Number(self.fold_volume, "m3", fold),
-            "fold_volume_error": Number(self.fold_volume_error, "m3", f"error of the {fold}"),
+            **with_error("fold_volume", *fold, "m3", "volume reached with both orientations"),
         }

@@ -12,10 +12,10 @@ from softreach.geometry.hull import convex_hull
 from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.box.simplices import chains, corner_steps
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Mask, as_points
+from softreach.support.arrays import Array, Index, Mask, as_points
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, ReachableSet
+from softreach.workspace.abstract_set import Number, ReachableSet, with_error
 from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
 from softreach.workspace.grid import every_second, grid_ticks, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
@@ -81,7 +81,6 @@ class ReachableSurface(ReachableSet):
         return self.mapped_grid.distance(as_points("points", points))
 
     def _repr_html_(self) -> str:
-        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Skin, html_card
 
         return html_card(repr(self), Skin(self.mapped_grid.vertices, self.mapped_grid.faces))
@@ -91,8 +90,7 @@ class ReachableSurface(ReachableSet):
 
     def _numbers(self) -> dict[str, Number]:
         return {
-            "area": Number(self.area, "m2", "area"),
-            "area_error": Number(self.area_error, "m2", "error of the area"),
+            **with_error("area", self.area, self.area_error, "m2", "area"),
             **self._convex_numbers(),
         }
 
@@ -145,13 +143,9 @@ class ReachableCurve(ReachableSet):
 
     @lazy
     def _chords(self) -> Surface:
-        """The chords as triangles that repeat a corner."""
-        start = np.flatnonzero(~self.left_out)
-        faces = np.stack([start, start + 1, start + 1], axis=1)
-        return Surface(vertices=np.nan_to_num(self.path), faces=faces)
+        return threads(np.nan_to_num(self.path), np.flatnonzero(~self.left_out))
 
     def _repr_html_(self) -> str:
-        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Dots, html_card
 
         return html_card(repr(self), Dots(_found(self.path)))
@@ -161,9 +155,9 @@ class ReachableCurve(ReachableSet):
         return [f"length {length}", self._convex_text()]
 
     def _numbers(self) -> dict[str, Number]:
+        length, error = self.curve_length, self.curve_length_error
         return {
-            "curve_length": Number(self.curve_length, "m", "length"),
-            "curve_length_error": Number(self.curve_length_error, "m", "error of the length"),
+            **with_error("curve_length", length, error, "m", "length"),
             **self._convex_numbers(),
         }
 
@@ -212,21 +206,35 @@ def thin_set(rod: TipMap) -> ReachableSet:
     return _KINDS[rod.box.dimension].of(rod)
 
 
+def threads(points: Array, first: Index) -> Surface:
+    """Lines from points to those that follow them, as triangles that repeat a corner.
+
+    Args:
+        points: [m], shape (n, 3).
+        first: Numbers of the points where lines begin, shape (m,).
+    """
+    return Surface(vertices=points, faces=np.stack([first, first + 1, first + 1], axis=1))
+
+
+def by_nodes(rod: TipMap) -> Estimate:
+    """Length [m] or area [m²] of the image, and by how much fewer Gauss nodes change it."""
+    fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
+    return Estimate(fine, abs(fine - rough))
+
+
 def _grid_tips(rod: TipMap, cells: int) -> Array:
     """Tips of a grid [m], on whose lines kinks are; even where some tips may be unstable."""
     return grid_tips(rod, cells, ticks=None if rod.supports_unstable else grid_ticks(rod, cells))
 
 
 def _measure(rod: TipMap, tips: Array, left_out: Mask) -> Estimate:
-    """Length or area of the image, and by how much fewer Gauss nodes change it.
+    """Length or area of the image, by Gauss nodes where it is smooth.
 
     Where cells are left out, it is that of the others and an estimate of the rest. Where the map
     has kinks it is that of cells, which err by O(1/n) there: three times what is removed is stated.
     """
-    if rod.is_smooth and not left_out.any():
-        fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
-        if np.isfinite([fine, rough]).all():
-            return Estimate(fine, abs(fine - rough))
+    if rod.is_smooth and not left_out.any() and np.isfinite(smooth := by_nodes(rod)).all():
+        return smooth
     return _of_cells(tips, left_out, 1.0 if rod.is_smooth else 3.0)
 
 
@@ -237,12 +245,15 @@ def _of_cells(tips: Array, left_out: Mask, share: float) -> Estimate:
     too, and a share of it is part of the error. A cell that is left out may still reach as much as
     its largest neighbor, and half of it is taken.
     """
+    from scipy.ndimage import maximum_filter
+
     cells, m = len(left_out), left_out.ndim
     sizes = np.where(left_out, 0.0, _sizes(tips, cells, m))
     lost = coarser(left_out)
     rough = np.where(lost, 0.0, _sizes(every_second(tips, cells, m), cells // 2, m))
     removed = (float(sizes[~finer(lost)].sum()) - float(rough.sum())) / 3.0
-    unknown = 0.5 * float(_largest_neighbor(sizes)[left_out].sum())
+    around = maximum_filter(sizes, 3, mode="constant")  # of a cell and those that touch it
+    unknown = 0.5 * float(around[left_out].sum())
     return Estimate(float(sizes.sum()) + removed + unknown, share * abs(removed) + unknown)
 
 
@@ -257,18 +268,7 @@ def _sizes(tips: Array, cells: int, m: int) -> Array:
     return np.linalg.norm(pair, axis=-1).sum(axis=0) / 2.0
 
 
-def _largest_neighbor(sizes: Array) -> Array:
-    """The largest of a cell and those that touch it."""
-    for axis in range(sizes.ndim):
-        none = np.zeros_like(np.take(sizes, [0], axis))
-        rows = np.concatenate([none, sizes, none], axis)
-        sizes = np.moveaxis(corner_values(corner_values(rows, [axis]).max(axis=-1), [axis]), -1, 0)
-        sizes = sizes.max(axis=0)
-    return sizes
-
-
 def _found(tips: Array) -> Array:
-    """Tips of stable equilibria."""
     return tips[np.isfinite(tips[:, 0])]
 
 

@@ -7,24 +7,21 @@ sides of a sheet and its rim. Each of its vertices is drawn to the nearest tip.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from softreach.geometry.surface import Surface, corner_areas
+from softreach.geometry.surface import Surface, corner_areas, level_set
 from softreach.rod.activation_box import damped_steps
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index, Mask
-from softreach.support.errors import MissingExtra
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-from softreach.workspace.search import ENOUGH, Flood, nearest_tips
+from softreach.workspace.search import CLEARLY, ENOUGH, Flood, Nearest, nearest_tips
 
-__all__ = ["DISTANCE", "Wrap", "drawn_tight", "fits", "spread", "wrapped"]
+__all__ = ["DISTANCE", "Wrap", "drawn_tight", "spread", "wrapped"]
 
 DISTANCE = 0.75
 """Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
-_CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 _ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
 _SHEET = 2e-3  # of its width, the root of its area, that a sheet is thinner than
 _SHEET_TOL = 1e-9  # in L, as a sheet may be no thicker than tips are exact otherwise
@@ -103,8 +100,9 @@ def spread(flood: Flood) -> None:
     """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
     offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ flood.steps
     offsets = offsets[offsets != 0]
-    front = np.flatnonzero((flood.gap < DISTANCE) & (flood.gap > 0.0))
-    front = np.concatenate([front, _rim(flood, offsets)])
+    near, reached = (flood.gap < DISTANCE) & (flood.gap > 0.0), np.flatnonzero(flood.gap == 0.0)
+    rim = reached[(flood.gap[reached[:, None] + offsets] > 0.0).any(axis=1)]
+    front = np.concatenate([np.flatnonzero(near), rim])
     while len(front):
         tips = flood.rod.tips(flood.gamma[front])
         sources = np.repeat(np.arange(len(front)), len(offsets))
@@ -112,7 +110,7 @@ def spread(flood: Flood) -> None:
         sources, cells = sources[flood.gap[cells] > 0.0], cells[flood.gap[cells] > 0.0]
         away = np.linalg.norm(flood.centers(cells) - tips[sources], axis=1) / flood.lattice.cell
         order = np.lexsort((away, cells))
-        order = order[away[order] < flood.gap[cells[order]] - _CLEARLY]
+        order = order[away[order] < flood.gap[cells[order]] - CLEARLY]
         order = order[np.diff(cells[order], prepend=-1) > 0]
         cells, sources = cells[order], front[sources[order]]
         before = flood.gap[cells]
@@ -120,47 +118,23 @@ def spread(flood: Flood) -> None:
         front = cells[(flood.gap[cells] < before) & (flood.gap[cells] < DISTANCE)]
 
 
-def _rim(flood: Flood, offsets: Index) -> Index:
-    """Centers that are reached beside some that are not."""
-    reached = np.flatnonzero(flood.gap == 0.0)
-    return reached[(flood.gap[reached[:, None] + offsets] > 0.0).any(axis=1)]
-
-
-def fits(flood: Flood) -> Mask:
-    """True if the level set ends within the lattice."""
-    near = ((flood.gap >= 0.0) & (flood.gap < DISTANCE)).reshape(flood.lattice.shape)
-    return np.count_nonzero(near) == np.count_nonzero(near[2:-2, 2:-2, 2:-2])
-
-
-class Drawn(NamedTuple):
-    """Places of the level set that are drawn to the nearest tips."""
-
-    places: Array
-    """[m], shape (n, 3)."""
-    tips: Array
-    """[m], shape (n, 3)."""
-    gamma: Array
-    """Activations that lead to them, shape (n, bundles)."""
-
-
-def drawn_tight(flood: Flood, at: Array) -> Drawn:
+def drawn_tight(flood: Flood, at: Array) -> Nearest:
     """The nearest tips of places on edges of the lattice, from the tips at both ends.
 
     Args:
         flood: What was found.
         at: Coordinates of the places in cells, shape (n, 3).
     """
-    lattice = flood.lattice
+    lattice, n = flood.lattice, len(at)
     places = lattice.origin + lattice.cell * at
-    tips, distance = np.full_like(places, np.nan), np.full(len(places), np.inf)
-    gamma = np.zeros((len(places), flood.gamma.shape[1]))
+    best = Nearest(np.zeros((n, flood.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
     for end in (np.floor(at), np.ceil(at)):
         cells = end.astype(np.int64) @ flood.steps
         found = nearest_tips(flood.rod, flood.gamma[cells], places, ENOUGH * lattice.cell)
-        closer = found.distance < distance
-        tips[closer], distance[closer] = found.tips[closer], found.distance[closer]
-        gamma[closer] = found.gamma[closer]
-    return Drawn(places, tips, gamma)
+        closer = found.distance < best.distance
+        for kept, new in zip(best, found, strict=True):
+            kept[closer] = new[closer]
+    return best
 
 
 def wrapped(flood: Flood) -> Wrap:
@@ -169,17 +143,9 @@ def wrapped(flood: Flood) -> Wrap:
     Raises:
         MissingExtra: scikit-image is not installed.
     """
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as error:
-        raise MissingExtra(("scikit-image", "surface")) from error
-    at, faces, _, _ = marching_cubes(
-        flood.distances, DISTANCE, gradient_direction="descent", allow_degenerate=False
-    )
-    drawn = drawn_tight(flood, at.astype(float))
-    places, tips, gamma = drawn.places, drawn.tips, drawn.gamma
-    tight = Surface(vertices=tips, faces=faces).volume
-    cell, away = flood.lattice.cell, places - tips
+    at, faces = level_set(flood.distances, DISTANCE)
+    gamma, tips, _ = drawn_tight(flood, at)
+    cell, away = flood.lattice.cell, flood.lattice.origin + flood.lattice.cell * at - tips
     away /= np.linalg.norm(away, axis=1).clip(1e-9 * cell)[:, None]
     return Wrap(
         vertices=tips + _ASIDE * cell * away,
@@ -187,5 +153,5 @@ def wrapped(flood: Flood) -> Wrap:
         rod=flood.rod,
         cell=cell,
         gamma=gamma,
-        tight_volume=tight,
+        tight_volume=Surface(vertices=tips, faces=faces).volume,
     )
