@@ -189,12 +189,7 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
 
 
 def fitted(
-    model: MarkerModel,
-    places: Array,
-    *,
-    robust: bool,
-    noise: float | None,
-    progress: Progress,
+    model: MarkerModel, places: Array, *, robust: bool, noise: float | None, progress: Progress
 ) -> Fit:
     """The numbers at which predicted places are nearest to measured ones.
 

@@ -6,12 +6,7 @@ import io
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from softreach.calibration.report import (
-    error_cells,
-    error_head,
-    number_rows,
-    remarks,
-)
+from softreach.calibration.report import error_cells, error_head, number_rows, remarks
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
@@ -27,10 +22,7 @@ REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
 
 _DPI = 160
-_WORDS = {
-    "softreach_version": "softreach",
-    "data_sha256": "SHA-256 of the data",
-}
+_WORDS = {"softreach_version": "softreach", "data_sha256": "SHA-256 of the data"}
 
 
 def write_report(

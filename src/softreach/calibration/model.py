@@ -47,16 +47,7 @@ _BLOCK = 1024
 """Samples at once: their shapes at all nodes are kept."""
 _TOL = 1e-6
 _STEPS = 24
-_BODY = (
-    "profile",
-    "section",
-    "actuators",
-    "loads",
-    "rest",
-    "stations",
-    "rigid_pieces",
-    "markers",
-)
+_BODY = ("profile", "section", "actuators", "loads", "rest", "stations", "rigid_pieces", "markers")
 """Parts of an arm that are more than its drives and the pose of its base."""
 _ENDS = ("start", "end", "stations.")
 """In names of numbers that move ends of actuators."""

@@ -40,8 +40,7 @@ def check(
     changes: Changes = UNCHANGED,
     out: Annotated[Path | None, out_option("Draw the arm at the places (.png .pdf .svg).")] = None,
     view: Annotated[
-        str | None,
-        Parameter(group=OUTPUT, help="oblique (if left out), front, side or top."),
+        str | None, Parameter(group=OUTPUT, help="oblique (if left out), front, side or top.")
     ] = None,
     overwrite: Overwrite = False,
     unit: Unit = None,

@@ -74,8 +74,7 @@ def search(
         Parameter(group=_ASKED, help="Relative error of volumes: 3e-3 if left out everywhere."),
     ] = None,
     sampler: Annotated[
-        str | None,
-        Parameter(group=_ASKED, help="auto, cma, tpe, nsga2, nsga3, sobol or random."),
+        str | None, Parameter(group=_ASKED, help="auto, cma, tpe, nsga2, nsga3, sobol or random.")
     ] = None,
     polish: Annotated[
         bool | None,

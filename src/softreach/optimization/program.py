@@ -225,12 +225,7 @@ class Point:
                 yield self._limit(name, 1.0, value, most, partial(self.design.arm_slope, name))
 
     def _limit(
-        self,
-        name: str,
-        sense: float,
-        value: float,
-        limit: float,
-        derived: Callable[[], Array],
+        self, name: str, sense: float, value: float, limit: float, derived: Callable[[], Array]
     ) -> Part:
         """Room below a limit (sense 1) or above it (-1), relative."""
         scale = abs(limit) or 1.0

@@ -16,11 +16,7 @@ from softreach.arm.parameters import Parameter
 from softreach.arm.parameters.changes import unknown_parameter
 from softreach.arm.parameters.shown import from_written, written_name
 from softreach.atlas.space_file import flat_keys
-from softreach.optimization.free_parameters import (
-    NAMED_CHOICES,
-    free_parameters,
-    known_parameters,
-)
+from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.objectives import goals, known_objective
 from softreach.optimization.study import SAMPLERS
 from softreach.requirements.requirements import Requirements

@@ -103,11 +103,7 @@ def _claim(pages: Path, key: Mapping[str, Any], *, overwrite: bool) -> None:
 
 
 def _computed(
-    name: str,
-    part: Callable[..., None],
-    settings: Any,
-    folder: Path,
-    key: Mapping[str, Any],
+    name: str, part: Callable[..., None], settings: Any, folder: Path, key: Mapping[str, Any]
 ) -> Notebook:
     """The notebook of a part: of an earlier run, or written now."""
     pages = folder / "figures"
