@@ -40,7 +40,7 @@ from softreach.support.versions import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Calibration", "Rival", "calibrate"]
+__all__ = ["Calibration", "Rival", "calibrate", "leave_one_run_out"]
 
 Array = NDArray[np.float64]
 
@@ -150,6 +150,34 @@ def calibrate(
         )
         result = replace(result, exchange=found)
     return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+
+
+def leave_one_run_out(
+    arm: Manipulator, data: Any, *, free: Sequence[str], **options: Any
+) -> dict[str, Misses]:
+    """Errors of each run by a fit to all others: what to expect of a motion that is new.
+
+    Args:
+        arm: The design to start from.
+        data: Measured poses with a column of runs, as for `calibrate`.
+        free: Numbers, as for `calibrate`.
+        **options: Others of `calibrate`.
+
+    Raises:
+        InvalidInput: Fewer than two runs; else as `calibrate`.
+    """
+    names = ("inputs", "markers", "run", "order")
+    columns = {name: options.pop(name) for name in names if name in options}
+    table = read_measurements(arm, data, **columns)
+    if not table.has_runs:
+        raise InvalidInput("runs", len(table.run_names), "2 or more: name their column by `run`")
+    errors = {}
+    for number, name in enumerate(table.run_names):
+        out = table.runs == number
+        if out.any() and not out.all():
+            others = calibrate(arm, table.of(~out), free=free, **{"rivals": False, **options})
+            errors[name] = misses(others.residuals_on(table.of(out)))
+    return errors
 
 
 def _left(ratio: float) -> bool:
@@ -467,7 +495,7 @@ class Calibration:
             unit: Of lengths: m, cm, mm or L.
             overwrite: Whether it may replace any file, and not only such a table.
         """
-        from softreach.calibration.residual_table import write_table
+        from softreach.calibration.report import write_table
 
         write_table(self, path, unit, overwrite=overwrite)
 
@@ -484,7 +512,7 @@ class Calibration:
         Raises:
             MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        from softreach.calibration.html_report import write_report
+        from softreach.calibration.report import write_report
 
         write_report(self, path, unit, overwrite=overwrite)
 

@@ -122,10 +122,9 @@ def calibrate(
     """
     from softreach import calibration
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.calibration.html_report import REPORT
-    from softreach.calibration.report import summary_text
-    from softreach.calibration.residual_table import TABLE
+    from softreach.calibration.report import TABLE, summary_text
     from softreach.support import progress
+    from softreach.support.report import REPORT
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)

@@ -13,7 +13,7 @@ from typing import Any
 from softreach.paper.claims import CLAIMS, Verdict
 from softreach.paper.notebook import Notebook, Settings
 from softreach.support.files.atomic import writing
-from softreach.support.files.templates import page_template, png_source
+from softreach.support.report import page_template, png_source
 
 __all__ = ["report_template", "write_report"]
 
