@@ -104,8 +104,6 @@ def constant_curvature(
 
 
 class _Arcs:
-    """Arcs of circles in a row."""
-
     def __init__(
         self, ends: Array, acts: NDArray[np.bool_], scale: Array, markers: Array, offsets: Array
     ) -> None:

@@ -181,12 +181,10 @@ def leave_one_run_out(
 
 
 def _left(ratio: float) -> bool:
-    """True of a number that left the design."""
     return not 1.0 / _LEAVES < ratio < _LEAVES
 
 
 def _warn_of_numbers(result: Calibration) -> None:
-    """Warn of numbers that left the design, or are not told, and of what the new design is."""
     own = [n.name for n in result.fit.free.numbers if n.prior is not None]
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:

@@ -75,8 +75,9 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
     rotation, shift = _kabsch(predicted, measured)
     _refuse_mirror(model, places, predicted, measured)
     _refuse_exchanged(each, places, model.names)
-    vector = _rotation_vector(rotation)
-    place = rotation @ start + shift
+    from scipy.spatial.transform import Rotation
+
+    place, vector = rotation @ start + shift, Rotation.from_matrix(rotation).as_rotvec()
     return free.started_at(dict(zip(POSE, [*place, *vector], strict=True)))
 
 
@@ -131,7 +132,6 @@ def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...])
 
 
 def _refuse_mirror(model: MarkerModel, places: Array, predicted: Array, measured: Array) -> None:
-    """Refuse places whose mirror image matches far better than they do."""
     misses = [_miss(predicted, measured, mirror) for mirror in (False, True)]
     size = np.median(np.linalg.norm(measured - measured.mean(axis=0), axis=1))
     if misses[1] < 0.35 * misses[0] and misses[0] > 0.1 * size:
@@ -147,12 +147,6 @@ def _refuse_mirror(model: MarkerModel, places: Array, predicted: Array, measured
             "right-handed, as those of the design: exchange two of x, y and z, or turn one over"
             + cause,
         )
-
-
-def _rotation_vector(rotation: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(rotation).as_rotvec()
 
 
 def identifiable(free: FreeNumbers, slopes: Array) -> None:
@@ -204,18 +198,18 @@ def fitted(
     Raises:
         InvalidInput: Numbers that the data cannot tell, or no equilibrium at the start.
     """
-    problem = _Problem(model, places, noise, progress)
+    problem = _Problem(model, places, progress)
     values = np.clip(model.free.start, *problem.bounds)
-    problem.look(values)
+    identifiable(model.free, problem.slopes(values))
     if not np.isfinite(problem.residuals(values)).all():
         raise InvalidInput("arm", "no equilibrium", "one at the start for some sample at least")
     rounds = [None, _ROBUST] if robust else [None]
     converged, count = False, 0
     for width in rounds:
         if width is not None:
-            problem.robust_at(values, width)
+            problem.width = width * robust_width(problem.miss(values))
         if any(number.prior for number in model.free.numbers):
-            problem.weigh_priors(values)
+            problem.unit = noise or robust_width(problem.miss(values))
         result = problem.solved(values, _FINE if width == rounds[-1] else _COARSE)
         values, converged = result.x, bool(result.status > 0)
         count += int(result.nfev)
@@ -238,33 +232,22 @@ def fitted(
 class _Problem:
     """Residuals and their derivatives, the last evaluation kept."""
 
-    def __init__(
-        self, model: MarkerModel, places: Array, noise: float | None, progress: Progress
-    ) -> None:
+    def __init__(self, model: MarkerModel, places: Array, progress: Progress) -> None:
         self.model, self.places, self.progress = model, places, progress
         self.seen = np.asarray(np.isfinite(places).all(axis=2))
-        self.noise = noise
-        self.width: float | None = None
-        self.unit = 1.0  # of priors, in m
+        self.bounds = model.free.bounds
+        self.width: float | None = None  # beyond which residuals count less, in m
+        self.unit = 1.0  # of priors, which count as a coordinate of one width, in m
         self.kept: tuple[bytes, Prediction] | None = None
 
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        return self.model.free.bounds
-
-    def look(self, values: Array) -> None:
-        """Refuse numbers that the data cannot tell."""
-        identifiable(self.model.free, self.slopes(values))
-
     def at(self, values: Array) -> Prediction:
-        """Places and their derivatives; the last ones are kept."""
         key = values.tobytes()
         if self.kept is None or self.kept[0] != key:
             self.kept = (key, self.model.predict(values, slopes=True))
             self.progress(1)
         return self.kept[1]
 
-    def _miss(self, values: Array) -> Array:
+    def miss(self, values: Array) -> Array:
         """Predicted minus measured places that were seen [m]."""
         return (self.at(values).places - self.places)[self.seen]
 
@@ -272,14 +255,13 @@ class _Problem:
         """Of all that was seen [m], then of the priors."""
         free = self.model.free
         try:
-            miss = self._miss(values)
+            miss = self.miss(values)
         except InvalidDesign:
             return np.full(3 * int(self.seen.sum()) + self._priors(values)[0].size, _FAR)
         miss = np.where(np.isfinite(miss), miss, _FAR * 0.1 * free.arm.length)
         return np.concatenate([miss.ravel(), self._priors(values)[0]])
 
     def slopes(self, values: Array) -> Array:
-        """Derivatives of the residuals."""
         prediction = self.at(values)
         assert prediction.slopes is not None
         slopes = prediction.slopes[self.seen].reshape(-1, len(self.model.free))
@@ -296,18 +278,7 @@ class _Problem:
             slopes[row, k] = self.unit / width
         return rows, slopes
 
-    def robust_at(self, values: Array, widths: float) -> None:
-        """From here on residuals beyond so many widths count less."""
-        miss = self._miss(values)
-        self.width = widths * robust_width(miss)
-
-    def weigh_priors(self, values: Array) -> None:
-        """Priors count as much as a coordinate of one width."""
-        miss = self._miss(values)
-        self.unit = self.noise or robust_width(miss)
-
     def solved(self, values: Array, fine: float) -> Any:
-        """The end of SciPy's trust region, from these values."""
         from scipy.optimize import least_squares
 
         return least_squares(

@@ -103,15 +103,11 @@ class FreeNumbers:
                 pose[number.name] = value
             else:
                 paths |= dict.fromkeys(_tied(number.name), value)
-        arm = self._changed(paths)
-        return arm.replace(base=_moved(arm.base, pose)) if pose else arm
-
-    def _changed(self, values: Mapping[str, float]) -> Manipulator:
-        """As `changed`, with parameters that were found before."""
         draft = Draft(self.arm)
         for name, parameter in self._parameters.items():
-            parameter.change(draft, values[name])
-        return draft.made() if values else self.arm
+            parameter.change(draft, paths[name])
+        arm = draft.made() if paths else self.arm
+        return arm.replace(base=_moved(arm.base, pose)) if pose else arm
 
     @cached_property
     def _parameters(self) -> dict[str, Parameter]:

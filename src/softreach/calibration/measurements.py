@@ -207,7 +207,6 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
 
 
 def _table(data: Any) -> tuple[pd.DataFrame, str]:
-    """The data as a table, and a name for it."""
     import pandas as pd
 
     if isinstance(data, pd.DataFrame):
@@ -220,15 +219,11 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
         except ValueError as error:
             raise InvalidInput("data", str(error), "columns of one length") from None
     if isinstance(data, str | PathLike):
-        return _read(Path(data))
+        path = Path(data)
+        if not path.is_file():
+            raise InvalidInput("data", str(path), "a file that exists")
+        return read_table(path, str(path)), path.name
     raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
-
-
-def _read(path: Path) -> tuple[pd.DataFrame, str]:
-    """The table of a file, and its name."""
-    if not path.is_file():
-        raise InvalidInput("data", str(path), "a file that exists")
-    return read_table(path, str(path)), path.name
 
 
 def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
@@ -374,7 +369,6 @@ def _triples(columns: list[str], taken: set[str | None]) -> dict[str, list[str]]
 def _chosen_markers(
     arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
 ) -> dict[str, str]:
-    """Start of the columns of each marker of the arm."""
     names = [marker.name for marker in arm.markers] or ["tip"]
     chosen: dict[str, str] = {}
     for name, start in given.items():
@@ -400,7 +394,7 @@ def _simple(name: str) -> str:
 
 
 def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:
-    """Column of each input of the arm; "" for one that stays at zero."""
+    """Column of each input; "" for one that stays at zero."""
     chosen: dict[str, str] = {}
     for name, column in given.items():
         if name not in arm.input_names:

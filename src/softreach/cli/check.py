@@ -89,7 +89,6 @@ def finding_record(finding: Finding) -> dict[str, object]:
 
 
 def _record(result: Check, lengths: Lengths) -> dict[str, object]:
-    """The result for machines."""
     return {
         "met": result.met,
         "verdict": result.verdict,

@@ -186,7 +186,6 @@ class _Program:
         return _TOLERANCE * self._accuracy * _GENTLE
 
     def values_of(self, unknowns: Array) -> Values:
-        """Free parameters of unknowns."""
         parameters = self._problem.parameters
         low, high = parameters.bounds.T
         reals = low + unknowns[: len(low)] * (high - low)
@@ -222,7 +221,6 @@ class _Program:
         return cost if math.isfinite(cost) else _WORSE
 
     def cost_slope(self, unknowns: Array) -> Array:
-        """Its derivatives."""
         self.accepted = unknowns.copy()
         try:
             return np.nan_to_num(self.point(unknowns).cost_slope / self._scale)

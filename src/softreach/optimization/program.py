@@ -155,7 +155,6 @@ class Point:
         return first + np.arange(places * free).reshape(places, free).T
 
     def _rules(self) -> Iterator[Part]:
-        """Regions to keep to and limits of poses."""
         needs = self.design.problem.requirements
         keeps = [keep for keep in needs.keeps if keep.when == "targets"]
 

@@ -205,7 +205,6 @@ class _Reader:
                 self._tried(path, value, partial(free_parameters, dict(bases), tied, choices))
 
     def options(self, needs: Requirements | None) -> dict[str, Any]:
-        """Objectives and numbers of the search."""
         options: dict[str, Any] = {word: self._objectives(word) for word in _SENSES}
         for name, convert in _OPTIONS.items():
             path, value = self._value(name)

@@ -15,7 +15,7 @@ from softreach.paper.notebook import Notebook, Settings
 from softreach.support.files.atomic import writing
 from softreach.support.report import page_template, png_source
 
-__all__ = ["report_template", "write_report"]
+__all__ = ["write_report"]
 
 _NARROW = 900  # pixels; two such figures stand side by side
 
@@ -44,14 +44,15 @@ def write_report(
         MissingExtra: Jinja2 is not installed.
     """
     rows = list(_rows(notebooks, quick))
-    page = report_template().render(
+    system = f"{platform.system()} on {platform.machine()}"
+    page = page_template("softreach.paper", "report.html.jinja").render(
         rows=rows,
         counts={verdict: sum(row["verdict"] == verdict for row in rows) for verdict in Verdict},
         figures=sorted(_figures(notebooks), key=lambda figure: figure["order"]),
         parts=[(name, notebook.seconds) for name, notebook in notebooks.items()],
         settings=settings,
         quick=quick,
-        machine=_machine(),
+        machine=f"{os.cpu_count()} cores, {system}, Python {platform.python_version()}",
         version=version("softreach"),
         date=f"{datetime.now(UTC):%Y-%m-%d}",
     )
@@ -61,7 +62,6 @@ def write_report(
 
 
 def _rows(notebooks: Mapping[str, Notebook], quick: bool) -> Iterator[dict[str, Any]]:
-    """One for each statement of the paper."""
     for claim in CLAIMS:
         finding = claim.check(notebooks[claim.part].numbers)
         yield {
@@ -85,17 +85,3 @@ def _figures(notebooks: Mapping[str, Notebook]) -> Iterator[dict[str, Any]]:
                 "source": png_source(image),
                 "order": picture.label or "9",
             }
-
-
-def _machine() -> str:
-    system = f"{platform.system()} on {platform.machine()}"
-    return f"{os.cpu_count()} cores, {system}, Python {platform.python_version()}"
-
-
-def report_template() -> Any:
-    """The page, to be filled.
-
-    Raises:
-        MissingExtra: Jinja2 is not installed.
-    """
-    return page_template("softreach.paper", "report.html.jinja")

@@ -442,7 +442,6 @@ class Mesh(Region):
 
 
 def _triple(name: str, value: object) -> Triple:
-    """Three finite numbers."""
     allowed = "three finite numbers"
     numbers = check_finite(name, as_floats(name, value, allowed))
     if numbers.shape != (3,):

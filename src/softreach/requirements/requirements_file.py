@@ -77,8 +77,6 @@ def read(text: str, folder: Path, length: float | None, source: str) -> dict[str
 
 
 class _Reader:
-    """Reads the tables and keeps their faults."""
-
     def __init__(self, folder: Path, length: float | None) -> None:
         self.folder, self.length = folder, length
         self.faults: list[Fault] = []
@@ -337,7 +335,6 @@ class _Reader:
         return {}
 
     def _tables(self, document: dict[str, Any], key: str) -> Iterator[tuple[dict[str, Any], str]]:
-        """Tables of a list, and their paths."""
         raw = document.get(key, [])
         if not isinstance(raw, list):
             self._refuse(key, raw, f"must be tables: write [[{key}]]")
