@@ -453,9 +453,7 @@ class Calibration:
             "data_sha256": self.data.digest,
             "samples": f"{len(self.data)}, of which {int(self.held.sum())} held out",
             "free": ", ".join(self.names),
-            "error": self.held_out.text(self.arm.length)
-            if self.held.any()
-            else self.train.text(self.arm.length),
+            "error": (self.held_out if self.held.any() else self.train).text(self.arm.length),
             "verdict": self.verdict.sentence,
         }
 
@@ -467,16 +465,9 @@ class Calibration:
             NotWritten: It cannot be written.
         """
         lines = [f"# {key}: {value}" for key, value in self.provenance.items()]
-        numbers = (
-            f"# {name} = {value:.6g} ± {sigma:.2g} {number.unit}".replace(" 1\n", "\n")
-            for name, value, sigma, number in zip(
-                self.names,
-                self.fit.values.tolist(),
-                self.uncertainty.sigma.tolist(),
-                self.fit.free.numbers,
-                strict=True,
-            )
-        )
+        free, sigma = self.fit.free.numbers, self.sigma
+        pairs = zip(free, self.fit.values.tolist(), strict=True)
+        numbers = [f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs]
         head = "\n".join(["# Calibrated from measured poses.", *lines, *numbers])
         text = f"{head}\n\n{self.arm.file_text}"
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)

@@ -69,13 +69,12 @@ def exchanged_columns(
             predicted = own if inputs is None else other.predict(values).places
             found[text] = moved_miss(model.free, predicted, _ordered(seen, columns))
         first = min(found, key=found.__getitem__, default="")
-        if not first or found[first] > _PROMISING * moved_miss(model.free, own, seen):
-            continue
-        alike = [text for text, miss in found.items() if miss <= _ALIKE * found[first]]
-        inputs, columns = each[first]
-        if first in tried:
+        promising = found and found[first] <= _PROMISING * moved_miss(model.free, own, seen)
+        if not promising or first in tried:
             continue
         tried.add(first)
+        alike = [text for text, miss in found.items() if miss <= _ALIKE * found[first]]
+        inputs, columns = each[first]
         other = model if inputs is None else replace(model, inputs=model.inputs[:, inputs])
         moved = _ordered(places, columns)
         try:
@@ -102,6 +101,5 @@ def _coordinates(names: tuple[str, ...]) -> Iterator[tuple[str, list[int]]]:
 
 
 def _ordered(places: Array, order: list[int] | None) -> Array:
-    return (
-        places if order is None else places.reshape(len(places), -1)[:, order].reshape(places.shape)
-    )
+    rows = places.reshape(len(places), -1)
+    return places if order is None else rows[:, order].reshape(places.shape)

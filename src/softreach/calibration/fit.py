@@ -124,11 +124,8 @@ def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...])
         if misses[own] > 0.1 * size:
             given = ", ".join(names[: len(own)])
             seem = ", ".join(names[k] for k in best)
-            raise InvalidInput(
-                "markers of the data",
-                given,
-                f"in their order along the arm; they seem to be {seem}",
-            )
+            allowed = f"in their order along the arm; they seem to be {seem}"
+            raise InvalidInput("markers of the data", given, allowed)
 
 
 def _refuse_mirror(model: MarkerModel, places: Array, predicted: Array, measured: Array) -> None:

@@ -308,9 +308,8 @@ def _check_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> No
         row, k = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
         name, reached = columns[own[k]], f"{values[row, own[k]]:.4g} {unit}"
         if size.max() > _HARD * bound:
-            allowed = (
-                f"near the bounds of the design, {bound:.4g} {unit}: look at the column's unit"
-            )
+            allowed = f"near the bounds of the design, {bound:.4g} {unit}"
+            allowed += ": look at the column's unit"
             raise InvalidInput(f"{name} in row {row}", reached, allowed)
         if size.max() < bound / _HARD:
             warn(
@@ -355,14 +354,11 @@ def _triples(columns: list[str], taken: set[str | None]) -> dict[str, list[str]]
             found.setdefault(start, {})[match["axis"].lower()] = column
     for start, axes in found.items():
         if lacking := [axis for axis in "xyz" if axis not in axes]:
-            what = f"columns of {start or 'the place'}"
-            raise InvalidInput(
-                what, ", ".join(axes.values()), f"x, y and z: {lacking[0]} is missing"
-            )
+            what, given = f"columns of {start or 'the place'}", ", ".join(axes.values())
+            raise InvalidInput(what, given, f"x, y and z: {lacking[0]} is missing")
     if not found:
-        raise InvalidInput(
-            "places of markers", "none", "columns such as x_mm, y_mm, z_mm or marker1_x_mm"
-        )
+        allowed = "columns such as x_mm, y_mm, z_mm or marker1_x_mm"
+        raise InvalidInput("places of markers", "none", allowed)
     return {start: [axes[axis] for axis in "xyz"] for start, axes in found.items()}
 
 
@@ -413,10 +409,8 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
         wanting = [name for name in left if units[name] == unit]
         free = [c for c in columns if c not in chosen.values() and _fits(c, unit)]
         if len(free) != len(wanting):
-            have = ", ".join(free) or "none"
-            allowed = (
-                f"{counted(len(wanting), 'column')} in {_unit_text(unit)} for {', '.join(wanting)}"
-            )
+            have, several = ", ".join(free) or "none", counted(len(wanting), "column")
+            allowed = f"{several} in {_unit_text(unit)} for {', '.join(wanting)}"
             raise InvalidInput("inputs of the data", have, allowed, "name them by `inputs`")
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]

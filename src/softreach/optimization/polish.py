@@ -197,9 +197,8 @@ class _Program:
         if key not in self._points:
             count = len(self._problem.parameters.real)
             reals, poses = unknowns[:count].copy(), unknowns[count:].reshape(self._shape).copy()
-            design = next(
-                (p.design for p in self._points.values() if (p.reals == reals).all()), None
-            )
+            alike = (p.design for p in self._points.values() if (p.reals == reals).all())
+            design = next(alike, None)
             if design is None:
                 # one is left for the design that it ends with
                 if self.designs >= self._most - 1 and len(self.accepted):

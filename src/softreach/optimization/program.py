@@ -120,7 +120,7 @@ class Point:
         for number, (rod, cube) in enumerate(self._by_payload()):
             tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
             gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
-            slopes = lazily(partial(self._tip_slopes, number))
+            slopes = cache(partial(self._tip_slopes, number))
             for k, gap in enumerate(gaps):
                 slope = partial(_row, slopes, k)
                 near = within[k] / rod.length
@@ -169,7 +169,7 @@ class Point:
             if not len(rules):
                 return
             value = _room(rules, cube)
-            slopes = lazily(partial(self._rule_slopes, rules_of, number, value))
+            slopes = cache(partial(self._rule_slopes, rules_of, number, value))
             scales = [(keep.name, rules.arm.length, "m") for keep in keeps]
             scales += [(name, most or 1.0, "") for name, most in rules.limits.items()]
             for column, (name, scale, unit) in enumerate(scales):
@@ -298,11 +298,6 @@ def _row(slopes: Callable[[], Array], k: int) -> Array:
 
 def _column(slopes: Callable[[], Array], k: int) -> Array:
     return slopes()[:, k]
-
-
-def lazily(make: Callable[[], Array]) -> Callable[[], Array]:
-    """A function that calls another once."""
-    return cache(make)
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:

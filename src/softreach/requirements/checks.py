@@ -17,7 +17,6 @@ from softreach.requirements.poses import PoseRules
 from softreach.requirements.requirements import Requirements
 from softreach.requirements.verdicts import verdicts
 from softreach.rod.rods import in_steps, tip_map
-from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_instance, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, no_warnings
@@ -116,14 +115,16 @@ def checked(
         choose: Source of the poses.
     """
     payloads = needs.payloads or (None,)
+    keeps = [keep for keep in needs.keeps if keep.when == "targets" and needs.targets]
     every: list[PoseRules] = []
     posed: list[Posed] = []
     coverages: list[Coverage] = []
     for payload, loaded in zip(payloads, needs.under_payloads(arm), strict=True):
-        rules = _rules(loaded, needs, accuracy)
+        rules = PoseRules.of(loaded, keeps, needs.limits, 0.1 * accuracy * arm.length)
         every.append(rules)
-        if choose is descended:
-            rules = replace(rules, known_rod=_rough_map(rules.arm))
+        if choose is descended:  # on the way, with shapes in no more steps than tips
+            rod = tip_map(loaded, _ROUGH_TOL)
+            rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
         posed.append(solved(rules, needs.places, needs.within, step, choose))
         for target in needs.targets:
             if target.region is not None:
@@ -145,17 +146,6 @@ def checked(
     return replace(made, findings=(*verdicts(made, joined, every), *measures))
 
 
-def _rules(arm: Manipulator, needs: Requirements, accuracy: float) -> PoseRules:
-    keeps = [keep for keep in needs.keeps if keep.when == "targets" and needs.targets]
-    return PoseRules.of(arm, keeps, needs.limits, 0.1 * accuracy * arm.length)
-
-
-def _rough_map(arm: Manipulator) -> TipMap:
-    """A tip map for designs on the way, whose shapes have no more steps than its tips."""
-    rod = tip_map(arm, _ROUGH_TOL)
-    return in_steps(arm, rod.steps, rod)
-
-
 def _coverage(
     rules: PoseRules,
     target: Target,
@@ -164,7 +154,6 @@ def _coverage(
     sets: Sets,
     step: Progress,
 ) -> Coverage:
-    """The share of a region that is reached."""
     assert target.region is not None
     count = int(np.clip(0.25 / accuracy**2, _LEAST_PLACES, _MOST_PLACES))
     places = target.region.places(count)

@@ -56,30 +56,23 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
         if reached.all():
             effort = float(made.effort[:, own].max())
             near = f" to {unit.text(target.within)}" if target.within else ""
-            yield Finding(
-                target.name, "reach", "met", 0.0, f"{met} reached{near}, effort up to {effort:.3g}"
-            )
+            text = f"{met} reached{near}, effort up to {effort:.3g}"
+            yield Finding(target.name, "reach", "met", 0.0, text)
             continue
         gap, number = float(gaps[load, place]), int(np.flatnonzero(own)[place])
         excess = max(gap - target.within, TOL * length) / length
         where = ", ".join(f"{x / unit.size:.4g}" for x in target.places[place])
         text = f"{met} reached; place {place + 1} at ({where}) {unit.name}"
-        more = ""
-        if (
-            gap
-            > length + float(np.linalg.norm(target.places[place] - made.arm.base.position)) - 1e-9
-        ):
-            text += f" is not held{_under(made.payloads[load])}: no stable equilibrium"
+        more, laden = "", _under(made.payloads[load])
+        away = float(np.linalg.norm(target.places[place] - made.arm.base.position))
+        if gap > length + away - 1e-9:
+            text += f" is not held{laden}: no stable equilibrium"
         else:
-            text += (
-                f" is missed by {_length(gap - target.within, unit)}{_under(made.payloads[load])}"
-            )
-            more = advice(
-                rules[int(load)].arm, target.places[place], made.poses[load, number], unit
-            )
-        held = [
-            p for p, row in zip(made.payloads, reached, strict=True) if p is not None and row.all()
-        ]
+            text += f" is missed by {_length(gap - target.within, unit)}{laden}"
+            pose = made.poses[load, number]
+            more = advice(rules[int(load)].arm, target.places[place], pose, unit)
+        pairs = zip(made.payloads, reached, strict=True)
+        held = [payload for payload, row in pairs if payload is not None and row.all()]
         if held:
             more += f"; all reached with {max(held):.4g} kg"
         yield Finding(target.name, "reach", "missed", excess, text + more)
@@ -125,9 +118,8 @@ def _kept_at_targets(made: Check, keep: Keep, value: Array, error: Array, excess
     decides = value if value.max() > 0.0 or (value + error).max() <= 0.0 else value + error
     load, place = np.unravel_index(int(decides.argmax()), value.shape)
     where = f"at place {place + 1}{_under(made.payloads[load])}"
-    return _kept(
-        keep, float(value[load, place]), float(error[load, place]), float(excess.max()), where, unit
-    )
+    most, off = float(value[load, place]), float(error[load, place])
+    return _kept(keep, most, off, float(excess.max()), where, unit)
 
 
 def _kept_always(made: Check, keep: Keep, rules: Sequence[PoseRules]) -> Finding:
