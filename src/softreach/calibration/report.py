@@ -15,18 +15,15 @@ from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import counted
 from softreach.support.files.atomic import writing
-from softreach.support.files.formats import FileFormat, Formats, format_of
+from softreach.support.files.formats import TABLES, format_of
 from softreach.support.quantity import columns, quantity
 from softreach.support.report import REPORT, Section, check_libraries, figure_source, write_page
 from softreach.support.units import LengthUnit, as_unit, readable_unit
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from softreach.calibration.calibration import Calibration
 
 __all__ = [
-    "TABLE",
     "ErrorRow",
     "error_cells",
     "error_head",
@@ -38,9 +35,6 @@ __all__ = [
     "write_report",
     "write_table",
 ]
-
-TABLE: Formats = {".csv": FileFormat()}
-"""Formats of tables of residuals."""
 
 _MOST_ROWS = 10
 _PICTURE = (
@@ -83,12 +77,11 @@ def summary_text(result: Calibration, unit: LengthUnit | None = None) -> str:
 
 def number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     """Name, value ± standard deviation and value of the design of each free number."""
-    free = result.fit.free.numbers
-    values, bound = result.fit.values.tolist(), result.fit.at_bound.tolist()
-    pose = dict(zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True))
-    for number, value, sigma, at_bound in zip(
-        free, values, result.uncertainty.sigma.tolist(), bound, strict=True
-    ):
+    fit, widths = result.fit, result.uncertainty.sigma.tolist()
+    pairs = zip(fit.free.numbers, fit.values.tolist(), widths, fit.at_bound, strict=True)
+    place = (*result.start.base.position, 0.0, 0.0, 0.0)
+    pose: dict[str, float] = {name: at for name, at in zip(POSE, place, strict=True)}
+    for number, value, sigma, at_bound in pairs:
         name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma / size, digits=2)
         text += ", at its bound" if at_bound else ", with its prior" if number.prior else ""
@@ -197,24 +190,13 @@ def write_report(
 def write_table(
     result: Calibration, path: str | PathLike[str], unit: str, *, overwrite: bool
 ) -> None:
-    """Write `residual_table` as CSV."""
-    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    format_of(path, TABLE)
-    table = residual_table(result, as_unit(unit, result.arm.length))
-    with writing(path, overwrite=overwrite) as file:
-        file.write(table.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode())
-
-
-def residual_table(result: Calibration, unit: LengthUnit) -> pd.DataFrame:
-    """A row for each sample, in the order of the data, with units in the names of columns.
-
-    Args:
-        result: The calibration.
-        unit: Of lengths.
-    """
+    """Write a row for each sample, in the order of the data, with units in names of columns."""
     import pandas as pd
 
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    format_of(path, TABLES)
     data, arm = result.data, result.arm
+    shown = as_unit(unit, arm.length)
     table: dict[str, object] = {
         "row": data.rows,
         "run": np.array(data.run_names)[data.runs],
@@ -227,7 +209,9 @@ def residual_table(result: Calibration, unit: LengthUnit) -> pd.DataFrame:
     for m, marker in enumerate(data.marker_names):
         for words, places in (("", data.places), ("predicted_", predicted)):
             for axis in range(3):
-                values = unit.of(places[:, m, axis])
-                table[f"{marker}_{words}{'xyz'[axis]}_{unit.name}"] = values
-        table[f"{marker}_error_{unit.name}"] = unit.of(distance[:, m])
-    return pd.DataFrame(table)
+                values = shown.of(places[:, m, axis])
+                table[f"{marker}_{words}{'xyz'[axis]}_{shown.name}"] = values
+        table[f"{marker}_error_{shown.name}"] = shown.of(distance[:, m])
+    text = pd.DataFrame(table).to_csv(index=False, float_format="%.9g", lineterminator="\n")
+    with writing(path, overwrite=overwrite) as file:
+        file.write(text.encode())

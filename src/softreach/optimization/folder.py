@@ -24,21 +24,16 @@ from softreach.optimization.report import (
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import SoftreachError, counted
 from softreach.support.files.atomic import check_place, writing
-from softreach.support.files.formats import FileFormat, Formats, format_of
+from softreach.support.files.formats import TABLES, format_of
 from softreach.support.report import REPORT, Section, check_libraries, figure_source, write_page
 from softreach.support.units import LengthUnit, as_unit, readable_unit
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from softreach.optimization.result import Search
 
-__all__ = ["TABLE", "check_folder", "design_table", "save", "write_report", "write_table"]
+__all__ = ["check_folder", "save", "write_report", "write_table"]
 
 _FOUND = "# Found by a search of softreach"
-
-TABLE: Formats = {".csv": FileFormat()}
-"""Formats of such tables."""
 
 _FILES = ("best.toml", "front.csv", "candidates.csv", "report.html")
 
@@ -167,25 +162,13 @@ def _pictures(search: Search, unit: LengthUnit) -> Iterator[tuple[str, str, str]
 def write_table(
     search: Search, path: str | PathLike[str], unit: str, *, every: bool, overwrite: bool
 ) -> None:
-    """Write `design_table` as CSV."""
-    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    length = float(str(search.attributes["length"]))
-    table = design_table(search, as_unit(unit, length), every=as_flag("every", every))
-    format_of(path, TABLE)
-    with writing(path, overwrite=overwrite) as file:
-        file.write(table.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode())
-
-
-def design_table(search: Search, unit: LengthUnit, *, every: bool) -> pd.DataFrame:
-    """A row for each design of the front, or for every one, with units in the names of columns.
-
-    Args:
-        search: The search.
-        unit: Of lengths.
-        every: All candidates and finalists.
-    """
+    """Write a row for each design of the front, or for `every` one, units in names of columns."""
     import pandas as pd
 
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    format_of(path, TABLES)
+    shown = as_unit(unit, float(str(search.attributes["length"])))
+    every = as_flag("every", every)
     rows = (*search.candidates, *search.finalists) if every else search.front
     records = []
     for number, each in enumerate(rows, 1):
@@ -198,16 +181,20 @@ def design_table(search: Search, unit: LengthUnit, *, every: bool) -> pd.DataFra
         }
         for k, goal in enumerate(search.goals):
             pair = each.objectives[k] if each.objectives else (None, None)
-            suffix, size = _written_unit(goal.objective.unit, unit)
+            suffix, size = _written_unit(goal.objective.unit, shown)
             record[f"{goal.name}{suffix}"] = None if pair[0] is None else pair[0] / size
             record[f"{goal.name}_error{suffix}"] = None if pair[1] is None else pair[1] / size
         for parameter in search.problem.parameters.free:
-            suffix, size = _written_unit(parameter.unit, unit)
+            suffix, size = _written_unit(parameter.unit, shown)
             value = each.values[parameter.name]
             value = value if isinstance(value, str) else value / size
             record[with_suffix(parameter.name, suffix)] = value
         records.append(record | {"missed": "; ".join(each.missed), "fault": each.fault})
-    return pd.DataFrame.from_records(records)
+    text = pd.DataFrame.from_records(records).to_csv(
+        index=False, float_format="%.9g", lineterminator="\n"
+    )
+    with writing(path, overwrite=overwrite) as file:
+        file.write(text.encode())
 
 
 def _written_unit(unit: str, length: LengthUnit) -> tuple[str, float]:

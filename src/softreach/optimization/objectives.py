@@ -162,7 +162,9 @@ def goals(
     """
     result = []
     for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
-        several = [given] if isinstance(given, Metric) else _each(word, given)
+        several = [given] if isinstance(given, Metric) else given
+        if not (isinstance(several, list | tuple) and any(isinstance(x, Metric) for x in several)):
+            several = as_names(word, several)
         result += [Goal(known_objective(word, each), sense) for each in several]
     names = [goal.name for goal in result]
     if twice := [name for name in names if names.count(name) > 1]:
@@ -176,12 +178,6 @@ def goals(
             allowed = f"asked with {goal.objective.asks} among the requirements"
             raise InvalidInput("objective", goal.name, allowed)
     return tuple(result)
-
-
-def _each(word: str, given: Any) -> Sequence[str | Metric]:
-    if isinstance(given, list | tuple) and any(isinstance(each, Metric) for each in given):
-        return given
-    return as_names(word, given)
 
 
 def known_objective(word: str, given: str | Metric) -> Objective:
