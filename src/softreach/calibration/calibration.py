@@ -24,8 +24,14 @@ from softreach.calibration.errors import (
     misses,
     repeatability,
 )
-from softreach.calibration.exchanged import Exchange, exchanged_columns
-from softreach.calibration.fit import Fit, fitted, robust_width, started
+from softreach.calibration.fit import (
+    Exchange,
+    Fit,
+    exchanged_columns,
+    fitted,
+    robust_width,
+    started,
+)
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel

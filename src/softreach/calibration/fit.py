@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import permutations
-from typing import Any
+from itertools import combinations, permutations
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.calibration.model import MarkerModel, Prediction, exchanged_inputs
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.progress import Progress
 
-__all__ = ["SAME", "Fit", "fitted", "identifiable", "moved_miss", "robust_width", "started"]
+__all__ = [
+    "SAME",
+    "Exchange",
+    "Fit",
+    "exchanged_columns",
+    "fitted",
+    "identifiable",
+    "robust_width",
+    "started",
+]
 
 Array = NDArray[np.float64]
 
@@ -30,6 +40,12 @@ _FINE, _COARSE = 1e-7, 1e-3
 _MOST = 60
 _PERMUTED = 5
 """Markers of which all orders are tried."""
+_SAMPLES = 100
+"""Samples by which exchanges are compared."""
+_PROMISING, _BETTER = 0.8, 0.5
+"""Error over that of the columns as they are: before a fit, and after it."""
+_ALIKE = 1.2
+"""Factor between errors that nothing tells apart."""
 _FAR = 1.0  # m, what a sample without equilibrium misses
 
 
@@ -96,7 +112,7 @@ def _miss(predicted: Array, measured: Array, mirror: bool = False) -> float:
     return float(np.median(np.linalg.norm(predicted @ rotation.T + shift - measured, axis=1)))
 
 
-def moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
+def _moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
     """Distance in the middle of places, moved together as far as the pose is free [m]."""
     predicted, measured = predicted.reshape(-1, 3), measured.reshape(-1, 3)
     known = np.isfinite(predicted + measured).all(axis=1)
@@ -111,17 +127,17 @@ def moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
 
 def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...]) -> None:
     """Refuse markers that match far better under each other's names, shapes (n, marker, 3)."""
-    misses: dict[tuple[int, ...], float] = {}
+    missed: dict[tuple[int, ...], float] = {}
     for order in permutations(range(min(len(names), _PERMUTED))):
         others = predicted[:, list(order)], measured[:, : len(order)]
         known = np.isfinite(others[0] + others[1]).all(axis=2)
         if known.sum() > 2:
-            misses[order] = _miss(others[0][known], others[1][known])
+            missed[order] = _miss(others[0][known], others[1][known])
     own = tuple(range(min(len(names), _PERMUTED)))
-    best = min(misses, key=misses.__getitem__, default=own)
-    if best != own and own in misses and misses[best] < 0.35 * misses[own]:
+    best = min(missed, key=missed.__getitem__, default=own)
+    if best != own and own in missed and missed[best] < 0.35 * missed[own]:
         size = float(np.nanmedian(np.linalg.norm(np.diff(predicted, axis=1), axis=2)))
-        if misses[own] > 0.1 * size:
+        if missed[own] > 0.1 * size:
             given = ", ".join(names[: len(own)])
             seem = ", ".join(names[k] for k in best)
             allowed = f"in their order along the arm; they seem to be {seem}"
@@ -129,18 +145,18 @@ def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...])
 
 
 def _refuse_mirror(model: MarkerModel, places: Array, predicted: Array, measured: Array) -> None:
-    misses = [_miss(predicted, measured, mirror) for mirror in (False, True)]
+    missed = [_miss(predicted, measured, mirror) for mirror in (False, True)]
     size = np.median(np.linalg.norm(measured - measured.mean(axis=0), axis=1))
-    if misses[1] < 0.35 * misses[0] and misses[0] > 0.1 * size:
+    if missed[1] < 0.35 * missed[0] and missed[0] > 0.1 * size:
         free, alike = model.free, []
         for text, order in exchanged_inputs(free.arm):
             other = replace(model, inputs=model.inputs[:, order]).predict(free.start).places
-            if moved_miss(free, other, places) < 0.35 * misses[0]:
+            if _moved_miss(free, other, places) < 0.35 * missed[0]:
                 alike.append(text)
         cause = f"; or exchange {' or '.join(alike[:4])}, which looks the same" if alike else ""
         raise InvalidInput(
             "axes of the data",
-            f"a miss of {1e3 * misses[0]:.3g} mm in the middle, {1e3 * misses[1]:.3g} mm mirrored",
+            f"a miss of {1e3 * missed[0]:.3g} mm in the middle, {1e3 * missed[1]:.3g} mm mirrored",
             "right-handed, as those of the design: exchange two of x, y and z, or turn one over"
             + cause,
         )
@@ -324,3 +340,80 @@ def robust_width(miss: Array) -> float:
     distance = np.linalg.norm(miss, axis=-1)
     known = distance[np.isfinite(distance)]
     return max(float(np.median(known)) / 1.5382 if known.size else 0.0, 1e-9)  # χ of 3 degrees
+
+
+class Exchange(NamedTuple):
+    """Columns by whose exchange the same numbers fit far better."""
+
+    columns: str
+    fit: Fit
+    """With them exchanged."""
+
+
+def exchanged_columns(
+    fit: Fit,
+    model: MarkerModel,
+    places: Array,
+    *,
+    robust: bool,
+    noise: float | None,
+    progress: Progress,
+) -> Exchange | None:
+    """The exchange of two columns that halves the error of a fit at least, if there is one.
+
+    Args:
+        fit: The fit with the columns as they are.
+        model: Its model.
+        places: Measured places [m], shape (n, marker, 3).
+        robust: As in `fitted`.
+        noise: As in `fitted`.
+        progress: Called with 1 for each step.
+    """
+    some = slice(None, None, -(-len(places) // _SAMPLES))
+    few, seen = replace(model, inputs=model.inputs[some]), places[some]
+    least, best = _BETTER * misses(fit.residuals).rms, None
+    tried: set[str] = set()
+    for values in (model.free.start, fit.values):
+        own = few.predict(values).places
+        each = {text: (order, None) for text, order in exchanged_inputs(model.free.arm)}
+        each |= {text: (None, order) for text, order in _coordinates(model.names)}
+        found = {}
+        for text, (inputs, columns) in each.items():
+            other = few if inputs is None else replace(few, inputs=few.inputs[:, inputs])
+            predicted = own if inputs is None else other.predict(values).places
+            found[text] = _moved_miss(model.free, predicted, _ordered(seen, columns))
+        first = min(found, key=found.__getitem__, default="")
+        promising = found and found[first] <= _PROMISING * _moved_miss(model.free, own, seen)
+        if not promising or first in tried:
+            continue
+        tried.add(first)
+        alike = [text for text, miss in found.items() if miss <= _ALIKE * found[first]]
+        inputs, columns = each[first]
+        other = model if inputs is None else replace(model, inputs=model.inputs[:, inputs])
+        moved = _ordered(places, columns)
+        try:
+            other = replace(other, free=started(other, moved))
+            again = fitted(other, moved, robust=robust, noise=noise, progress=progress)
+        except InvalidInput:
+            continue
+        if (error := misses(again.residuals).rms) < least:
+            least, best = error, Exchange(" or ".join(alike[:4]), again)
+    return best
+
+
+def _coordinates(names: tuple[str, ...]) -> Iterator[tuple[str, list[int]]]:
+    """Orders of the coordinates of all markers with two axes, or two columns, exchanged."""
+    columns = [f"{name} {axis}" for name in names for axis in "xyz"]
+    for a, b in combinations(range(3), 2):
+        turned = {a: b, b: a}
+        order = [k - k % 3 + turned.get(k % 3, k % 3) for k in range(len(columns))]
+        yield f"the axes {'xyz'[a]} and {'xyz'[b]}", order
+    for j, k in combinations(range(len(columns)) if len(names) > 1 else (), 2):
+        order = list(range(len(columns)))
+        order[j], order[k] = k, j
+        yield f"the columns {columns[j]} and {columns[k]}", order
+
+
+def _ordered(places: Array, order: list[int] | None) -> Array:
+    rows = places.reshape(len(places), -1)
+    return places if order is None else rows[:, order].reshape(places.shape)
