@@ -6,8 +6,8 @@ import grimp
 
 CIRCLES = [
     "arm.driving arm.fitting arm.manipulator arm.tables arm.tensions",
-    "calibration.calibration calibration.html_report calibration.report calibration.residual_table",
-    "optimization.folder optimization.html_report optimization.report optimization.result",
+    "calibration.calibration calibration.report",
+    "optimization.folder optimization.report optimization.result",
     "requirements.requirements requirements.requirements_file",
     "studio.fields studio.jobs.calibration studio.jobs.plots studio.jobs.reach studio.plots "
     "studio.plots.plot studio.plots.section studio.plots.sweep studio.session",

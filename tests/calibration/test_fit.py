@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.calibration.calibration import leave_one_run_out
 from softreach.calibration.errors import judged, repeatability
 from softreach.calibration.measurements import read_measurements
-from softreach.calibration.runs_left_out import leave_one_run_out
 from softreach.rod.kinematics import marker_positions
 from tests.calibration.arms import hanging_tentacle, pulled_wire, random_inputs, table
 

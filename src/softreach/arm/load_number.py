@@ -7,13 +7,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.scale import body_mass
 from softreach.support.errors import Fault, InvalidDesign
 
-__all__ = [
-    "VERIFIED_LOAD_NUMBER",
-    "is_overloaded",
-    "load_number",
-    "load_number_faults",
-    "mass",
-]
+__all__ = ["VERIFIED_LOAD_NUMBER", "is_overloaded", "load_number", "load_number_faults", "mass"]
 
 VERIFIED_LOAD_NUMBER = 12.0
 """Largest Λ for which loaded arms were verified over the whole box of activations [-]."""

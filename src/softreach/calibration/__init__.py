@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from softreach.calibration.calibration import Calibration, Rival, calibrate
+from softreach.calibration.calibration import Calibration, Rival, calibrate, leave_one_run_out
 from softreach.calibration.errors import Misses, Repeatability, Verdict
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.plan import PosePlan, plan_poses
-from softreach.calibration.runs_left_out import leave_one_run_out
 from softreach.calibration.uncertainty import Uncertainty
 
 __all__ = [

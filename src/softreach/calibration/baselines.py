@@ -104,15 +104,8 @@ def constant_curvature(
 
 
 class _Arcs:
-    """Arcs of circles in a row."""
-
     def __init__(
-        self,
-        ends: Array,
-        acts: NDArray[np.bool_],
-        scale: Array,
-        markers: Array,
-        offsets: Array,
+        self, ends: Array, acts: NDArray[np.bool_], scale: Array, markers: Array, offsets: Array
     ) -> None:
         self.ends, self.acts, self.scale = ends, acts, scale
         self.markers, self.offsets = markers, offsets

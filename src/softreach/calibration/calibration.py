@@ -24,8 +24,7 @@ from softreach.calibration.errors import (
     misses,
     repeatability,
 )
-from softreach.calibration.exchanged import exchanged_columns
-from softreach.calibration.fit import Fit, fitted, robust_width, started
+from softreach.calibration.fit import Fit, exchanged_columns, fitted, robust_width, started
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
@@ -40,7 +39,7 @@ from softreach.support.versions import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Calibration", "Rival", "calibrate"]
+__all__ = ["Calibration", "Rival", "calibrate", "leave_one_run_out"]
 
 Array = NDArray[np.float64]
 
@@ -152,13 +151,39 @@ def calibrate(
     return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
 
 
+def leave_one_run_out(
+    arm: Manipulator, data: Any, *, free: Sequence[str], **options: Any
+) -> dict[str, Misses]:
+    """Errors of each run by a fit to all others: what to expect of a motion that is new.
+
+    Args:
+        arm: The design to start from.
+        data: Measured poses with a column of runs, as for `calibrate`.
+        free: Numbers, as for `calibrate`.
+        **options: Others of `calibrate`.
+
+    Raises:
+        InvalidInput: Fewer than two runs; else as `calibrate`.
+    """
+    names = ("inputs", "markers", "run", "order")
+    columns = {name: options.pop(name) for name in names if name in options}
+    table = read_measurements(arm, data, **columns)
+    if not table.has_runs:
+        raise InvalidInput("runs", len(table.run_names), "2 or more: name their column by `run`")
+    errors = {}
+    for number, name in enumerate(table.run_names):
+        out = table.runs == number
+        if out.any() and not out.all():
+            others = calibrate(arm, table.of(~out), free=free, **{"rivals": False, **options})
+            errors[name] = misses(others.residuals_on(table.of(out)))
+    return errors
+
+
 def _left(ratio: float) -> bool:
-    """True of a number that left the design."""
     return not 1.0 / _LEAVES < ratio < _LEAVES
 
 
 def _warn_of_numbers(result: Calibration) -> None:
-    """Warn of numbers that left the design, or are not told, and of what the new design is."""
     own = [n.name for n in result.fit.free.numbers if n.prior is not None]
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:
@@ -427,9 +452,7 @@ class Calibration:
             "data_sha256": self.data.digest,
             "samples": f"{len(self.data)}, of which {int(self.held.sum())} held out",
             "free": ", ".join(self.names),
-            "error": self.held_out.text(self.arm.length)
-            if self.held.any()
-            else self.train.text(self.arm.length),
+            "error": (self.held_out if self.held.any() else self.train).text(self.arm.length),
             "verdict": self.verdict.sentence,
         }
 
@@ -441,16 +464,9 @@ class Calibration:
             NotWritten: It cannot be written.
         """
         lines = [f"# {key}: {value}" for key, value in self.provenance.items()]
-        numbers = (
-            f"# {name} = {value:.6g} ± {sigma:.2g} {number.unit}".replace(" 1\n", "\n")
-            for name, value, sigma, number in zip(
-                self.names,
-                self.fit.values.tolist(),
-                self.uncertainty.sigma.tolist(),
-                self.fit.free.numbers,
-                strict=True,
-            )
-        )
+        free, sigma = self.fit.free.numbers, self.sigma
+        pairs = zip(free, self.fit.values.tolist(), strict=True)
+        numbers = [f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs]
         head = "\n".join(["# Calibrated from measured poses.", *lines, *numbers])
         text = f"{head}\n\n{self.arm.file_text}"
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
@@ -467,7 +483,7 @@ class Calibration:
             unit: Of lengths: m, cm, mm or L.
             overwrite: Whether it may replace any file, and not only such a table.
         """
-        from softreach.calibration.residual_table import write_table
+        from softreach.calibration.report import write_table
 
         write_table(self, path, unit, overwrite=overwrite)
 
@@ -484,7 +500,7 @@ class Calibration:
         Raises:
             MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        from softreach.calibration.html_report import write_report
+        from softreach.calibration.report import write_report
 
         write_report(self, path, unit, overwrite=overwrite)
 

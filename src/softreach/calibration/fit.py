@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import combinations, permutations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.calibration.model import MarkerModel, Prediction, exchanged_inputs
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.progress import Progress
 
-__all__ = ["SAME", "Fit", "fitted", "identifiable", "moved_miss", "robust_width", "started"]
+__all__ = [
+    "SAME",
+    "Fit",
+    "exchanged_columns",
+    "fitted",
+    "identifiable",
+    "robust_width",
+    "started",
+]
 
 Array = NDArray[np.float64]
 
@@ -30,6 +39,12 @@ _FINE, _COARSE = 1e-7, 1e-3
 _MOST = 60
 _PERMUTED = 5
 """Markers of which all orders are tried."""
+_SAMPLES = 100
+"""Samples by which exchanges are compared."""
+_PROMISING, _BETTER = 0.8, 0.5
+"""Error over that of the columns as they are: before a fit, and after it."""
+_ALIKE = 1.2
+"""Factor between errors that nothing tells apart."""
 _FAR = 1.0  # m, what a sample without equilibrium misses
 
 
@@ -75,8 +90,9 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
     rotation, shift = _kabsch(predicted, measured)
     _refuse_mirror(model, places, predicted, measured)
     _refuse_exchanged(each, places, model.names)
-    vector = _rotation_vector(rotation)
-    place = rotation @ start + shift
+    from scipy.spatial.transform import Rotation
+
+    place, vector = rotation @ start + shift, Rotation.from_matrix(rotation).as_rotvec()
     return free.started_at(dict(zip(POSE, [*place, *vector], strict=True)))
 
 
@@ -95,7 +111,7 @@ def _miss(predicted: Array, measured: Array, mirror: bool = False) -> float:
     return float(np.median(np.linalg.norm(predicted @ rotation.T + shift - measured, axis=1)))
 
 
-def moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
+def _moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
     """Distance in the middle of places, moved together as far as the pose is free [m]."""
     predicted, measured = predicted.reshape(-1, 3), measured.reshape(-1, 3)
     known = np.isfinite(predicted + measured).all(axis=1)
@@ -110,49 +126,39 @@ def moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
 
 def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...]) -> None:
     """Refuse markers that match far better under each other's names, shapes (n, marker, 3)."""
-    misses: dict[tuple[int, ...], float] = {}
+    missed: dict[tuple[int, ...], float] = {}
     for order in permutations(range(min(len(names), _PERMUTED))):
         others = predicted[:, list(order)], measured[:, : len(order)]
         known = np.isfinite(others[0] + others[1]).all(axis=2)
         if known.sum() > 2:
-            misses[order] = _miss(others[0][known], others[1][known])
+            missed[order] = _miss(others[0][known], others[1][known])
     own = tuple(range(min(len(names), _PERMUTED)))
-    best = min(misses, key=misses.__getitem__, default=own)
-    if best != own and own in misses and misses[best] < 0.35 * misses[own]:
+    best = min(missed, key=missed.__getitem__, default=own)
+    if best != own and own in missed and missed[best] < 0.35 * missed[own]:
         size = float(np.nanmedian(np.linalg.norm(np.diff(predicted, axis=1), axis=2)))
-        if misses[own] > 0.1 * size:
+        if missed[own] > 0.1 * size:
             given = ", ".join(names[: len(own)])
             seem = ", ".join(names[k] for k in best)
-            raise InvalidInput(
-                "markers of the data",
-                given,
-                f"in their order along the arm; they seem to be {seem}",
-            )
+            allowed = f"in their order along the arm; they seem to be {seem}"
+            raise InvalidInput("markers of the data", given, allowed)
 
 
 def _refuse_mirror(model: MarkerModel, places: Array, predicted: Array, measured: Array) -> None:
-    """Refuse places whose mirror image matches far better than they do."""
-    misses = [_miss(predicted, measured, mirror) for mirror in (False, True)]
+    missed = [_miss(predicted, measured, mirror) for mirror in (False, True)]
     size = np.median(np.linalg.norm(measured - measured.mean(axis=0), axis=1))
-    if misses[1] < 0.35 * misses[0] and misses[0] > 0.1 * size:
+    if missed[1] < 0.35 * missed[0] and missed[0] > 0.1 * size:
         free, alike = model.free, []
         for text, order in exchanged_inputs(free.arm):
             other = replace(model, inputs=model.inputs[:, order]).predict(free.start).places
-            if moved_miss(free, other, places) < 0.35 * misses[0]:
+            if _moved_miss(free, other, places) < 0.35 * missed[0]:
                 alike.append(text)
         cause = f"; or exchange {' or '.join(alike[:4])}, which looks the same" if alike else ""
         raise InvalidInput(
             "axes of the data",
-            f"a miss of {1e3 * misses[0]:.3g} mm in the middle, {1e3 * misses[1]:.3g} mm mirrored",
+            f"a miss of {1e3 * missed[0]:.3g} mm in the middle, {1e3 * missed[1]:.3g} mm mirrored",
             "right-handed, as those of the design: exchange two of x, y and z, or turn one over"
             + cause,
         )
-
-
-def _rotation_vector(rotation: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(rotation).as_rotvec()
 
 
 def identifiable(free: FreeNumbers, slopes: Array) -> None:
@@ -189,12 +195,7 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
 
 
 def fitted(
-    model: MarkerModel,
-    places: Array,
-    *,
-    robust: bool,
-    noise: float | None,
-    progress: Progress,
+    model: MarkerModel, places: Array, *, robust: bool, noise: float | None, progress: Progress
 ) -> Fit:
     """The numbers at which predicted places are nearest to measured ones.
 
@@ -209,18 +210,18 @@ def fitted(
     Raises:
         InvalidInput: Numbers that the data cannot tell, or no equilibrium at the start.
     """
-    problem = _Problem(model, places, noise, progress)
+    problem = _Problem(model, places, progress)
     values = np.clip(model.free.start, *problem.bounds)
-    problem.look(values)
+    identifiable(model.free, problem.slopes(values))
     if not np.isfinite(problem.residuals(values)).all():
         raise InvalidInput("arm", "no equilibrium", "one at the start for some sample at least")
     rounds = [None, _ROBUST] if robust else [None]
     converged, count = False, 0
     for width in rounds:
         if width is not None:
-            problem.robust_at(values, width)
+            problem.width = width * robust_width(problem.miss(values))
         if any(number.prior for number in model.free.numbers):
-            problem.weigh_priors(values)
+            problem.unit = noise or robust_width(problem.miss(values))
         result = problem.solved(values, _FINE if width == rounds[-1] else _COARSE)
         values, converged = result.x, bool(result.status > 0)
         count += int(result.nfev)
@@ -243,33 +244,22 @@ def fitted(
 class _Problem:
     """Residuals and their derivatives, the last evaluation kept."""
 
-    def __init__(
-        self, model: MarkerModel, places: Array, noise: float | None, progress: Progress
-    ) -> None:
+    def __init__(self, model: MarkerModel, places: Array, progress: Progress) -> None:
         self.model, self.places, self.progress = model, places, progress
         self.seen = np.asarray(np.isfinite(places).all(axis=2))
-        self.noise = noise
-        self.width: float | None = None
-        self.unit = 1.0  # of priors, in m
+        self.bounds = model.free.bounds
+        self.width: float | None = None  # beyond which residuals count less, in m
+        self.unit = 1.0  # of priors, which count as a coordinate of one width, in m
         self.kept: tuple[bytes, Prediction] | None = None
 
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        return self.model.free.bounds
-
-    def look(self, values: Array) -> None:
-        """Refuse numbers that the data cannot tell."""
-        identifiable(self.model.free, self.slopes(values))
-
     def at(self, values: Array) -> Prediction:
-        """Places and their derivatives; the last ones are kept."""
         key = values.tobytes()
         if self.kept is None or self.kept[0] != key:
             self.kept = (key, self.model.predict(values, slopes=True))
             self.progress(1)
         return self.kept[1]
 
-    def _miss(self, values: Array) -> Array:
+    def miss(self, values: Array) -> Array:
         """Predicted minus measured places that were seen [m]."""
         return (self.at(values).places - self.places)[self.seen]
 
@@ -277,14 +267,13 @@ class _Problem:
         """Of all that was seen [m], then of the priors."""
         free = self.model.free
         try:
-            miss = self._miss(values)
+            miss = self.miss(values)
         except InvalidDesign:
             return np.full(3 * int(self.seen.sum()) + self._priors(values)[0].size, _FAR)
         miss = np.where(np.isfinite(miss), miss, _FAR * 0.1 * free.arm.length)
         return np.concatenate([miss.ravel(), self._priors(values)[0]])
 
     def slopes(self, values: Array) -> Array:
-        """Derivatives of the residuals."""
         prediction = self.at(values)
         assert prediction.slopes is not None
         slopes = prediction.slopes[self.seen].reshape(-1, len(self.model.free))
@@ -301,18 +290,7 @@ class _Problem:
             slopes[row, k] = self.unit / width
         return rows, slopes
 
-    def robust_at(self, values: Array, widths: float) -> None:
-        """From here on residuals beyond so many widths count less."""
-        miss = self._miss(values)
-        self.width = widths * robust_width(miss)
-
-    def weigh_priors(self, values: Array) -> None:
-        """Priors count as much as a coordinate of one width."""
-        miss = self._miss(values)
-        self.unit = self.noise or robust_width(miss)
-
     def solved(self, values: Array, fine: float) -> Any:
-        """The end of SciPy's trust region, from these values."""
         from scipy.optimize import least_squares
 
         return least_squares(
@@ -361,3 +339,63 @@ def robust_width(miss: Array) -> float:
     distance = np.linalg.norm(miss, axis=-1)
     known = distance[np.isfinite(distance)]
     return max(float(np.median(known)) / 1.5382 if known.size else 0.0, 1e-9)  # χ of 3 degrees
+
+
+def exchanged_columns(
+    fit: Fit,
+    model: MarkerModel,
+    places: Array,
+    *,
+    robust: bool,
+    noise: float | None,
+    progress: Progress,
+) -> tuple[str, float] | None:
+    """The exchange of two columns that halves the error of a fit at least, and its error, rms [m].
+
+    Arguments are those of `fitted` and the fit with the columns as they are.
+    """
+    some = slice(None, None, -(-len(places) // _SAMPLES))
+    few, seen = replace(model, inputs=model.inputs[some]), places[some]
+    least, best = _BETTER * misses(fit.residuals).rms, None
+    for values in (model.free.start, fit.values):
+        own = few.predict(values).places
+        each = {text: (order, None) for text, order in exchanged_inputs(model.free.arm)}
+        each |= {text: (None, order) for text, order in _coordinates(model.names)}
+        found = {}
+        for text, (inputs, columns) in each.items():
+            other = few if inputs is None else replace(few, inputs=few.inputs[:, inputs])
+            predicted = own if inputs is None else other.predict(values).places
+            found[text] = _moved_miss(model.free, predicted, _ordered(seen, columns))
+        first = min(found, key=found.__getitem__)
+        if found[first] > _PROMISING * _moved_miss(model.free, own, seen):
+            continue
+        alike = [text for text, miss in found.items() if miss <= _ALIKE * found[first]]
+        inputs, columns = each[first]
+        other = model if inputs is None else replace(model, inputs=model.inputs[:, inputs])
+        moved = _ordered(places, columns)
+        try:
+            other = replace(other, free=started(other, moved))
+            again = fitted(other, moved, robust=robust, noise=noise, progress=progress)
+        except InvalidInput:
+            continue
+        if (error := misses(again.residuals).rms) < least:
+            least, best = error, (" or ".join(alike[:4]), error)
+    return best
+
+
+def _coordinates(names: tuple[str, ...]) -> Iterator[tuple[str, list[int]]]:
+    """Orders of the coordinates of all markers with two axes, or two columns, exchanged."""
+    columns = [f"{name} {axis}" for name in names for axis in "xyz"]
+    for a, b in combinations(range(3), 2):
+        turned = {a: b, b: a}
+        order = [k - k % 3 + turned.get(k % 3, k % 3) for k in range(len(columns))]
+        yield f"the axes {'xyz'[a]} and {'xyz'[b]}", order
+    for j, k in combinations(range(len(columns)) if len(names) > 1 else (), 2):
+        order = list(range(len(columns)))
+        order[j], order[k] = k, j
+        yield f"the columns {columns[j]} and {columns[k]}", order
+
+
+def _ordered(places: Array, order: list[int] | None) -> Array:
+    rows = places.reshape(len(places), -1)
+    return places if order is None else rows[:, order].reshape(places.shape)

@@ -103,15 +103,11 @@ class FreeNumbers:
                 pose[number.name] = value
             else:
                 paths |= dict.fromkeys(_tied(number.name), value)
-        arm = self._changed(paths)
-        return arm.replace(base=_moved(arm.base, pose)) if pose else arm
-
-    def _changed(self, values: Mapping[str, float]) -> Manipulator:
-        """As `changed`, with parameters that were found before."""
         draft = Draft(self.arm)
         for name, parameter in self._parameters.items():
-            parameter.change(draft, values[name])
-        return draft.made() if values else self.arm
+            parameter.change(draft, paths[name])
+        arm = draft.made() if paths else self.arm
+        return arm.replace(base=_moved(arm.base, pose)) if pose else arm
 
     @cached_property
     def _parameters(self) -> dict[str, Parameter]:
@@ -157,11 +153,9 @@ class FreeNumbers:
 
     def started_at(self, values: Mapping[str, float]) -> FreeNumbers:
         """The same with other values to start from."""
-        numbers = tuple(
-            replace(number, start=float(values.get(number.name, number.start)))
-            for number in self.numbers
-        )
-        return replace(self, numbers=numbers)
+        starts = [float(values.get(number.name, number.start)) for number in self.numbers]
+        pairs = zip(self.numbers, starts, strict=True)
+        return replace(self, numbers=tuple(replace(n, start=start) for n, start in pairs))
 
 
 def free_numbers(
@@ -271,12 +265,8 @@ def _of_parameters(arm: Manipulator, name: str, paths: tuple[str, ...]) -> FreeN
 def _typical(arm: Manipulator, unit: str) -> float:
     """A size of numbers in a unit, for those that are zero."""
     radius = float(arm.profile.radius(0.0))
-    pulls = [
-        abs(bound)
-        for bounds, own in zip(arm.bounds, arm.bundle_units, strict=True)
-        if own == unit
-        for bound in bounds
-    ]
+    pairs = zip(arm.bounds, arm.bundle_units, strict=True)
+    pulls = [abs(bound) for bounds, own in pairs if own == unit for bound in bounds]
     lengths = {"m": radius, "1/m": 1.0 / arm.length, "rad": 1.0, "kg": 0.01, "kg/m³": 1000.0}
     return lengths.get(unit, max([*pulls, 1e-3]) if unit in ("N", "Pa") else 1.0)
 

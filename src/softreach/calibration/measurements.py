@@ -207,7 +207,6 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
 
 
 def _table(data: Any) -> tuple[pd.DataFrame, str]:
-    """The data as a table, and a name for it."""
     import pandas as pd
 
     if isinstance(data, pd.DataFrame):
@@ -220,15 +219,11 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
         except ValueError as error:
             raise InvalidInput("data", str(error), "columns of one length") from None
     if isinstance(data, str | PathLike):
-        return _read(Path(data))
+        path = Path(data)
+        if not path.is_file():
+            raise InvalidInput("data", str(path), "a file that exists")
+        return read_table(path, str(path)), path.name
     raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
-
-
-def _read(path: Path) -> tuple[pd.DataFrame, str]:
-    """The table of a file, and its name."""
-    if not path.is_file():
-        raise InvalidInput("data", str(path), "a file that exists")
-    return read_table(path, str(path)), path.name
 
 
 def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
@@ -313,9 +308,8 @@ def _refuse_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> N
         row, k = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
         name, reached = columns[own[k]], f"{values[row, own[k]]:.4g} {unit}"
         if size.max() > _HARD * bound:
-            allowed = (
-                f"near the bounds of the design, {bound:.4g} {unit}: look at the column's unit"
-            )
+            allowed = f"near the bounds of the design, {bound:.4g} {unit}"
+            allowed += ": look at the column's unit"
             raise InvalidInput(f"{name} in row {row}", reached, allowed)
         for j in own:
             actuator = None if bundles[j] is None else arm.bundle_actuators[bundles[j]]
@@ -355,21 +349,17 @@ def _triples(columns: list[str], taken: set[str | None]) -> dict[str, list[str]]
             found.setdefault(start, {})[match["axis"].lower()] = column
     for start, axes in found.items():
         if lacking := [axis for axis in "xyz" if axis not in axes]:
-            what = f"columns of {start or 'the place'}"
-            raise InvalidInput(
-                what, ", ".join(axes.values()), f"x, y and z: {lacking[0]} is missing"
-            )
+            what, given = f"columns of {start or 'the place'}", ", ".join(axes.values())
+            raise InvalidInput(what, given, f"x, y and z: {lacking[0]} is missing")
     if not found:
-        raise InvalidInput(
-            "places of markers", "none", "columns such as x_mm, y_mm, z_mm or marker1_x_mm"
-        )
+        allowed = "columns such as x_mm, y_mm, z_mm or marker1_x_mm"
+        raise InvalidInput("places of markers", "none", allowed)
     return {start: [axes[axis] for axis in "xyz"] for start, axes in found.items()}
 
 
 def _chosen_markers(
     arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
 ) -> dict[str, str]:
-    """Start of the columns of each marker of the arm."""
     names = [marker.name for marker in arm.markers] or ["tip"]
     chosen: dict[str, str] = {}
     for name, start in given.items():
@@ -395,7 +385,7 @@ def _simple(name: str) -> str:
 
 
 def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:
-    """Column of each input of the arm; "" for one that stays at zero."""
+    """Column of each input; "" for one that stays at zero."""
     chosen: dict[str, str] = {}
     for name, column in given.items():
         if name not in arm.input_names:
@@ -414,10 +404,8 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
         wanting = [name for name in left if units[name] == unit]
         free = [c for c in columns if c not in chosen.values() and _fits(c, unit)]
         if len(free) != len(wanting):
-            have = ", ".join(free) or "none"
-            allowed = (
-                f"{counted(len(wanting), 'column')} in {_unit_text(unit)} for {', '.join(wanting)}"
-            )
+            have, several = ", ".join(free) or "none", counted(len(wanting), "column")
+            allowed = f"{several} in {_unit_text(unit)} for {', '.join(wanting)}"
             raise InvalidInput("inputs of the data", have, allowed, "name them by `inputs`")
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]

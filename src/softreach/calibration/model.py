@@ -47,16 +47,7 @@ _BLOCK = 1024
 """Samples at once: their shapes at all nodes are kept."""
 _TOL = 1e-6
 _STEPS = 24
-_BODY = (
-    "profile",
-    "section",
-    "actuators",
-    "loads",
-    "rest",
-    "stations",
-    "rigid_pieces",
-    "markers",
-)
+_BODY = ("profile", "section", "actuators", "loads", "rest", "stations", "rigid_pieces", "markers")
 """Parts of an arm that are more than its drives and the pose of its base."""
 _ENDS = ("start", "end", "stations.")
 """In names of numbers that move ends of actuators."""
@@ -151,10 +142,15 @@ class MarkerModel:
 
     def of_arm(self, arm: Manipulator, values: Array | None = None) -> Prediction:
         """Places of the markers of an arm that has these values."""
-        grid = self._grid(arm)
+        free, stations = self.free, marker_stations(arm)[0][self.markers]
+        moving = any(word in name for name in free.names for word in _ENDS)
+        grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors: list[list[tuple[float, Manipulator | Base]]] = []
         if values is not None:
-            neighbors = [self._neighbors(values, k) for k in range(len(self.free))]
+            neighbors = [
+                [*(free.base_neighbors if free.moves_base(k) else free.neighbors)(values, k)]
+                for k in range(len(free))
+            ]
         blocks = [
             self._block(arm, neighbors, grid, rows, values is not None)
             for rows in parallel.blocks(len(self.inputs), _BLOCK)
@@ -165,16 +161,6 @@ class MarkerModel:
             None if values is None else np.concatenate([s for s in slopes if s is not None]),
             np.concatenate(status),
         )
-
-    def _neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator | Base]]:
-        if self.free.moves_base(k):
-            return [*self.free.base_neighbors(values, k)]
-        return [*self.free.neighbors(values, k)]
-
-    def _grid(self, arm: Manipulator) -> StepGrid:
-        stations, _ = marker_stations(arm)
-        moving = any(word in name for name in self.free.names for word in _ENDS)
-        return step_grid(body_of(arm), stations[self.markers], _STEPS, moving_ends=moving)
 
     def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm)
@@ -233,7 +219,8 @@ class MarkerModel:
         known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
         changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
         result = np.full((*places.shape, len(changes)), np.nan)
-        result[known] = _slopes(rod.arm, at, _some(state, known), changes, known)
+        some = RodState(*(getattr(state, name)[known] for name in RodState.__dataclass_fields__))
+        result[known] = _slopes(rod.arm, at, some, changes, known)
         return places, result, state.status
 
     def _change(
@@ -288,11 +275,6 @@ def _activations(arm: Manipulator, rod: ArmRod, bundles: Array) -> Array:
         return bundles
     lengths = law if arm.loads is None else LoadedLengths(law, rod)
     return law.inner(bundles, lengths.tensions(bundles).tension)
-
-
-def _some(state: RodState, rows: NDArray[np.bool_]) -> RodState:
-    values = (getattr(state, name)[rows] for name in RodState.__dataclass_fields__)
-    return RodState(*values)
 
 
 def _places(at: _Explicit, state: RodState) -> Array:

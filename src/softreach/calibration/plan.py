@@ -20,9 +20,8 @@ from softreach.sampling import sample_cube
 from softreach.support.arguments import as_flag, as_integer, as_names, as_number, as_path
 from softreach.support.errors import InvalidInput, Range, did_you_mean
 from softreach.support.files.atomic import writing
-from softreach.support.files.formats import FileFormat, Formats
 
-__all__ = ["PLAN", "PosePlan", "plan_poses"]
+__all__ = ["PosePlan", "plan_poses"]
 
 Array = NDArray[np.float64]
 
@@ -271,7 +270,3 @@ def _gains(slopes: Array, total: Array) -> Array:
     half = np.linalg.cholesky(np.linalg.inv(0.5 * (total + total.T)))
     along = slopes @ half
     return np.linalg.slogdet(np.eye(slopes.shape[1]) + along @ along.transpose(0, 2, 1))[1]
-
-
-PLAN: Formats = {".csv": FileFormat()}
-"""Formats of plans."""

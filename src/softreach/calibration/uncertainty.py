@@ -134,7 +134,8 @@ def _sandwich(
         inverse: Of the sum of squares of all rows.
     """
     count = rows.shape[2]
-    half, meat = _root(inverse), np.zeros((count, count))
+    values, axes = np.linalg.eigh(inverse)
+    half, meat = axes * np.sqrt(np.maximum(values, 0.0)), np.zeros((count, count))
     squares, total, mixed = np.zeros((3, count))
     spread = np.zeros((count, count, count))
     order = np.argsort(keys, kind="stable")
@@ -156,11 +157,6 @@ def _sandwich(
     variance = squares - 2.0 * mixed + np.einsum("cpq,cqp->c", product, product)
     freedom = np.maximum((total - lost) ** 2 / np.maximum(variance, 1e-300), 1.0)
     return meat, freedom, total - lost
-
-
-def _root(matrix: Array) -> Array:
-    values, axes = np.linalg.eigh(matrix)
-    return axes * np.sqrt(np.maximum(values, 0.0))
 
 
 def _without_leverage(half: Array, left: Array) -> Array:

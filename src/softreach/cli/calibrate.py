@@ -122,16 +122,16 @@ def calibrate(
     """
     from softreach import calibration
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.calibration.html_report import REPORT
     from softreach.calibration.report import summary_text
-    from softreach.calibration.residual_table import TABLE
     from softreach.support import progress
+    from softreach.support.files.formats import TABLES
+    from softreach.support.report import REPORT
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     if out is None and report is None and table is None:
         refuse("left out where no file is written: give --out too", overwrite=overwrite)
-    for path, formats in ((out, DESIGN_FILE), (report, REPORT), (table, TABLE)):
+    for path, formats in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)):
         if path is not None:
             check_output(path, formats, overwrite)
     with progress.bar("fitting", None) as step:

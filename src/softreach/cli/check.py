@@ -40,8 +40,7 @@ def check(
     changes: Changes = UNCHANGED,
     out: Annotated[Path | None, out_option("Draw the arm at the places (.png .pdf .svg).")] = None,
     view: Annotated[
-        str | None,
-        Parameter(group=OUTPUT, help="oblique (if left out), front, side or top."),
+        str | None, Parameter(group=OUTPUT, help="oblique (if left out), front, side or top.")
     ] = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
@@ -90,7 +89,6 @@ def finding_record(finding: Finding) -> dict[str, object]:
 
 
 def _record(result: Check, lengths: Lengths) -> dict[str, object]:
-    """The result for machines."""
     return {
         "met": result.met,
         "verdict": result.verdict,

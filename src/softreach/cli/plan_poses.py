@@ -47,14 +47,14 @@ def plan_poses(
     Example: softreach plan-poses arm.toml --free pose --free "rings*modulus" -o poses.csv
     """
     from softreach import calibration
-    from softreach.calibration.plan import PLAN
     from softreach.calibration.report import sigma_rows
+    from softreach.support.files.formats import TABLES
     from softreach.support.quantity import columns
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     width = read_noise(noise)
-    check_output(out, PLAN, overwrite)
+    check_output(out, TABLES, overwrite)
     plan = calibration.plan_poses(
         arm,
         free_names(arm, free),

@@ -95,15 +95,11 @@ def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     from softreach.support.files.formats import PAGES, PICTURES, check_installed
 
     formats = {**SURFACE_FILES, **PICTURES, **PAGES}
-    needed = [
-        (library, known.extra)
-        for path in outs
-        if (known := formats.get(path.suffix.lower()))
-        for library in known.libraries
-    ]
-    if any(path.suffix.lower() in SURFACE_FILES for path in outs):
-        needed.append(("skimage", "surface"))
-    check_installed(*needed)
+    suffixes = [path.suffix.lower() for path in outs]
+    known = [formats[suffix] for suffix in suffixes if suffix in formats]
+    needed = [(library, each.extra) for each in known for library in each.libraries]
+    has_surface = any(suffix in SURFACE_FILES for suffix in suffixes)
+    check_installed(*needed, *[("skimage", "surface")] * has_surface)
     free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:
         check_output(path, formats, overwrite)

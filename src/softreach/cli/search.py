@@ -74,8 +74,7 @@ def search(
         Parameter(group=_ASKED, help="Relative error of volumes: 3e-3 if left out everywhere."),
     ] = None,
     sampler: Annotated[
-        str | None,
-        Parameter(group=_ASKED, help="auto, cma, tpe, nsga2, nsga3, sobol or random."),
+        str | None, Parameter(group=_ASKED, help="auto, cma, tpe, nsga2, nsga3, sobol or random.")
     ] = None,
     polish: Annotated[
         bool | None,
@@ -153,8 +152,6 @@ def search(
 
 
 class _Watch:
-    """The best so far, beside the progress."""
-
     def __init__(self, options: Mapping[str, Any]) -> None:
         self.total = options.get("designs", 200)
         self._up, self._down = options["maximize"], options["minimize"]
@@ -162,7 +159,6 @@ class _Watch:
         self._met = 0
 
     def __call__(self, candidate: Candidate) -> None:
-        """See a design that was judged."""
         self._met += candidate.is_feasible
         if self._best is None or self._place(candidate) < self._place(self._best):
             self._best = candidate

@@ -104,11 +104,7 @@ def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
         status += f" within {lengths.text(solution.gap, '.4g')}"
     console.line(f"target {lengths.place(solution.target)}: {status}")
     rows = zip(
-        solution.activations,
-        solution.residuals,
-        solution.conditions,
-        solution.margins,
-        strict=True,
+        solution.activations, solution.residuals, solution.conditions, solution.margins, strict=True
     )
     for gamma, residual, condition, margin in rows:
         apart = lengths.text(residual, ".1e")

@@ -42,7 +42,6 @@ class _Followed(NamedTuple):
 
     @classmethod
     def of(cls, first: FirstOrder, seed: int) -> _Followed:
-        """Places, evenly spread in each part."""
         solid, boundary = first.solid, first.boundary
         low, high = boundary.places.min(axis=0), boundary.places.max(axis=0)
         pool = low + (high - low) * sample_cube("sobol", _POOL, 3, seed)
@@ -69,8 +68,6 @@ class _Followed(NamedTuple):
 
 
 class _Made(NamedTuple):
-    """Numbers of an arm that was made."""
-
     kept: float
     volume: float
     unreachability: float

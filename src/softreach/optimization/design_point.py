@@ -27,8 +27,8 @@ from softreach.workspace.tip_derivatives import TipDerivatives
 __all__ = ["OF_ARM", "STEP", "DesignPoint"]
 
 OF_ARM: dict[str, Callable[[Manipulator], float]] = {
-    "mass": lambda arm: mass(arm) or 0.0,
-    "load_number": lambda arm: load_number(arm) or 0.0,
+    "mass": mass,
+    "load_number": load_number,
     "actuators": lambda arm: float(arm.inputs),
 }
 _TOL = 1e-7  # of tips at the targets, in L
@@ -137,8 +137,7 @@ class DesignPoint:
     def arm_slope(self, name: str) -> Array:
         """Its derivatives by differences."""
         of = OF_ARM[name]
-        slopes = [(of(ahead) - of(behind)) / step for step, ahead, behind in self.neighbors]
-        return np.array(slopes)
+        return np.array([(of(up) - of(down)) / step for step, up, down in self.neighbors])
 
     @lazy
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:

@@ -18,14 +18,7 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import quantity
 
-__all__ = [
-    "NORMAL",
-    "QUANTILE",
-    "Deviations",
-    "Spread",
-    "deviations_of",
-    "probabilities",
-]
+__all__ = ["NORMAL", "QUANTILE", "Deviations", "Spread", "deviations_of", "probabilities"]
 
 QUANTILE = 0.05
 """Share of arms that are worse than the number given for them."""

@@ -126,17 +126,20 @@ class FreeParameters:
         Raises:
             InvalidDesign: No such arm can exist, or some activation would shorten it to nothing.
         """
-        arm = self.bases[str(values[DESIGN])] if DESIGN in values else self._only
+        arm = (
+            self.bases[str(values[DESIGN])] if DESIGN in values else next(iter(self.bases.values()))
+        )
         for name, make in _CHOICES.items():
             if name in values:
                 arm = make(arm, values[name])
         numbers = {name: value for name, value in values.items() if name not in _WORDS}
         for tie in self.ties:
             numbers[tie.name] = tie.factor * float(numbers[tie.of]) + tie.constant
+        whole = {parameter.name for parameter in self.free if parameter.whole}
         varies = DESIGN in values or BUNDLES in values
         known = parameters_by_every_name(arm) if varies else numbers
         numbers = {
-            name: int(value) if name in self._whole else float(value)
+            name: int(value) if name in whole else float(value)
             for name, value in numbers.items()
             if name in known  # else of another base, or of another number of bundles
         }
@@ -169,14 +172,6 @@ class FreeParameters:
             else:
                 values[parameter.name] = float(np.clip(value, parameter.low, parameter.high))
         return values
-
-    @property
-    def _only(self) -> Manipulator:
-        return next(iter(self.bases.values()))
-
-    @lazy
-    def _whole(self) -> frozenset[str]:
-        return frozenset(parameter.name for parameter in self.free if parameter.whole)
 
 
 def free_parameters(
@@ -319,7 +314,6 @@ def _with_bundles(arm: Manipulator, count: Any) -> Manipulator:
 
 
 def _of_material(arm: Manipulator, name: Any) -> Manipulator:
-    """The arm made of one material."""
     material, section = named_material(name), arm.section
     rings = tuple(ring.replace(material=material) for ring in section.rings)
     return arm.replace(section=section.replace(rings=rings, core=None))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from softreach.arm.load_number import mass
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric
@@ -17,6 +18,7 @@ from softreach.atlas.metrics import known_metric
 from softreach.requirements.checks import Check, Sets, checked, quick_check, sets_to
 from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_given, as_names
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, did_you_mean, no_warnings
 from softreach.support.lazy import lazy
 
@@ -160,7 +162,9 @@ def goals(
     """
     result = []
     for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
-        several = [given] if isinstance(given, Metric) else _each(word, given)
+        several = [given] if isinstance(given, Metric) else given
+        if not (isinstance(several, list | tuple) and any(isinstance(x, Metric) for x in several)):
+            several = as_names(word, several)
         result += [Goal(known_objective(word, each), sense) for each in several]
     names = [goal.name for goal in result]
     if twice := [name for name in names if names.count(name) > 1]:
@@ -174,12 +178,6 @@ def goals(
             allowed = f"asked with {goal.objective.asks} among the requirements"
             raise InvalidInput("objective", goal.name, allowed)
     return tuple(result)
-
-
-def _each(word: str, given: Any) -> Sequence[str | Metric]:
-    if isinstance(given, list | tuple) and any(isinstance(each, Metric) for each in given):
-        return given
-    return as_names(word, given)
 
 
 def known_objective(word: str, given: str | Metric) -> Objective:
@@ -210,16 +208,8 @@ def _metric(metric: Metric, case: DesignCase) -> Value:
     return Value(case.metric(metric))
 
 
-def _volume(case: DesignCase) -> Value:
-    return Value(case.reached.volume, case.reached.volume_error)
-
-
-def _convex_volume(case: DesignCase) -> Value:
-    return Value(case.reached.convex_volume, case.reached.convex_volume_error)
-
-
-def _unreachability(case: DesignCase) -> Value:
-    return Value(case.reached.unreachability, case.reached.unreachability_error)
+def _of_set(name: str, case: DesignCase) -> Value:
+    return Value(getattr(case.reached, name), getattr(case.reached, f"{name}_error"))
 
 
 def _coverage(case: DesignCase) -> Value:
@@ -228,12 +218,8 @@ def _coverage(case: DesignCase) -> Value:
     return Value(float(np.mean(shares)), float(np.mean([each.error for each in covered])))
 
 
-def _mean_effort(case: DesignCase) -> Value:
-    return Value(float(np.mean(case.check.effort)), 0.0)
-
-
-def _worst_effort(case: DesignCase) -> Value:
-    return Value(float(np.max(case.check.effort)), 0.0)
+def _effort(total: Callable[[Array], float], case: DesignCase) -> Value:
+    return Value(float(total(case.check.effort)), 0.0)
 
 
 def _sampled(values: Any) -> Value:
@@ -280,10 +266,7 @@ def _payload(case: DesignCase) -> Value:
 
 
 def _mass(case: DesignCase) -> Value:
-    from softreach.arm.load_number import mass
-
-    value = mass(case.arm)
-    return Value(math.nan if value is None else value, 0.0)
+    return Value(mass(case.arm), 0.0)
 
 
 def _actuators(case: DesignCase) -> Value:
@@ -291,12 +274,33 @@ def _actuators(case: DesignCase) -> Value:
 
 
 _ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value], str, bool], ...] = (
-    ("exact_volume", "m3", "volume of the reachable set", _volume, "", True),
-    ("exact_convex_volume", "m3", "volume of its convex hull", _convex_volume, "", True),
-    ("exact_unreachability", "1", "1 - volume / convex volume", _unreachability, "", True),
+    ("exact_volume", "m3", "volume of the reachable set", partial(_of_set, "volume"), "", True),
+    (
+        "exact_convex_volume",
+        "m3",
+        "volume of its convex hull",
+        partial(_of_set, "convex_volume"),
+        "",
+        True,
+    ),
+    (
+        "exact_unreachability",
+        "1",
+        "1 - volume / convex volume",
+        partial(_of_set, "unreachability"),
+        "",
+        True,
+    ),
     ("coverage", "1", "mean share of the regions that is reached", _coverage, "regions", True),
-    ("mean_effort", "1", "mean effort at the targets", _mean_effort, "targets", True),
-    ("worst_effort", "1", "largest effort at the targets", _worst_effort, "targets", True),
+    ("mean_effort", "1", "mean effort at the targets", partial(_effort, np.mean), "targets", True),
+    (
+        "worst_effort",
+        "1",
+        "largest effort at the targets",
+        partial(_effort, np.max),
+        "targets",
+        True,
+    ),
     ("manipulability", "m3", "mean √det(J Jᵀ) over the box", _manipulability, "", False),
     ("dexterity", "1", "mean of 1 / condition of J over the box", _inverse_condition, "", False),
     ("activation_distance", "1", "mean D̄ within L/10", _activation_distance, "", False),

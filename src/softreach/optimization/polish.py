@@ -186,7 +186,6 @@ class _Program:
         return _TOLERANCE * self._accuracy * _GENTLE
 
     def values_of(self, unknowns: Array) -> Values:
-        """Free parameters of unknowns."""
         parameters = self._problem.parameters
         low, high = parameters.bounds.T
         reals = low + unknowns[: len(low)] * (high - low)
@@ -198,9 +197,8 @@ class _Program:
         if key not in self._points:
             count = len(self._problem.parameters.real)
             reals, poses = unknowns[:count].copy(), unknowns[count:].reshape(self._shape).copy()
-            design = next(
-                (p.design for p in self._points.values() if (p.reals == reals).all()), None
-            )
+            alike = (p.design for p in self._points.values() if (p.reals == reals).all())
+            design = next(alike, None)
             if design is None:
                 # one is left for the design that it ends with
                 if self.designs >= self._most - 1 and len(self.accepted):
@@ -222,7 +220,6 @@ class _Program:
         return cost if math.isfinite(cost) else _WORSE
 
     def cost_slope(self, unknowns: Array) -> Array:
-        """Its derivatives."""
         self.accepted = unknowns.copy()
         try:
             return np.nan_to_num(self.point(unknowns).cost_slope / self._scale)

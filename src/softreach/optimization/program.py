@@ -120,7 +120,7 @@ class Point:
         for number, (rod, cube) in enumerate(self._by_payload()):
             tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
             gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
-            slopes = lazily(partial(self._tip_slopes, number))
+            slopes = cache(partial(self._tip_slopes, number))
             for k, gap in enumerate(gaps):
                 slope = partial(_row, slopes, k)
                 near = within[k] / rod.length
@@ -155,7 +155,6 @@ class Point:
         return first + np.arange(places * free).reshape(places, free).T
 
     def _rules(self) -> Iterator[Part]:
-        """Regions to keep to and limits of poses."""
         needs = self.design.problem.requirements
         keeps = [keep for keep in needs.keeps if keep.when == "targets"]
 
@@ -170,7 +169,7 @@ class Point:
             if not len(rules):
                 return
             value = _room(rules, cube)
-            slopes = lazily(partial(self._rule_slopes, rules_of, number, value))
+            slopes = cache(partial(self._rule_slopes, rules_of, number, value))
             scales = [(keep.name, rules.arm.length, "m") for keep in keeps]
             scales += [(name, most or 1.0, "") for name, most in rules.limits.items()]
             for column, (name, scale, unit) in enumerate(scales):
@@ -225,12 +224,7 @@ class Point:
                 yield self._limit(name, 1.0, value, most, partial(self.design.arm_slope, name))
 
     def _limit(
-        self,
-        name: str,
-        sense: float,
-        value: float,
-        limit: float,
-        derived: Callable[[], Array],
+        self, name: str, sense: float, value: float, limit: float, derived: Callable[[], Array]
     ) -> Part:
         """Room below a limit (sense 1) or above it (-1), relative."""
         scale = abs(limit) or 1.0
@@ -304,11 +298,6 @@ def _row(slopes: Callable[[], Array], k: int) -> Array:
 
 def _column(slopes: Callable[[], Array], k: int) -> Array:
     return slopes()[:, k]
-
-
-def lazily(make: Callable[[], Array]) -> Callable[[], Array]:
-    """A function that calls another once."""
-    return cache(make)
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from softreach.optimization.free_parameters import FreeParameter
 from softreach.optimization.objectives import Goal, Value
-from softreach.optimization.problem import NEAR, Candidate
+from softreach.optimization.problem import NEAR
 from softreach.support.errors import counted
 from softreach.support.quantity import columns, quantity
 from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
@@ -130,15 +130,11 @@ def front_rows(search: Search, unit: LengthUnit) -> Iterator[Sequence[str]]:
     free = search.problem.parameters.free
     yield ("front", *map(goal_text, search.goals), *(parameter.name for parameter in free))
     for number, each in enumerate(search.front, 1):
-        yield (str(number), *_cells(search, each, unit))
-
-
-def _cells(search: Search, each: Candidate, unit: LengthUnit) -> Iterator[str]:
-    values = each.objectives or [Value(math.nan)] * len(search.goals)
-    for goal, value in zip(search.goals, values, strict=True):
-        yield value_text(goal, value, unit)
-    for parameter in search.problem.parameters.free:
-        yield number_text(parameter, each.values[parameter.name], unit)
+        values = each.objectives or [Value(math.nan)] * len(search.goals)
+        pairs = zip(search.goals, values, strict=True)
+        cells = [value_text(goal, value, unit) for goal, value in pairs]
+        cells += [number_text(parameter, each.values[parameter.name], unit) for parameter in free]
+        yield (str(number), *cells)
 
 
 def missed_text(search: Search) -> Iterator[str]:
@@ -161,11 +157,7 @@ def remarks(search: Search) -> Iterator[str]:
     ways.append(f"{judged['full']} to full accuracy ({problem.accuracy:g})")
     shown = "; numbers shown are of full accuracy" if search.best.fidelity == "full" else ""
     yield f"judged: {', '.join(ways)}{shown}"
-    yield from _how_sure(search)
-
-
-def _how_sure(search: Search) -> Iterator[str]:
-    """Agreement of polishes from designs apart, whose spread is that of searches by other seeds."""
+    # Agreement of polishes from designs apart, whose spread is that of searches by other seeds.
     count, near = search.restarts
     if search.goals and search.best.is_feasible:
         text = (

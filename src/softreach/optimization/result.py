@@ -172,7 +172,7 @@ class Search:
                 "objective_error": (("design", "objective"), numbers[..., 1]),
                 "excess": ("design", [each.excess for each in every], {"units": "1"}),
                 "feasible": ("design", [each.is_feasible for each in every]),
-                "front": ("design", self._is_front(every)),
+                "front": ("design", [any(each is one for one in self.front) for each in every]),
                 "fidelity": ("design", np.array([each.fidelity for each in every], dtype=str)),
                 "looked_at": ("design", [*looked_at, *[self.designs] * len(self.finalists)]),
                 "coarse_design": ("design", coarse),
@@ -190,9 +190,6 @@ class Search:
             },
             {**self.attributes, **self.provenance, "finalists": len(self.finalists)},
         )
-
-    def _is_front(self, every: Sequence[Candidate]) -> list[bool]:
-        return [any(each is one for one in self.front) for each in every]
 
     @property
     def attributes(self) -> dict[str, object]:
@@ -259,7 +256,7 @@ class Search:
         Raises:
             MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        from softreach.optimization.html_report import write_report
+        from softreach.optimization.folder import write_report
 
         write_report(self, path, unit, overwrite=overwrite)
 

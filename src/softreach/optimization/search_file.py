@@ -15,11 +15,7 @@ from softreach.arm.parameters import Parameter
 from softreach.arm.parameters.changes import unknown_parameter
 from softreach.arm.parameters.shown import from_written, written_name
 from softreach.atlas.space_file import flat_keys
-from softreach.optimization.free_parameters import (
-    NAMED_CHOICES,
-    free_parameters,
-    known_parameters,
-)
+from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.objectives import goals, known_objective
 from softreach.optimization.study import SAMPLERS
 from softreach.requirements.requirements import Requirements
@@ -209,7 +205,6 @@ class _Reader:
                 self._tried(path, value, partial(free_parameters, dict(bases), tied, choices))
 
     def options(self, needs: Requirements | None) -> dict[str, Any]:
-        """Objectives and numbers of the search."""
         options: dict[str, Any] = {word: self._objectives(word) for word in _SENSES}
         for name, convert in _OPTIONS.items():
             path, value = self._value(name)

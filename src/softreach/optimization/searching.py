@@ -202,7 +202,6 @@ class _Run:
         return not self.problem.goals and any(each.is_feasible for each in known)
 
     def _sample(self, study: Study, count: int) -> None:
-        """Designs of the sampler."""
         while count > 0:
             asked = study.ask(min(_BATCH, count))
             count -= len(asked)

@@ -126,7 +126,7 @@ class Sensitivity:
             for name, unit, value, error in zip(
                 self.reals, self.units, self.gradient[k], self.gradient_error[k], strict=True
             ):
-                per = f"{_shown(self.goal_units[k])}/{unit if unit != '1' else '1'}"
+                per = f"{self.goal_units[k].replace('m3', 'm³')}/{unit if unit != '1' else '1'}"
                 if np.isfinite(value):
                     lines.append(f"  by {name}: {quantity(value, per, error)}")
             if (share := self.variance[k]) is not None:
@@ -143,10 +143,6 @@ class Sensitivity:
         if np.isfinite(self.residual):
             lines.append(f"not explained by requirements: {100 * self.residual:.2g} % of the slope")
         return "\n  ".join(lines)
-
-
-def _shown(unit: str) -> str:
-    return unit.replace("m3", "m³")
 
 
 def sensitivity(
@@ -284,7 +280,6 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
 
 
 def _rooms(point: Point) -> list[_Condition]:
-    """Requirements that have no room left."""
     return [
         _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
         for part in point.rooms

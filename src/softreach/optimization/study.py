@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -61,6 +61,7 @@ class Study:
         self.seed = seed
         self._judged: dict[int, Candidate] = {}  # by the number of its trial
         self._optuna = _library()
+        self._complete = (self._optuna.trial.TrialState.COMPLETE,)
         with _quiet():
             self._study = self._opened(storage)
             self._begin(storage)
@@ -122,10 +123,6 @@ class Study:
                 warn_independent_sampling=False,
             )
 
-    @property
-    def _complete(self) -> tuple[Any, ...]:
-        return (self._optuna.trial.TrialState.COMPLETE,)
-
     def _opened(self, storage: str | None) -> optuna.Study:
         optuna, place = self._optuna, None if storage is None else as_path("storage", storage)
         try:
@@ -158,7 +155,9 @@ class Study:
         if known:  # else another process would draw the same designs
             self._study.sampler = self._made_sampler(self.seed + len(known))
         names = self.problem.parameters.names
-        asked = {_values_of(trial, names) for trial in known}
+        planned = [trial.system_attrs.get("fixed_params", {}) for trial in known]
+        each = [trial.params or plan for trial, plan in zip(known, planned, strict=True)]
+        asked = {tuple(values.get(name) for name in names) for values in each}
         for values in first_designs(self.problem, self._first, self.seed):
             if tuple(values[name] for name in names) not in asked:
                 self._study.enqueue_trial(dict(values))
@@ -205,12 +204,6 @@ class Study:
         if candidate.fidelity == "bounds":  # what is missed is no less: worse than all judged
             missed += 0.5 * _NEVER
         return [missed] * max(1, len(self.problem.goals))
-
-
-def _values_of(trial: Any, names: Sequence[str]) -> tuple[Any, ...]:
-    """Values of a trial, or those that it is going to have."""
-    values = trial.params or trial.system_attrs.get("fixed_params", {})
-    return tuple(values.get(name) for name in names)
 
 
 def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:

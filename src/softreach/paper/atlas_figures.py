@@ -79,7 +79,10 @@ def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
     from softreach.cloud.volume import concave_hull
     from softreach.rod.tip_map import TipStatus
 
-    cloud_at, alpha_over_length = _clouds(atlas), _alpha_over_length(atlas)
+    cloud_at = _clouds(atlas)
+    alpha_over_length = (
+        float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
+    )
 
     def hull_at(column: int, row: int) -> Hull | None:
         cloud = cloud_at(column, row)
@@ -91,11 +94,6 @@ def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
         return concave_hull(tips, alpha_over_length)
 
     return hull_at
-
-
-def _alpha_over_length(atlas: xr.Dataset) -> float:
-    """The radius that the atlas was measured with, over the length of each design."""
-    return float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
 
 
 def _corners(atlas: xr.Dataset) -> dict[str, xr.Dataset]:

@@ -1,12 +1,15 @@
-"""The whole paper, part by part: what is done stays done, so a rerun continues."""
+"""The whole paper, part by part, and its report; what is done stays done, so a rerun continues."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+import os
+import platform
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict
+from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.resources import files
 from os import PathLike
@@ -14,8 +17,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from softreach.paper.notebook import FULL, QUICK, Notebook
-from softreach.paper.report import write_report
+from softreach.paper.claims import CLAIMS, Verdict
+from softreach.paper.notebook import FULL, QUICK, Notebook, Settings
 from softreach.paper.sections.misprints import misprints
 from softreach.paper.sections.model import model
 from softreach.paper.sections.redundancy import redundancy
@@ -26,8 +29,11 @@ from softreach.plot.style import pyplot
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import MARK, check_place, writing
 from softreach.support.files.formats import check_installed
+from softreach.support.report import page_template, png_source
 
 __all__ = ["PARTS", "reproduce_paper"]
+
+_NARROW = 900  # pixels; two such figures stand side by side
 
 PARTS: Mapping[str, Callable[..., None]] = {
     "model": model,
@@ -103,11 +109,7 @@ def _claim(pages: Path, key: Mapping[str, Any], *, overwrite: bool) -> None:
 
 
 def _computed(
-    name: str,
-    part: Callable[..., None],
-    settings: Any,
-    folder: Path,
-    key: Mapping[str, Any],
+    name: str, part: Callable[..., None], settings: Any, folder: Path, key: Mapping[str, Any]
 ) -> Notebook:
     """The notebook of a part: of an earlier run, or written now."""
     pages = folder / "figures"
@@ -117,3 +119,70 @@ def _computed(
     part(settings, folder, notes)
     notes.close(perf_counter() - start)
     return notes
+
+
+def write_report(
+    path: Path,
+    notebooks: Mapping[str, Notebook],
+    settings: Settings,
+    quick: bool,
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Write what was found beside what the paper says.
+
+    Args:
+        path: The HTML file.
+        notebooks: What each part found, by name.
+        settings: The sizes it was computed with.
+        quick: Whether these are small ones.
+        overwrite: Whether it may replace a file.
+
+    Returns:
+        The file.
+
+    Raises:
+        MissingExtra: Jinja2 is not installed.
+    """
+    rows = list(_rows(notebooks, quick))
+    system = f"{platform.system()} on {platform.machine()}"
+    page = page_template("softreach.paper", "report.html.jinja").render(
+        rows=rows,
+        counts={verdict: sum(row["verdict"] == verdict for row in rows) for verdict in Verdict},
+        figures=sorted(_figures(notebooks), key=lambda figure: figure["order"]),
+        parts=[(name, notebook.seconds) for name, notebook in notebooks.items()],
+        settings=settings,
+        quick=quick,
+        machine=f"{os.cpu_count()} cores, {system}, Python {platform.python_version()}",
+        version=version("softreach"),
+        date=f"{datetime.now(UTC):%Y-%m-%d}",
+    )
+    with writing(path, overwrite=overwrite) as file:
+        file.write(page.encode())
+    return path
+
+
+def _rows(notebooks: Mapping[str, Notebook], quick: bool) -> Iterator[dict[str, Any]]:
+    for claim in CLAIMS:
+        finding = claim.check(notebooks[claim.part].numbers)
+        yield {
+            "section": claim.section,
+            "says": claim.says,
+            "found": finding.text,
+            "how": claim.how,
+            "verdict": Verdict.UNTESTED if quick and claim.full else finding.verdict,
+        }
+
+
+def _figures(notebooks: Mapping[str, Notebook]) -> Iterator[dict[str, Any]]:
+    """Figures in the paper's order, our own after them."""
+    for notebook in notebooks.values():
+        for picture in notebook.pictures:
+            image = notebook.png(picture).read_bytes()
+            yield {
+                "wide": int.from_bytes(image[16:20]) > _NARROW,  # its width, in a PNG header
+                "title": f"Figure {picture.label}" if picture.label else "Beyond the paper",
+                "caption": picture.caption,
+                "source": png_source(image),
+                "order": picture.label or "9",
+            }

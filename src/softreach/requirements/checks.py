@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.requirements.advice import advice
 from softreach.requirements.check_result import TOL, Check, Coverage
 from softreach.requirements.chosen_poses import Chooser, Posed, chosen, descended, solved
-from softreach.requirements.findings import measure_findings
-from softreach.requirements.parts import Target
-from softreach.requirements.poses import PoseRules
+from softreach.requirements.findings import (
+    Finding,
+    design_limits,
+    limit_finding,
+    measure_findings,
+    places_text,
+    verdict_of,
+)
+from softreach.requirements.parts import Keep, Target
+from softreach.requirements.poses import PoseRules, worst_pose
 from softreach.requirements.requirements import Requirements
-from softreach.requirements.verdicts import verdicts
+from softreach.rod.bending import bending_over_bounds
 from softreach.rod.rods import in_steps, tip_map
-from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_instance, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, no_warnings
 from softreach.support.progress import Progress, as_progress, silent
+from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSet, ReachableSolid, reachable_set
 
 __all__ = ["Check", "Coverage", "Sets", "check", "checked", "quick_check", "sets_to"]
@@ -116,14 +124,16 @@ def checked(
         choose: Source of the poses.
     """
     payloads = needs.payloads or (None,)
+    keeps = [keep for keep in needs.keeps if keep.when == "targets" and needs.targets]
     every: list[PoseRules] = []
     posed: list[Posed] = []
     coverages: list[Coverage] = []
     for payload, loaded in zip(payloads, needs.under_payloads(arm), strict=True):
-        rules = _rules(loaded, needs, accuracy)
+        rules = PoseRules.of(loaded, keeps, needs.limits, 0.1 * accuracy * arm.length)
         every.append(rules)
-        if choose is descended:
-            rules = replace(rules, known_rod=_rough_map(rules.arm))
+        if choose is descended:  # on the way, with shapes in no more steps than tips
+            rod = tip_map(loaded, _ROUGH_TOL)
+            rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
         posed.append(solved(rules, needs.places, needs.within, step, choose))
         for target in needs.targets:
             if target.region is not None:
@@ -142,18 +152,7 @@ def checked(
         nearest=joined.nearest,
     )
     measures = measure_findings(arm, needs, accuracy, partial(sets, arm))
-    return replace(made, findings=(*verdicts(made, joined, every), *measures))
-
-
-def _rules(arm: Manipulator, needs: Requirements, accuracy: float) -> PoseRules:
-    keeps = [keep for keep in needs.keeps if keep.when == "targets" and needs.targets]
-    return PoseRules.of(arm, keeps, needs.limits, 0.1 * accuracy * arm.length)
-
-
-def _rough_map(arm: Manipulator) -> TipMap:
-    """A tip map for designs on the way, whose shapes have no more steps than its tips."""
-    rod = tip_map(arm, _ROUGH_TOL)
-    return in_steps(arm, rod.steps, rod)
+    return replace(made, findings=(*_verdicts(made, joined, every), *measures))
 
 
 def _coverage(
@@ -164,7 +163,6 @@ def _coverage(
     sets: Sets,
     step: Progress,
 ) -> Coverage:
-    """The share of a region that is reached."""
     assert target.region is not None
     count = int(np.clip(0.25 / accuracy**2, _LEAST_PLACES, _MOST_PLACES))
     places = target.region.places(count)
@@ -193,3 +191,150 @@ def _reachable(known: Callable[[], ReachableSet], places: Array, within: float) 
         rod = reached.tip_map
         return reached.distance(places) <= max(within, rod.tol * rod.length)
     return reached.distance(places) <= within if within > 0.0 else reached.contains(places)
+
+
+def _verdicts(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
+    """Targets, regions and limits, each met or missed.
+
+    Args:
+        made: The check, whose findings these become.
+        posed: Poses under all payloads, stacked along a first axis.
+        rules: Rules of poses under each payload.
+    """
+    yield from _reach_findings(made, rules)
+    yield from _cover_findings(made)
+    yield from _keep_findings(made, posed, rules)
+    yield from _limit_findings(made, posed, rules)
+
+
+def _under(payload: float | None) -> str:
+    return "" if payload is None else f" with {payload:.4g} kg"
+
+
+def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding]:
+    length, unit = made.arm.length, made.arm.length_unit
+    for index, target in enumerate(made.requirements.targets):
+        if target.places is None:
+            continue
+        own = made.target_of == index
+        gaps, reached = made.gaps[:, own], made.reached[:, own]
+        load, place = np.unravel_index(int(gaps.argmax()), gaps.shape)
+        met = places_text(int(reached.all(axis=0).sum()), len(target.places))
+        if reached.all():
+            effort = float(made.effort[:, own].max())
+            near = f" to {unit.text(target.within)}" if target.within else ""
+            text = f"{met} reached{near}, effort up to {effort:.3g}"
+            yield Finding(target.name, "reach", "met", 0.0, text)
+            continue
+        gap, number = float(gaps[load, place]), int(np.flatnonzero(own)[place])
+        excess = max(gap - target.within, TOL * length) / length
+        where = ", ".join(f"{x / unit.size:.4g}" for x in target.places[place])
+        text = f"{met} reached; place {place + 1} at ({where}) {unit.name}"
+        more, laden = "", _under(made.payloads[load])
+        away = float(np.linalg.norm(target.places[place] - made.arm.base.position))
+        if gap > length + away - 1e-9:
+            text += f" is not held{laden}: no stable equilibrium"
+        else:
+            text += f" is missed by {_length(gap - target.within, unit)}{laden}"
+            pose = made.poses[load, number]
+            more = advice(rules[int(load)].arm, target.places[place], pose, unit)
+        pairs = zip(made.payloads, reached, strict=True)
+        held = [payload for payload, row in pairs if payload is not None and row.all()]
+        if held:
+            more += f"; all reached with {max(held):.4g} kg"
+        yield Finding(target.name, "reach", "missed", excess, text + more)
+
+
+def _length(value: float, unit: LengthUnit, digits: int = 4) -> str:
+    return f"{value / unit.size + 0.0:.{digits}g} {unit.name}"  # + 0.0: no minus before 0
+
+
+def _cover_findings(made: Check) -> Iterator[Finding]:
+    for target in made.requirements.targets:
+        if target.region is None:
+            continue
+        own = [each for each in made.coverages if each.name == target.name]
+        worst = min(own, key=lambda each: each.share)
+        # Where every place is reached that was tried, no share is left to be in doubt.
+        error = worst.error if worst.share < 1.0 else 0.0
+        verdict = verdict_of(worst.share - target.share, error)
+        text = (
+            f"{100 * worst.share:.2f} ± {100 * worst.error:.2g} % covered of at least "
+            f"{100 * target.share:.4g} %{_under(worst.payload)}"
+        )
+        yield Finding(target.name, "cover", verdict, max(target.share - worst.share, 0.0), text)
+
+
+def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
+    at_targets = bool(made.requirements.targets)
+    column = 0
+    for keep in made.requirements.keeps:
+        if keep.when == "targets" and at_targets:
+            values = posed.value[..., column], posed.error[..., column]
+            excess = posed.excess[..., column]
+            column += 1
+            yield _kept_at_targets(made, keep, *values, excess)
+        else:
+            yield _kept_always(made, keep, rules)
+
+
+def _kept_at_targets(made: Check, keep: Keep, value: Array, error: Array, excess: Array) -> Finding:
+    unit = made.arm.length_unit
+    if not value.size:
+        return Finding(keep.name, keep.kind, "met", 0.0, "counted in what is covered")
+    decides = value if value.max() > 0.0 or (value + error).max() <= 0.0 else value + error
+    load, place = np.unravel_index(int(decides.argmax()), value.shape)
+    where = f"at place {place + 1}{_under(made.payloads[load])}"
+    most, off = float(value[load, place]), float(error[load, place])
+    return _kept(keep, most, off, float(excess.max()), where, unit)
+
+
+def _kept_always(made: Check, keep: Keep, rules: Sequence[PoseRules]) -> Finding:
+    """A region that every pose must keep to, by a search for the worst."""
+    worst: list[tuple[float, float, float, str]] = []
+    for payload, own in zip(made.payloads, rules, strict=True):
+        gamma, judged = worst_pose(replace(own, keeps=(keep,), limits={}))
+        inputs = ", ".join(f"{x:.4g}" for x in gamma)
+        where = f"in the worst pose found, ({inputs}){_under(payload)}"
+        value, excess, error = (float(column[0, 0]) for column in judged)
+        worst.append((value, error, excess, where))
+    value, error, excess, where = max(worst)
+    return _kept(keep, value, error, excess, where, made.arm.length_unit)
+
+
+def _kept(
+    keep: Keep, value: float, error: float, excess: float, where: str, unit: LengthUnit
+) -> Finding:
+    """Distance by which a region is missed, or kept to."""
+    of = "the tip" if keep.of == "tip" else "the arm"
+    close = f" (to {_length(error, unit, 2)})" if keep.of == "arm" else ""
+    verdict = "missed" if excess > 0.0 else verdict_of(max(-value, 0.0), error)
+    if excess > 0.0:
+        beyond = "outside" if keep.inside else "inside or too near"
+        text = f"{of} is {_length(value, unit)}{close} {beyond} {where}"
+    elif not np.isfinite(value):
+        text = "no pose to judge"
+    else:
+        text = f"{of} keeps {_length(-value, unit)}{close} to spare {where}"
+    return Finding(keep.name, keep.kind, verdict, excess, text)
+
+
+def _limit_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
+    needs = made.requirements
+    yield from design_limits(made.arm, needs)
+    for column, (name, most) in enumerate(rules[0].limits.items(), len(rules[0].keeps)):
+        values = posed.value[..., column]
+        if values.size:
+            load, place = np.unravel_index(int(values.argmax()), values.shape)
+            value = float(values[load, place])
+            where = f", at place {place + 1}{_under(made.payloads[load])}"
+        elif needs.targets:
+            value, where = 0.0, ", counted in what is covered"
+        elif name == "bending":
+            bending = [bending_over_bounds(each.arm) for each in rules]
+            value = max(each.sharpest.value for each in bending)
+            where = ", over all bounds" + ", by search" * (not bending[0].exact)
+        else:
+            value = max(each.of_bounds(name) for each in rules)
+            where = ", over all bounds, by search"
+        yield limit_finding(name, value if np.isfinite(value) else 0.0, most, made.arm, where)

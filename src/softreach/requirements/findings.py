@@ -120,10 +120,9 @@ def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
         else:
             continue
         if gap > 1e-6 * arm.length:
-            if target.region is None:
-                yield Finding(target.name, "reach", "missed", gap / arm.length, text)
-            else:
-                yield Finding(target.name, "cover", "missed", target.share, text)
+            excess = gap / arm.length if target.region is None else target.share
+            kind = "reach" if target.region is None else "cover"
+            yield Finding(target.name, kind, "missed", excess, text)
 
 
 def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:

@@ -129,7 +129,12 @@ class PoseRules:
         if not self.arm.bundles:
             return np.zeros(len(gamma))
         if name == "shortening":
-            return (1.0 - self._line_lengths(gamma) / self._straight).max(axis=1)
+            straight = line_lengths(self.arm.replace(loads=None), np.zeros((1, self.arm.inputs)))
+            if self.arm.loads is None:
+                lengths = line_lengths(self.arm, gamma)
+            else:
+                lengths = configuration(self.rod, gamma, 2)["line_length"].values
+            return (1.0 - lengths / straight).max(axis=1)
         own = Driving(self.arm).bundles(gamma)[:, : self.arm.bundles]
         driven = [_SIZES.get(unit) == name for unit in self.arm.bundle_units]
         sizes = np.abs(own[:, driven])
@@ -138,15 +143,6 @@ class PoseRules:
             by_length = [unit == "m" for unit in self.arm.bundle_units]
             sizes = np.concatenate([sizes, np.abs(tension[:, by_length])], axis=1)
         return sizes.max(axis=1, initial=0.0)
-
-    def _line_lengths(self, gamma: Array) -> Array:
-        if self.arm.loads is None:
-            return line_lengths(self.arm, gamma)
-        return configuration(self.rod, gamma, 2)["line_length"].values
-
-    @property
-    def _straight(self) -> Array:
-        return line_lengths(self.arm.replace(loads=None), np.zeros((1, self.arm.inputs)))
 
     def of_bounds(self, name: str) -> float:
         """Value of a limit of poses other than bending over all of the bounds, by search."""

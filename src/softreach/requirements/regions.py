@@ -479,7 +479,6 @@ def _unit_of(name: str) -> str | None:
 
 
 def _triple(name: str, value: object) -> Triple:
-    """Three finite numbers."""
     allowed = "three finite numbers"
     numbers = check_finite(name, as_floats(name, value, allowed))
     if numbers.shape != (3,):

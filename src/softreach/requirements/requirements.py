@@ -198,19 +198,13 @@ def _named(parts: Sequence[Any]) -> Iterator[Any]:
     for number, part in enumerate(parts, 1):
         if not part.name:
             kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
-            part = _renamed(part, f"{kind} {number}")
+            given, part = vars(part), object.__new__(type(part))
+            for key, value in {**given, "name": f"{kind} {number}"}.items():
+                object.__setattr__(part, key, value)
         yield part
 
 
-def _renamed(part: Any, name: str) -> Any:
-    copy = object.__new__(type(part))
-    for key, value in {**vars(part), "name": name}.items():
-        object.__setattr__(copy, key, value)
-    return copy
-
-
 def _limits_of(name: str, ends: Any) -> tuple[float | None, float | None]:
-    """Least and largest value of a measure."""
     metric = known_metric(name) if isinstance(name, str) else None
     if metric is None or metric.over:
         known = [m.name for group in METRIC_GROUPS.values() for m in group if not m.over]

@@ -76,8 +76,6 @@ def read(text: str, folder: Path, length: float | None, source: str) -> dict[str
 
 
 class _Reader:
-    """Reads the tables and keeps their faults."""
-
     def __init__(self, folder: Path, length: float | None) -> None:
         self.folder, self.length = folder, length
         self.faults: list[Fault] = []
@@ -136,12 +134,10 @@ class _Reader:
             if (value := self._value(raw, path, name, unit, several=name in several)) is not None
         }
         for name in words:
-            if name in raw:
-                value = raw[name]
-                text = isinstance(value, str)
-                values[name] = (
-                    value if text else self._refuse(f"{path}.{name}", value, "must be text")
-                )
+            if isinstance(value := raw.get(name, ""), str):
+                values |= {name: value} if name in raw else {}
+            else:
+                values[name] = self._refuse(f"{path}.{name}", value, "must be text")
         shapes = [name for name in _SHAPES if name in raw]
         if len(shapes) > 1:
             values["region"] = self._refuse(path, None, f"has {' and '.join(shapes)}: give one")
@@ -155,14 +151,13 @@ class _Reader:
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
-                mesh = Mesh.load(self.folder / table, unit=raw.get("mesh_unit"))
+                return Mesh.load(self.folder / table, unit=raw.get("mesh_unit"))
             except InvalidInput as error:
                 if error.name == "unit":
                     return self._refuse(f"{path}_unit", error.value, f"must be {error.allowed}")
                 return self._refuse(path, table, f"must be {error.allowed} ({error.value})")
             except SoftreachError as error:
                 return self._refuse(path, table, str(error))
-            return mesh
         if not isinstance(table, dict):
             return self._refuse(path, table, "must be a table" + " or a file" * (shape == "mesh"))
         if shape == "mesh":
@@ -209,9 +204,8 @@ class _Reader:
             text = read_text("file", name, LONGEST)
             return np.array(positions_in(text, str(file), self.length))
         except InvalidInput as error:
-            return self._refuse(
-                path, file, f"must be {error.allowed} ({error.name} = {error.value})"
-            )
+            allowed = f"must be {error.allowed} ({error.name} = {error.value})"
+            return self._refuse(path, file, allowed)
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `_WRONG` and a fault where it refuses them."""
@@ -262,14 +256,12 @@ class _Reader:
         if len(keys) != 1:
             if keys or needed:
                 said = f"has {' and '.join(keys)}: give one" if keys else "required key is missing"
-                return self._refuse(
-                    start + (name if keys else next(iter(suffixes), name)), None, said
-                )
+                key = name if keys else next(iter(suffixes), name)
+                return self._refuse(start + key, None, said)
             return None
         (key,) = keys
         symbol = suffixes.get(key, "")
-        is_list = isinstance(raw[key], list)
-        if several and not is_list and not isinstance(raw[key], str):
+        if several and not isinstance(raw[key], list | str):
             return self._refuse(start + key, raw[key], "must be a list")
         try:
             return self._read(raw[key], unit, symbol, plain or not unit)
@@ -291,11 +283,9 @@ class _Reader:
                 raise ValueError(value)
             if "," in value:
                 return [self._read(item, unit, symbol, plain) for item in value.split(",")]
-            return (
-                read_length(_with_unit(value), self.length)
-                if unit == "m"
-                else read_quantity(value, unit)
-            )
+            if unit == "m":
+                return read_length(_with_unit(value), self.length)
+            return read_quantity(value, unit)
         if not symbol and not plain and value != 0:
             raise ValueError(value)
         if symbol in ("", unit):
@@ -338,7 +328,6 @@ class _Reader:
         return {}
 
     def _tables(self, document: dict[str, Any], key: str) -> Iterator[tuple[dict[str, Any], str]]:
-        """Tables of a list, and their paths."""
         raw = document.get(key, [])
         if not isinstance(raw, list):
             self._refuse(key, raw, f"must be tables: write [[{key}]]")

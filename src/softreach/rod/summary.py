@@ -87,6 +87,7 @@ def describe(arm: Manipulator) -> DesignSummary:
     tip_radius = float(arm.profile.radius(arm.length))
     body, bending = (arm.profile, arm.section), bending_over_bounds(arm)
     alone = list(_alone(arm))
+    bent = [(each.gentlest, each.sharpest.value) for each in map(bending_over_bounds, alone)]
     limits = (f"{part.default_name}: {part.validity}" for part in arm.actuators if part.validity)
     return DesignSummary(
         helical_angles=np.array([_angle_at_start(fiber, arm) for fiber in arm.fibers]),
@@ -98,7 +99,7 @@ def describe(arm: Manipulator) -> DesignSummary:
         extension=extension_range(arm),
         curvature=(bending.least * arm.length, bending.largest * arm.length),
         bundle_extension=np.array([extension_range(each) for each in alone]).reshape(-1, 2),
-        bundle_bending=np.array([_slender_bending(each) for each in alone]).reshape(-1, 2),
+        bundle_bending=np.array(bent).reshape(-1, 2),
         bundle_strain=line_strains(arm),
         breakpoints=arm.breakpoints,
         validity=tuple(dict.fromkeys(limits)),
@@ -136,12 +137,6 @@ def _alone(arm: Manipulator) -> Iterator[Manipulator]:
             bounds = np.zeros_like(bare.bounds)
             bounds[bundle] = bare.bounds[bundle]
             yield bare.with_bounds(bounds)
-
-
-def _slender_bending(arm: Manipulator) -> tuple[float, float]:
-    """Smallest and largest |κ| R2 anywhere along the arm [-]."""
-    bending = bending_over_bounds(arm)
-    return bending.gentlest, bending.sharpest.value
 
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:

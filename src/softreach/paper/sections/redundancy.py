@@ -154,12 +154,7 @@ def _draw(
     distances: dict[str, xr.DataArray],
     notes: Notebook,
 ) -> None:
-    from softreach.plot import (
-        DesignPanel,
-        plot_designs,
-        plot_distance_histograms,
-        plot_redundancy,
-    )
+    from softreach.plot import DesignPanel, plot_designs, plot_distance_histograms, plot_redundancy
 
     panels = [DesignPanel(name, arm) for name, arm in arms.items()]
     words = "The minimal and the redundant design, above their cross-sections at the base."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -100,7 +100,7 @@ def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
         aside_from=ASIDE,
         quantiles=curvature["quantile"].values.tolist(),
         curvature=curvature.transpose("taper", "station", "quantile").values.tolist(),
-        **{name: _rows(atlas[name]) for name in _SCALARS},
+        **{name: atlas[name].transpose("revolution", "taper").values.tolist() for name in _SCALARS},
     )
     for name, figure in atlas_figures(atlas, settings.panels):
         if name in _CAPTIONS:
@@ -324,11 +324,6 @@ def _swept(settings: Settings, folder: Path) -> xr.Dataset:
     )
 
 
-def _rows(values: xr.DataArray) -> Any:
-    """Numbers over (revolution, taper)."""
-    return values.transpose("revolution", "taper").values.tolist()
-
-
 class _Sweep:
     """The atlas's numbers over (revolution, taper), and where they rise."""
 
@@ -362,7 +357,6 @@ class _Sweep:
         return up / max(up + down, 1)
 
     def place(self, flat: int | np.intp) -> str:
-        """A design by its number."""
         i, j = divmod(int(flat), len(self.taper))
         return f"Ω = {self.revolution[i]:.4g}°, φ = {self.taper[j]:.4g}°"
 

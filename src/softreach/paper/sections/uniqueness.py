@@ -89,15 +89,10 @@ def _clearest_pair(reached: ReachableSolid) -> Pair:
     axes = [grid[axis].values for axis in "xyz"]
     tips = np.stack([axes[k][places[::every, k]] for k in range(3)], axis=1)
     solutions = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
-    best = max(solutions, key=lambda s: _apart(s.activations), default=None)
-    return (
-        Pair(np.zeros(3), np.empty((0, 3))) if best is None else Pair(best.target, best.activations)
-    )
-
-
-def _apart(activations: Array) -> float:
-    """Distance of the first and the last activation [-]."""
-    return float(np.linalg.norm(activations[0] - activations[-1]))
+    if not solutions:
+        return Pair(np.zeros(3), np.empty((0, 3)))
+    best = max(solutions, key=lambda s: np.linalg.norm(s.activations[0] - s.activations[-1]))
+    return Pair(best.target, best.activations)
 
 
 def _fewer_fibers() -> dict[str, float]:

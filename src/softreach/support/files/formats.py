@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from softreach.support.errors import InvalidInput, MissingExtra
 from softreach.support.files.atomic import Foreign
 
-__all__ = ["PAGES", "PICTURES", "FileFormat", "Formats", "check_installed", "format_of"]
+__all__ = ["PAGES", "PICTURES", "TABLES", "FileFormat", "Formats", "check_installed", "format_of"]
 
 _PACKAGES = {"skimage": "scikit-image"}
 """Packages by the name of their module, where that is another."""
@@ -83,3 +83,6 @@ PICTURES: Formats = dict.fromkeys(
 
 PAGES: Formats = {".html": FileFormat()}
 """Formats of figures that turn in a browser."""
+
+TABLES: Formats = {".csv": FileFormat()}
+"""Formats of tables."""
