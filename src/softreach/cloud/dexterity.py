@@ -20,7 +20,7 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dexterity", "manipulability_unit", "solution_measure"]
+__all__ = ["dexterity", "solution_measure"]
 
 Signs = NDArray[np.int8]
 
