@@ -82,7 +82,7 @@ def common(draw: st.DrawFn, ends: st.SearchStrategy[float]) -> dict[str, Any]:
 
 
 def _sector(draw: st.DrawFn) -> dict[str, Any]:
-    extent = draw(st.floats(0, 2 * math.pi, exclude_min=True))
+    extent = draw(st.floats(1e-6, 2 * math.pi))
     return {**draw(common(numbers)), "offset": draw(numbers), "extent": extent}
 
 
@@ -189,6 +189,6 @@ def any_arms(draw: st.DrawFn) -> sr.Manipulator:
             profile=draw(profiles()), section=draw(sections()), actuators=tuple(kinds)
         )
     except sr.InvalidDesign as error:  # names alike, no modulus for a force, far off
-        allowed = "name", "must be given in Pa", "times the largest outer radius"
+        allowed = "name", "must be given in Pa", "must be at most the length of the arm"
         assume(not any(fault in str(error) for fault in allowed))
         raise

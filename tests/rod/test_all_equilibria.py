@@ -448,8 +448,8 @@ def test_a_cantilever_hangs_from_its_base_as_published_however_heavy_its_payload
     [
         Loads(tip_force=(0.0, 0.0, 1e9)),
         Loads(tip_force=(1e9, 0.0, 0.0)),
-        Loads(gravity=(0.0, 0.0, 1e30), payload=1.0),
-        Loads(tip_moment=(0.0, 1e30, 0.0)),
+        Loads(gravity=(0.0, 0.0, 1e14), payload=1.0),
+        Loads(tip_moment=(0.0, 1e14, 0.0)),
         Loads(follower_force=(0.0, 1e9, 0.0)),
     ],
 )

@@ -153,7 +153,7 @@ BAD_FILES = {
     "a file": (b'[[reach]]\nfile = "/etc/passwd"', "not sent along"),
     "a mesh": (b'[[stay_inside]]\nmesh = "/etc/passwd"', "not sent along"),
     "many": (f"[[reach]]\nplaces_m = {[[0, 0, 1]] * 301}".encode(), "at most 300"),
-    "large": (b"#" * 1_000_001, "at most 1 MB"),
+    "large": (b"#" * 2_000_001, "at most 2 MB"),
 }
 
 

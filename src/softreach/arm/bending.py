@@ -124,7 +124,7 @@ def _reached(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array, tuple
         vertices = _vertices(center, halves)
         return center, halves, (vertices, np.roll(vertices, -1, axis=1))
     moving = np.flatnonzero(half)
-    signs = 2.0 * np.indices((2,) * len(moving)).reshape(len(moving), -1) - 1.0
+    signs = 2.0 * np.indices((2,) * len(moving)).reshape(len(moving), 2 ** len(moving)) - 1.0
     seen = center[:, None] + np.einsum("smc,mv->svc", halves[:, moving], signs)
     seen /= (1.0 + (rates @ mean)[:, None] + (rates * half)[:, moving] @ signs)[..., None]
     first, steps = np.arange(signs.shape[1]), 1 << np.arange(len(moving))

@@ -221,7 +221,9 @@ def _unchanged(text: str) -> Manipulator:
         raise InvalidInput(
             "design", text, allowed, f"{hint} in Python, points in m of shape (n, 3)"
         )
-    is_named = path.exists() and not path.is_dir() and path.suffix != ".json"
+    is_named = (
+        path.exists() and not path.is_dir() and not (path.suffix == ".json" and path.is_file())
+    )
     if is_named or path.suffix == ".toml":
         return Manipulator.load(text)  # which refuses what is no file, such as a pipe
     if text.endswith(".json"):

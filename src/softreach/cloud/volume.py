@@ -27,7 +27,6 @@ __all__ = [
     "Hull",
     "concave_hull",
     "convex_hull",
-    "flat_areas",
     "unreachability",
     "volume_curve",
 ]
@@ -184,7 +183,7 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
     array = as_floats("points", labeled("points", points, AXES))
     if not isinstance(points, np.ndarray) and "status" in getattr(points, "coords", ()):
         array = array[is_stable(points)]
-    return as_points("points", array)
+    return as_points("points", array, any_scale=True)
 
 
 def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> float | str:

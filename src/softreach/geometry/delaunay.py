@@ -27,7 +27,7 @@ def delaunay(points: np.ndarray) -> Delaunay:
     Raises:
         InvalidInput: Points of another shape, or not finite.
     """
-    points = as_points("points", points)
+    points = as_points("points", points, any_scale=True)
     scaled, _ = unit_scale(points)
     cells = neighbors = np.empty((0, 4), np.int32)
     order = same = np.arange(len(points))

@@ -112,7 +112,7 @@ def convex_hull(points: np.ndarray) -> Hull:
     Raises:
         InvalidInput: Points of another shape, or not finite.
     """
-    points = as_points("points", points)
+    points = as_points("points", points, any_scale=True)
     vertices, faces = compact_surface(points, convex_faces(points))
     volume = enclosed_volume(vertices, faces)
     return Hull(

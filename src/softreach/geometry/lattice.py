@@ -39,7 +39,7 @@ class CellGrid:
                 or so small that the grid would not fit into memory.
         """
         placed = np.asarray(~np.isnan(points).all(axis=-1))
-        points = as_points("points", points[placed])
+        points = as_points("points", points[placed], any_scale=True)
         if len(points) == 0:
             raise InvalidInput("points", "none", "at least one")
         if not 0 < edge < np.inf:  # NaN too

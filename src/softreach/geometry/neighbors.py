@@ -57,7 +57,10 @@ def mean_value_distance(
     Raises:
         InvalidInput: Arrays of another shape or not finite, or a radius below zero.
     """
-    points, values = as_points("points", points), _finite_values(values, len(points))
+    points, values = (
+        as_points("points", points, any_scale=True),
+        _finite_values(values, len(points)),
+    )
     if not radius >= 0:  # NaN too
         raise InvalidInput("radius", radius, "a radius >= 0 [m]")
     if len(points) == 0:

@@ -112,7 +112,8 @@ def worst_inputs(
         for _ in range(_ROUNDS):
             around = rng.normal(size=(_AROUND, *gamma.shape)) * width * box.widths
             tried = box.clip(gamma + around)
-            found = of(tried.reshape(-1, box.bundles))[:, column].reshape(_AROUND, -1)
+            flat = tried.reshape(_AROUND * len(gamma), box.bundles)
+            found = of(flat)[:, column].reshape(_AROUND, len(gamma))
             top = found.argmax(axis=0)
             better = found[top, row] > value
             gamma = np.where(better[:, None], tried[top, row], gamma)

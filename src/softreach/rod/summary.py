@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
+from softreach.arm.bending import Extreme
 from softreach.arm.lines import line_strains
 from softreach.arm.load_number import (
     VERIFIED_LOAD_NUMBER,
@@ -24,8 +25,8 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
-from softreach.rod.bending import bending_over_bounds
-from softreach.support.errors import Fault
+from softreach.rod.bending import BendingRange, bending_over_bounds
+from softreach.support.errors import Fault, InvalidInput
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
 
@@ -85,7 +86,7 @@ def describe(arm: Manipulator) -> DesignSummary:
     """
     check_extension(a_manipulator("arm", arm))
     tip_radius = float(arm.profile.radius(arm.length))
-    body, bending = (arm.profile, arm.section), bending_over_bounds(arm)
+    body, bending = (arm.profile, arm.section), _bending(arm)
     alone = list(_alone(arm))
     bent = [(each.gentlest, each.sharpest.value) for each in map(bending_over_bounds, alone)]
     limits = (f"{part.default_name}: {part.validity}" for part in arm.actuators if part.validity)
@@ -157,8 +158,17 @@ def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     )
 
 
+def _bending(arm: Manipulator) -> BendingRange:
+    """The range of bending; NaN under loads that no solver follows."""
+    try:
+        return bending_over_bounds(arm)
+    except InvalidInput:
+        unknown = float("nan")
+        return BendingRange(unknown, unknown, unknown, Extreme(unknown, 0.0), exact=False)
+
+
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:
-    sharpest = bending_over_bounds(arm).sharpest
+    sharpest = _bending(arm).sharpest
     if sharpest.value >= 1:
         place = f"Z = {sharpest.station / arm.length:.2f} L"
         yield (

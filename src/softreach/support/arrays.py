@@ -122,14 +122,17 @@ def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
     return check_finite(name, rows)
 
 
-def as_points(name: str, values: object) -> Points:
-    """Finite positions [m], shape (n, 3); one may stand alone, and an empty array is none."""
+def as_points(name: str, values: object, *, any_scale: bool = False) -> Points:
+    """Finite positions [m], shape (n, 3); one may stand alone, and an empty array is none.
+
+    They are at most 1e9 m far, unless any scale is allowed.
+    """
     allowed = "of shape (n, 3), positions in m"
     points = as_floats(name, labeled(name, values, ("x", "y", "z")), allowed)
     if points.size == 0 and points.ndim <= 2:
         return points.reshape(0, 3)
     points = as_rows(name, points, 3, allowed)
-    if max(-points.min(), points.max()) > _FARTHEST:
+    if not any_scale and max(-points.min(), points.max()) > _FARTHEST:
         raise InvalidInput(
             name, f"up to {np.abs(points).max():g} m", f"at most {_FARTHEST:g} m far"
         )
