@@ -27,6 +27,7 @@ _HOPELESS = 0.5  # over L or relative: what a start may miss
 _TOLERANCE = 0.003  # of the accuracy
 _GENTLE = 0.1  # of the cost: the first step is along its slope, and as long
 _BACK = (0.05, 0.1, 0.2, 0.4)  # of the way from an end that misses something to its start
+_AMPLE = 24  # designs of which some are kept for that way back
 _WORSE = 10.0  # times the cost of the start: a design that cannot exist
 
 
@@ -74,7 +75,7 @@ def polished(
     """
     if start.excess > _HOPELESS:
         return Polished(start, 0)
-    most = max(designs - len(_BACK), 1) if start.is_feasible else designs
+    allowed, most = designs, designs - len(_BACK) * (start.is_feasible and designs >= _AMPLE)
     program = _Program(problem, start, accuracy or problem.coarse, goal, floors, most)
     try:
         first = program.begin()
@@ -84,7 +85,7 @@ def polished(
         if start.is_feasible and not candidate.is_feasible:
             # A program that was cut, or stalled, ends a little outside of what is required.
             low, high = (problem.parameters.reals(each.values) for each in (candidate, start))
-            for back in _BACK:
+            for back in _BACK[: max(allowed - designs, 0)]:
                 values = problem.parameters.moved(start.values, low + back * (high - low))
                 again = problem.judged(values, problem.case(values, accuracy or problem.coarse))
                 designs += 1
