@@ -14,10 +14,11 @@ __all__ = ["files_in", "raised_by", "refusal_of"]
 
 
 def files_in(folder: Path) -> dict[str, bytes | None]:
-    """Every file below the folder with what it holds, and the folders."""
+    """Every file below the folder with what it holds, and the folders, but Python's bytecode."""
     return {
         str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
         for path in folder.rglob("*")
+        if "__pycache__" not in path.parts
     }
 
 

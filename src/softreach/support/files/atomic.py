@@ -167,7 +167,8 @@ def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False
             sync(place.parent)  # before the old one goes
             _discard(old)
         finally:
-            shutil.rmtree(building, ignore_errors=True)
+            for _ in range(3):  # threads of libraries may still write into it after Ctrl-C
+                shutil.rmtree(building, ignore_errors=True)
             _rename_what_is_whole(place)  # after Ctrl-C between two renames
 
 
