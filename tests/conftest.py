@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -96,3 +97,16 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> Iterat
             "To run them, type: sudo apt-get install chromium",
             yellow=True,
         )
+
+
+@pytest.fixture
+def printed(capsys):
+    """What a command prints as JSON."""
+    from softreach.cli.app import run
+
+    def of(*words):
+        capsys.readouterr()
+        assert run([*words, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return of

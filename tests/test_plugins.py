@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 
 import pytest
@@ -58,18 +57,6 @@ def wire(tmp_path_factory):
     (folder / "wire.toml").write_text(designed("OwnWire"))
     yield ["--import", str(folder / "own_wire.py")], str(folder / "wire.toml")
     sys.modules.pop("own_wire", None)
-
-
-@pytest.fixture
-def printed(capsys):
-    """What a command prints as JSON."""
-
-    def of(*words):
-        capsys.readouterr()
-        assert run([*words, "--json"]) == 0
-        return json.loads(capsys.readouterr().out)
-
-    return of
 
 
 def test_every_field_is_a_parameter_that_can_be_set(wire, printed):
