@@ -67,7 +67,9 @@ document.documentElement.addEventListener("keydown", function (event) {
   function press(step) {
     var buttons = [...document.querySelectorAll("button")];
     var button = buttons.find(function (each) { return each.textContent.toLowerCase() === step; });
-    if (button) button.click();
+    if (!button) return;
+    button.disabled = false; // it may be gray still of the step before; the server knows
+    button.click();
   }
 
   function toggleTable() {
