@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +18,6 @@ from softreach.support.arrays import Array, as_points
 from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress
-from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, with_error
 from softreach.workspace.convex import HullCorners, climbed_hull
 from softreach.workspace.flux import box_slopes
 from softreach.workspace.grid import cube_grid
@@ -51,6 +49,8 @@ _SIGNS = 16  # cells of the grid that tells whether two bundles fold
 class ReachableRegion(ReachableSurface):
     """A region of a plane, which has an area, each place counted once, and no volume."""
 
+    _stored: ClassVar[tuple[str, ...]] = "area", "convex_area", "convex_volume", "unreachability"
+
     convex_area: float
     """Area of the convex hull [m²]."""
     convex_area_error: float
@@ -74,16 +74,8 @@ class ReachableRegion(ReachableSurface):
         return self.area, self.area_error, self.convex_area, self.convex_area_error
 
     def _lines(self) -> list[str]:
-        convex = quantity(self.convex_area, "m²", self.convex_area_error)
-        share = quantity(100 * self.unreachability, "%", 100 * self.unreachability_error)
-        return [
-            f"area {quantity(self.area, 'm²', self.area_error)} in one plane",
-            f"convex hull {convex}, of which {share} are out of reach",
-        ]
-
-    def _numbers(self) -> dict[str, Number]:
-        convex = self.convex_area, self.convex_area_error
-        return super()._numbers() | with_error("convex_area", *convex, "m2", "convex hull's area")
+        size, hull = super()._lines()
+        return [f"{size} in one plane", hull]
 
 
 @dataclass(frozen=True, repr=False)
@@ -175,8 +167,6 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
         area_error=area.error,
         convex_area=convex.value,
         convex_area_error=convex.error,
-        convex_volume=0.0,
-        convex_volume_error=0.0,
         lost_share=lost_share(rod),
         outline=tuple(plane.places(curve) for curve in found.curves),
         mapped_grid=_mesh(found, plane),

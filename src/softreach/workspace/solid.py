@@ -16,7 +16,7 @@ from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, ReachableSet, with_error
+from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
 from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
@@ -63,38 +63,34 @@ class ReachableSolid(ReachableSet):
     """
 
     dimension: ClassVar[int] = 3
+    _stored: ClassVar[tuple[str, ...]] = "volume", "convex_volume", "unreachability"
 
     tip_map: TipMap
     cells: int
     volume: float
     volume_error: float
     lost_share: float = 0.0
-    multiplicity: Mapping[int, float]
+    multiplicity: Mapping[int, float] = field(default_factory=dict)
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""
-    multiplicity_error: float
-    """Error of the volume reached more than once, the same as that of the volume itself [m³];
-    NaN for more than three free bundles."""
-    fold_volume: float
+    fold_volume: float = np.nan
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     NaN for more than three free bundles."""
-    fold_volume_error: float
-    """Change of `fold_volume` from half as fine a grid [m³]."""
     route: Route
     """Source of the volume. "flux": the map is found to be one to one, and the volume is what
     flows through the images of the six faces of the activation box. "raster": the image folds or
-    overlaps, or this is not clear; it is rasterized, and a signed volume by flux makes it exact
+    overlaps, or may do so under loads and at kinks; a signed volume by flux makes it exact
     elsewhere. "search": more than three free bundles."""
     measure_hull: Callable[[], Estimate] = field(repr=False)
     """Measures the convex hull [m³]."""
-    rasterize: Callable[[], Image | ReachedCells] = field(repr=False)
-    """Makes `image`."""
+    image: Image | ReachedCells = field(repr=False)
+    """The mapped activation grid, rasterized; of more than three bundles what was found."""
     coarse_image: Image | None = field(default=None, repr=False)
     """The image of half as fine a grid, for the route "raster"."""
 
     @property
     def convex_volume(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Volume of the convex hull [m³]; for the route "flux" measured when first asked for."""
+        """Volume of the convex hull [m³], measured when first asked for."""
         return self._hull.value
 
     @property
@@ -102,13 +98,18 @@ class ReachableSolid(ReachableSet):
         """Error of `convex_volume`, estimated from two grids [m³]."""
         return self._hull.error
 
-    @lazy
-    def image(self) -> Image | ReachedCells:
-        """The mapped activation grid, rasterized; of more than three bundles what was found.
+    @property
+    def multiplicity_error(self) -> float:
+        """Error of the volume reached more than once [m³]; NaN for more than three free bundles.
 
-        For the route "flux" it is made when it is first asked for.
+        The same as that of the volume itself, and 0 for the route "flux".
         """
-        return self.rasterize()
+        return {"flux": 0.0, "raster": self.volume_error, "search": np.nan}[self.route]
+
+    @property
+    def fold_volume_error(self) -> float:
+        """Error of `fold_volume`, as that of the volume reached more than once [m³]."""
+        return self.multiplicity_error
 
     @lazy
     def grid(self) -> xr.Dataset:
@@ -248,9 +249,8 @@ class ReachableSolid(ReachableSet):
         """All numbers with their errors and units; `multiplicity` over `activations`."""
         import xarray as xr
 
-        dataset = super().to_dataset().assign_attrs(route=self.route)
-        if self.route != "flux":  # else there may be no raster yet
-            dataset = dataset.assign_attrs(cell=self.image.lattice.cell)
+        attrs = {"route": self.route, "cell": self.image.lattice.cell}
+        dataset = super().to_dataset().assign_attrs(attrs)
         if not self.multiplicity:
             return dataset
         name = {"units": "m3", "long_name": "volume that so many activations reach"}
@@ -310,11 +310,7 @@ class ReachableSolid(ReachableSet):
         return critical_surface(self.image)
 
     def _lines(self) -> list[str]:
-        share, error = 100 * self.unreachability, 100 * self.unreachability_error
-        lines = [
-            f"volume {quantity(self.volume, 'm³', self.volume_error)}",
-            f"{self._convex_text()}, of which {quantity(share, '%', error)} are out of reach",
-        ]
+        lines = super()._lines()
         if self.shell is not None:
             area, thickness = self.shell
             sheet = f"a shell of area {quantity(area.value, 'm²', area.error)}, "
@@ -327,21 +323,15 @@ class ReachableSolid(ReachableSet):
         raster = "" if self.route == "flux" else f", cells of {self.image.lattice.cell:.3g} m"
         return [*lines, _ROUTES[self.route] + raster]
 
-    def _numbers(self) -> dict[str, Number]:
-        numbers = {
-            **with_error("volume", self.volume, self.volume_error, "m3", "volume"),
-            **self._convex_numbers(),
-        }
-        for name, size, unit in (("area", 0, "m2"), ("thickness", 1, "m")):
-            if self.shell is not None:
-                value, error = self.shell[size]
-                numbers[f"shell_{name}"] = Number(value, unit, f"{name} of the thin set")
-                numbers[f"shell_{name}_error"] = Number(error, unit, f"error of the {name}")
-        if not self.multiplicity:
-            return numbers
-        again = "error of the volume reached more than once"
-        fold = self.fold_volume, self.fold_volume_error
-        return numbers | {
-            "multiplicity_error": Number(self.multiplicity_error, "m3", again),
-            **with_error("fold_volume", *fold, "m3", "volume reached with both orientations"),
-        }
+    def _numbers(self) -> Stored:
+        numbers = super()._numbers()
+        if self.shell is not None:
+            area, thickness = self.shell
+            numbers |= with_error("shell_area", *area, "m2", "area of the thin set")
+            numbers |= with_error("shell_thickness", *thickness, "m", "thickness of the thin set")
+        if self.multiplicity:
+            about = {"units": "m3", "long_name": "error of the volume reached more than once"}
+            numbers["multiplicity_error"] = ((), self.multiplicity_error, about)
+            behind = self.fold_volume, self.fold_volume_error, "m3"
+            numbers |= with_error("fold_volume", *behind, "volume reached with both orientations")
+        return numbers
