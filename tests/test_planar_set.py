@@ -18,6 +18,7 @@ from softreach.arm import (
     Tendon,
     designs,
 )
+from softreach.arm.actuators import LengthTendon
 from softreach.atlas.metrics import chosen_metrics
 from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
@@ -120,6 +121,15 @@ def test_any_number_of_bundles_leaves_an_area_wherever_the_base_points(pairs, ch
     error = upright.area_error + leaning.area_error
     assert abs(upright.area - leaning.area) < error < 0.04 * upright.area
     assert 0.0 < upright.unreachability < 1.0
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_tendons_on_the_axis_reach_a_line_without_a_share(count):
+    axial = [LengthTendon(name=f"t{k}", distance_ratio=0.0, activation_bounds=(0.0, 0.01))
+             for k in range(count)]  # fmt: skip
+    text = repr(reachable_set(planar().replace(actuators=tuple(axial))))
+    assert "in one line" in text
+    assert "nan" not in text
 
 
 def test_a_sheet_in_space_is_no_plane():

@@ -129,7 +129,7 @@ class ReachableSet(ABC):
         """Lines to print: the size first."""
         size, hull = self._stored[:2]
         lines = [f"{_MEANINGS[size][1]} {self._text(size)}", f"convex hull {self._text(hull)}"]
-        if _MEANINGS[size][0] == _MEANINGS[hull][0]:
+        if _MEANINGS[size][0] == _MEANINGS[hull][0] and getattr(self, hull) > 0.0:
             lines[1] += f", of which {self._text('unreachability')} are out of reach"
         return lines
 

@@ -75,7 +75,7 @@ class ReachableRegion(ReachableSurface):
 
     def _lines(self) -> list[str]:
         size, hull = super()._lines()
-        return [f"{size} in one plane", hull]
+        return [f"{size} in one {'plane' if self.convex_area else 'line'}", hull]
 
 
 @dataclass(frozen=True, repr=False)
