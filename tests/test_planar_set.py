@@ -85,7 +85,7 @@ def test_tips_lie_in_the_region_and_its_outline_around_them(region):
     rod = region.tip_map
     tips = rod.tips(rod.box.from_cube(np.random.default_rng(1).random((2000, 4))))
     assert region.distance(tips).max() < 2e-4
-    outline = np.concatenate(region.outline)
+    outline = region.outline.vertices
     assert region.distance(outline).max() < 1e-9
     assert region.distance(outline + [0.0, 0.0, 1.0]).min() > 0.5
     mesh = region.surface()

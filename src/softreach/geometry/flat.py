@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -67,16 +66,18 @@ def enclosed_area(points: Points, edges: Faces) -> float:
     return 0.5 * float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
 
 
-def are_inside(points: Points, curves: Sequence[Points]) -> Mask:
-    """Mask of points inside of closed curves in the plane z = 0, by an odd number of crossings."""
+def are_inside(points: Points, edges: Array) -> Mask:
+    """Mask of points inside of closed curves in the plane z = 0, by an odd number of crossings.
+
+    Args:
+        points: Shape (n, 3).
+        edges: Both ends of each edge of the curves, shape (e, 2, 3).
+    """
     odd = np.zeros(len(points), bool)
-    for curve in curves:
-        for (x, y), (u, v) in zip(curve[:-1, :2], curve[1:, :2], strict=True):
-            if y != v:
-                crossed = (points[:, 1] < y) != (points[:, 1] < v)
-                odd[crossed] ^= points[crossed, 0] < x + (points[crossed, 1] - y) / (v - y) * (
-                    u - x
-                )
+    for (x, y, _), (u, v, _) in edges:
+        if y != v:
+            crossed = (points[:, 1] < y) != (points[:, 1] < v)
+            odd[crossed] ^= points[crossed, 0] < x + (points[crossed, 1] - y) / (v - y) * (u - x)
     return odd
 
 

@@ -18,9 +18,6 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ReachableSet", "Stored", "with_error"]
-
-
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MEANINGS = {
     "volume": ("m3", "volume"),

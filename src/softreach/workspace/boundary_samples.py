@@ -16,8 +16,6 @@ from softreach.support.arrays import Array, Index
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.image import Image
 
-__all__ = ["BoundarySamples", "boundary_samples", "overlap_samples"]
-
 _CLASSES = 4  # every other line along both directions
 
 

@@ -22,8 +22,6 @@ from softreach.workspace.wrap import Wrap
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-__all__ = ["ReachedCells"]
-
 _STARTS = 6  # tips nearby from which places are searched
 _MORE_STARTS, _NEAR = 24, 0.1  # of places that are nearer than this, in cells, to a tip
 _ON = 1e-2  # cells from a tip, where a place counts as reached

@@ -12,9 +12,6 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Lattice
 from softreach.workspace.search import ENOUGH, Flood, Nearest, nearest_tips
 
-__all__ = ["Crossings", "Edges", "boundary_edges", "swept_crossings"]
-
-
 _PROBE = 0.01  # cells: how closely crossings are enclosed
 _ROUNDS = 24
 _SWEEPS = 3

@@ -12,17 +12,6 @@ from softreach.support.arrays import Array, Mask
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
 
-__all__ = [
-    "corners_of",
-    "cube_grid",
-    "every_second",
-    "grid_stretches",
-    "grid_ticks",
-    "grid_tips",
-    "image_measure",
-]
-
-
 _BLOCK = 1 << 16  # vertices
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
 _NEARLY_ALL = 0.9

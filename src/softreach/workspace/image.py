@@ -17,9 +17,6 @@ from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
 
-__all__ = ["Image", "Lattice", "Spans", "image_of"]
-
-
 _STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
 _BYTES = 16  # of a cell: two counts, and what questions make of them
 _MARGIN = 3  # empty cells around the image

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.geometry.hull import convex_faces
-from softreach.geometry.surface import compact_surface, enclosed_volume
+from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 from softreach.workspace.crossings import Crossings
@@ -138,20 +137,16 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    return extrapolated(*(Estimate(_hull_volume(places), 0.0) for places in (points, fewer)))
+    return extrapolated(*(Estimate(convex_hull(places).volume, 0.0) for places in (points, fewer)))
 
 
 def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:
     """The same of a part of a box, and of some tips beside it [m], shape (n, 3)."""
     corners = _corners(fine)
-    value = _hull_volume(np.concatenate([corners, tips]))
-    removed = (_hull_volume(_corners(common)) - _hull_volume(_corners(coarse))) / 3.0
-    error = abs(removed) + value - _hull_volume(corners)
+    value = convex_hull(np.concatenate([corners, tips])).volume
+    removed = (convex_hull(_corners(common)).volume - convex_hull(_corners(coarse)).volume) / 3.0
+    error = abs(removed) + value - convex_hull(corners).volume
     return Estimate(value + removed, error)
-
-
-def _hull_volume(points: Array) -> float:
-    return enclosed_volume(*compact_surface(points, convex_faces(points)))
 
 
 def _corners(image: Image) -> Array:

@@ -20,8 +20,6 @@ from softreach.workspace.tip_derivatives import TipDerivatives
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-__all__ = ["MovingBoundary"]
-
 _CELLS = 40  # along each edge of the box, where its faces are the boundary
 _BLOCK = 1 << 21  # numbers at once
 _SLIVER = 1e-2  # of the mean area: the normal of what is smaller tells nothing

@@ -13,7 +13,6 @@ from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
 from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, warn
-from softreach.support.memory import free_memory
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.abstract_set import ReachableSet
@@ -22,7 +21,7 @@ from softreach.workspace.flux import grid_faces, signed_volume
 from softreach.workspace.grid import corners_of, every_second, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.planar import planar_set, plane_of_tips
-from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
+from softreach.workspace.redundant import lost_share, searched_set
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import thin_set
 
@@ -107,7 +106,19 @@ def reachable_set(
         result = _of_three(rod, accuracy, cell, progress)
         finer = f"a grid above {result.cells} and a smaller cell"
     else:
-        result = _of_many(rod, accuracy, cell, memory, progress)
+        cells, volume = searched_set(rod, accuracy, cell, memory, progress)
+        hull = cells.hull
+        assert hull is not None
+        result = ReachableSolid(
+            tip_map=rod,
+            cells=0,
+            volume=volume.value,
+            volume_error=volume.error,
+            measure_hull=lambda: hull.volume,
+            lost_share=lost_share(rod),
+            route="search",
+            image=cells,
+        )
         finer = "a smaller cell" if cell is not None else "more memory"
     if result.volume_error > accuracy * result.volume:
         warn(
@@ -140,40 +151,6 @@ def rasterized_set(
     return _by_raster(rod, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
 
 
-def grid_for(accuracy: float) -> int:
-    """The rule for n: even, within what memory and patience hold.
-
-    Args:
-        accuracy: Relative error of the volume.
-    """
-    most = np.cbrt(_MOST_VERTICES) - 1.0
-    return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
-
-
-def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
-    """Cells in space around tips.
-
-    Args:
-        tips: [m], shape (n, 3).
-        cell: Edge of a cell [m]; by the rule for h if None.
-        accuracy: Relative error of the volume that the rule is for.
-
-    Raises:
-        InvalidInput: Cells so small that memory does not hold them.
-    """
-    sides = np.ptp(tips, axis=0)
-    if cell is not None:
-        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
-        if not smallest <= cell < np.inf:  # NaN too
-            raise InvalidInput(
-                "cell", cell, f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
-            )
-        return Lattice.around(tips, float(cell))
-    edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
-    # An image that is almost flat would need countless cells along it.
-    return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
-
-
 def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
     """True if the volume errs by more than asked, and grids that memory holds may be fine enough.
 
@@ -192,7 +169,8 @@ def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
 def _of_three(
     rod: TipMap, accuracy: float, cell: float | None, progress: Progress
 ) -> ReachableSolid:
-    cells = grid_for(accuracy)
+    most = np.cbrt(_MOST_VERTICES) - 1.0
+    cells = max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
     while True:
         grid = _Grid.of(rod, cells, progress)
         fine = grid.image(grid.lattice(cell, accuracy), progress)
@@ -251,29 +229,6 @@ def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> Reacha
     )
 
 
-def _of_many(
-    rod: TipMap,
-    accuracy: float,
-    cell: float | None,
-    memory: float | None,
-    progress: Progress,
-) -> ReachableSolid:
-    memory = max(free_memory() / 4.0, smallest_memory(rod)) if memory is None else memory
-    if not smallest_memory(rod) <= memory < np.inf:
-        raise InvalidInput("memory", memory, f"at least {smallest_memory(rod):.3g} bytes")
-    search = searched_set(rod, accuracy, cell, memory, progress)
-    return ReachableSolid(
-        tip_map=rod,
-        cells=0,
-        volume=search.volume.value,
-        volume_error=search.volume.error,
-        measure_hull=lambda: search.convex_volume,
-        lost_share=lost_share(rod),
-        route="search",
-        image=search.cells,
-    )
-
-
 class _Grid(NamedTuple):
     """The mapped vertices of a grid of three bundles."""
 
@@ -292,7 +247,7 @@ class _Grid(NamedTuple):
         return cls(tips, grid_stretches(rod, tips, cells, left_out), left_out)
 
     def lattice(self, cell: float | None, accuracy: float) -> Lattice:
-        """Cells in space around the image.
+        """Cells in space around the image, of an edge by the rule for h if `cell` is None [m].
 
         Raises:
             InvalidInput: All cells of the grid are left out, or memory does not hold those in
@@ -302,7 +257,17 @@ class _Grid(NamedTuple):
         if not used.any():
             fault = f"no cell of an activation grid of {len(self.left_out)}³ has a stable, untorn "
             raise loads_too_heavy(fault + "image")
-        return lattice_for(self.tips[used], cell=cell, accuracy=accuracy)
+        tips = self.tips[used]
+        sides = np.ptp(tips, axis=0)
+        if cell is None:
+            edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
+            # An image that is almost flat would need countless cells along it.
+            return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
+        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
+        if not smallest <= cell < np.inf:  # NaN too
+            allowed = f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
+            raise InvalidInput("cell", cell, allowed)
+        return Lattice.around(tips, float(cell))
 
     def is_one_to_one(self, image: Image) -> bool:
         """True if no place of the image is found to be reached twice; none may be left out.

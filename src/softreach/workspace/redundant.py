@@ -9,8 +9,6 @@ it; what searches miss is missing from the volume.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
@@ -18,6 +16,7 @@ from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.memory import free_memory
 from softreach.support.progress import Progress
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.convex import ConvexHull, climbed_hull
@@ -25,17 +24,6 @@ from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
 from softreach.workspace.wrap import DISTANCE, Wrap, spread, wrapped
-
-__all__ = [
-    "Searched",
-    "cloud_on_faces",
-    "flooded",
-    "lost_share",
-    "searched_set",
-    "shifted_lattice",
-    "smallest_memory",
-]
-
 
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
 _CLOUD = 1 << 16  # tips in a cloud that searches start from
@@ -53,30 +41,32 @@ CLIMBERS = 1024
 """Of these, for the convex hull beside tips on the boundary: more make countless facets."""
 
 
-class Searched(NamedTuple):
-    """A reachable set found by search."""
-
-    cells: ReachedCells
-    volume: Estimate
-    convex_volume: Estimate
+def smallest_memory(rod: TipMap) -> float:
+    """Memory that a search cannot do without [bytes]."""
+    return _fixed(rod) + 2e4 * _per_cell(rod)
 
 
 def searched_set(
-    rod: TipMap, accuracy: float, cell: float | None, memory: float, progress: Progress
-) -> Searched:
-    """The image of a box of four free bundles or more.
+    rod: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
+) -> tuple[ReachedCells, Estimate]:
+    """The image of a box of four free bundles or more, and its volume [m³].
 
     Args:
         rod: The tip map.
         accuracy: Relative error asked of the volume: cells become smaller until it is met, or
             `memory` is used.
         cell: Edge of a cell [m], instead of the rule's.
-        memory: Memory that the search may use [bytes].
+        memory: Memory that the search may use [bytes]; a quarter of what is free if None.
         progress: Called with the number of centers searched since its last call.
 
     Raises:
-        InvalidInput: No activation has a stable equilibrium, or cells are too small for the memory.
+        InvalidInput: No activation has a stable equilibrium, too little memory, or cells too small
+            for it.
     """
+    least = smallest_memory(rod)
+    memory = max(free_memory() / 4.0, least) if memory is None else memory
+    if not least <= memory < np.inf:
+        raise InvalidInput("memory", memory, f"at least {least:.3g} bytes")
     cloud = gamma, tips = cloud_on_faces(rod, 0)
     sides = np.ptp(tips, axis=0)
     smallest = _smallest_cell(rod, sides, memory)
@@ -95,25 +85,27 @@ def searched_set(
     while True:
         flood = of_cells(edge)
         found = _found(flood, cloud, coarse, hull)
-        if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
+        if cell is not None or not _may_meet(*found, accuracy, smallest, mean / _THINNEST):
             return found
-        edge, coarse = edge / _FINER, found.cells.wrap
+        edge, coarse = edge / _FINER, found[0].wrap
 
 
-def _may_meet(found: Searched, accuracy: float, smallest: float, of_sheets: float) -> bool:
+def _may_meet(
+    cells: ReachedCells, volume: Estimate, accuracy: float, smallest: float, of_sheets: float
+) -> bool:
     """True if an accuracy is not met but may be, by cells that are no smaller than allowed.
 
     Where nothing is seen between both sides of a sheet, its error falls as the square of the edge,
     until the sheet is thin enough for its thickness to be found.
     """
-    (volume, error), cells = found.volume, found.cells
     edge = cells.lattice.cell
-    if error <= accuracy * volume or edge / _FINER < smallest:
+    value, error = volume
+    if error <= accuracy * value or edge / _FINER < smallest:
         return False
     if cells.is_thick:
         return True
     is_sheet = cells.wrap.volume_of_tips != cells.wrap.tight_volume
-    needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(volume, 0.0) / error)
+    needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(value, 0.0) / error)
     return needed >= of_sheets
 
 
@@ -135,11 +127,6 @@ def shifted_lattice(tips: Array, cell: float) -> Lattice:
     """A lattice around tips [m], shape (n, 3), that shares no plane of symmetry with them."""
     lattice = Lattice.around(tips, cell)
     return lattice._replace(origin=lattice.origin + cell * _SHIFT)
-
-
-def smallest_memory(rod: TipMap) -> float:
-    """Memory that a search cannot do without [bytes]."""
-    return _fixed(rod) + 2e4 * _per_cell(rod)
 
 
 def lost_share(rod: TipMap) -> float:
@@ -169,7 +156,9 @@ def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
     return high
 
 
-def _found(flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexHull) -> Searched:
+def _found(
+    flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexHull
+) -> tuple[ReachedCells, Estimate]:
     """The set by its wrap; by lines of sight if these tell the volume better, and agree."""
     rod, edge, wrap = flood.rod, flood.lattice.cell, wrapped(flood)
     change = abs(wrap.volume_of_tips - coarse.volume_of_tips)
@@ -182,7 +171,7 @@ def _found(flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexH
         error = seen.error + missed + area * (ENOUGH * edge + rod.tol * rod.length)
         if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
             volume = Estimate(seen.value, error)
-    return Searched(reached, volume, hull.volume)
+    return reached, volume
 
 
 def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:

@@ -14,9 +14,6 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.lazy import lazy
 
-__all__ = ["Shifts", "shifts_along"]
-
-
 _SCALES = {"m": 0.1, "rad": 0.1}
 """Of parameters that are 0, by their unit; lengths in L."""
 

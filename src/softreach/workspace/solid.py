@@ -28,8 +28,6 @@ from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ReachableSolid", "Route"]
-
 Route = Literal["flux", "raster", "search"]
 
 _THIN = 0.01  # of its width, the root of its area, that a shell is thinner than

@@ -19,9 +19,6 @@ from softreach.workspace.discontinuities import coarser, corner_values, finer, l
 from softreach.workspace.grid import every_second, grid_ticks, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
 
-__all__ = ["ReachableCurve", "ReachablePoint", "ReachableSurface", "thin_set"]
-
-
 _CELLS = {1: 1024, 2: 128}  # of the grids of a curve and of a surface, for distances and pictures
 _NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
 

@@ -17,8 +17,6 @@ from softreach.support.arrays import Array
 from softreach.support.progress import Progress, silent
 from softreach.workspace.shifts import Shifts, shifts_along
 
-__all__ = ["TipDerivatives"]
-
 _STEP = 1e-5  # of a parameter: tips in equal steps are smooth to rounding
 _LOADED_STEP = 1e-3  # where they are as exact as an equilibrium is found
 _TRIES = 16  # numbers of steps

@@ -18,8 +18,6 @@ from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace.search import CLEARLY, ENOUGH, Flood, Nearest, nearest_tips
 
-__all__ = ["DISTANCE", "Wrap", "drawn_tight", "spread", "wrapped"]
-
 DISTANCE = 0.75
 """Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
 _ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
