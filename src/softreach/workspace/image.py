@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.image import contour, point_cover, raster
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
@@ -136,6 +137,13 @@ class Image:
         """Vertices of the grid of n³ boxes in the unit cube by number, shape (*which.shape, 3)."""
         n = round(len(self.vertices) ** (1 / 3)) - 1
         return np.stack(np.unravel_index(which, (n + 1,) * 3), axis=-1) / n
+
+    @lazy
+    def critical_surface(self) -> Surface:
+        """All critical triangles: the boundary of the image, and folds and walls inside it."""
+        vertices, faces = compact_surface(self.vertices, self.triangles[:, :3])
+        placed = self.lattice.origin + vertices * (self.lattice.cell / self.unit)
+        return Surface(vertices=placed, faces=faces)
 
     @lazy
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

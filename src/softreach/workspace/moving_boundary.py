@@ -12,7 +12,7 @@ import numpy as np
 from softreach.arm.parameters import Parameter
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
-from softreach.workspace.boundary_samples import boundary_samples
+from softreach.workspace.boundary import boundary_samples
 from softreach.workspace.flux import face_image, grid_faces
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tip_derivatives import TipDerivatives

@@ -17,7 +17,7 @@ from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
-from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
+from softreach.workspace.boundary import boundary_surface, signed_field
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
@@ -230,8 +230,11 @@ class ReachableSolid(ReachableSet):
         inside = self.contains(positions)
         out = np.empty(len(positions))
         out[inside] = -self._boundary.distance(positions[inside])
-        outside = self._searched or self._critical
-        out[~inside] = outside.distance(positions[~inside])
+        if (searched := self._searched) is not None:
+            out[~inside] = searched.distance(positions[~inside])
+        else:
+            assert isinstance(self.image, Image)
+            out[~inside] = self.image.critical_surface.distance(positions[~inside])
         return out
 
     def _repr_html_(self) -> str:
@@ -301,11 +304,6 @@ class ReachableSolid(ReachableSet):
     @lazy
     def _face_image(self) -> Surface | None:
         return face_image(self.tip_map)
-
-    @lazy
-    def _critical(self) -> Surface:
-        assert isinstance(self.image, Image)
-        return critical_surface(self.image)
 
     def _lines(self) -> list[str]:
         lines = super()._lines()
