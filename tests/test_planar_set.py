@@ -23,7 +23,7 @@ from softreach.atlas.metrics import chosen_metrics
 from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import flat_areas, unreachability
-from softreach.geometry.flat import alpha_triangles, convex_edges, enclosed_area, plane_of
+from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
 from softreach.rod.rods import tip_map
 from softreach.workspace import ReachableRegion, ReachableSolid, reachable_set
 
@@ -151,8 +151,8 @@ def test_clouds_in_a_plane_have_areas():
     assert plane is not None
     assert plane.sides[2] < 1e-12
     ring = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.0]], float)
-    triangles, areas = alpha_triangles(ring, 0.6)
-    assert (len(triangles), areas.sum()) == (4, pytest.approx(1.0))
+    assert alpha_area(ring, 0.6) == pytest.approx(1.0)
+    assert alpha_area(ring, 0.4) == 0.0
 
 
 def printed_json(capsys, *arguments):

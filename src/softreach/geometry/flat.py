@@ -8,7 +8,7 @@ import numpy as np
 
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 
-__all__ = ["Plane", "alpha_triangles", "are_inside", "convex_edges", "enclosed_area", "plane_of"]
+__all__ = ["Plane", "alpha_area", "are_inside", "convex_edges", "enclosed_area", "plane_of"]
 
 
 class Plane(NamedTuple):
@@ -81,25 +81,21 @@ def are_inside(points: Points, edges: Array) -> Mask:
     return odd
 
 
-def alpha_triangles(points: Points, alpha: float) -> tuple[Index, Array]:
-    """Delaunay triangles of points in the plane z = 0 with a circumradius below α, and their areas.
+def alpha_area(points: Points, alpha: float) -> float:
+    """Area [m²] of the α-shape of points in the plane z = 0, by Delaunay triangles.
 
     Args:
         points: [m], shape (n, 3).
-        alpha: Radius [m].
-
-    Returns:
-        Shapes (t, 3) and (t,).
+        alpha: Radius of the circumscribed circles [m].
     """
     from scipy.spatial import Delaunay, QhullError
 
     try:
         triangles = Delaunay(points[:, :2]).simplices
     except (QhullError, ValueError):  # on one line, or too few
-        return np.empty((0, 3), np.intp), np.empty(0)
+        return 0.0
     a, b, c = np.moveaxis(points[triangles][..., :2], 1, 0)
     (x, y), (u, v) = (b - a).T, (c - a).T
     area = 0.5 * np.abs(x * v - y * u)
     sides = np.prod([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    kept = sides < 4.0 * alpha * area
-    return triangles[kept].astype(np.intp), area[kept]
+    return float(area[sides < 4.0 * alpha * area].sum())

@@ -151,17 +151,16 @@ def _of_cells(cells: ReachedCells) -> BoundarySamples:
         group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
         return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
     crossings, _ = cells.swept
-    edges, lattice = crossings.edges, cells.lattice
-    every = np.arange(len(edges.cell))
-    index = np.stack(np.unravel_index(edges.cell, lattice.shape), axis=-1)
-    i, j = index[every, (edges.axis + 1) % 3], index[every, (edges.axis + 2) % 3]
+    every, axis, lattice = np.arange(len(crossings.cell)), crossings.axis, cells.lattice
+    index = np.stack(np.unravel_index(crossings.cell, lattice.shape), axis=-1)
+    i, j = index[every, (axis + 1) % 3], index[every, (axis + 2) % 3]
     area = np.zeros((len(every), 3))
-    area[every, edges.axis] = lattice.cell**2 * edges.sense
+    area[every, axis] = lattice.cell**2 * crossings.sense
     return BoundarySamples(
         rod.box.to_cube(crossings.beyond)[:, rod.box.free].clip(0.0, 1.0),
         crossings.points(every, crossings.place),
         area,
-        _group(edges.axis, i, j),
+        _group(axis, i, j),
     )
 
 

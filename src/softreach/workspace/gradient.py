@@ -44,11 +44,8 @@ _RASTER_STEP = 2e-2  # of a parameter, where neighbors are rasterized, which is 
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
 _MEANINGS = {
     "volume": ("m3 per unit", "derivative of the reachable volume"),
-    "volume_error": ("m3 per unit", "error of the derivative of the reachable volume"),
     "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
-    "convex_volume_error": ("m3 per unit", "error of the derivative of the convex hull's volume"),
     "unreachability": ("1 per unit", "derivative of the unreachability"),
-    "unreachability_error": ("1 per unit", "error of the derivative of the unreachability"),
 }
 
 
@@ -170,10 +167,11 @@ class VolumeGradient:
         """All derivatives with their errors over `parameter`, and where they come from."""
         import xarray as xr
 
-        numbers = {
-            name: ("parameter", getattr(self, name), {"units": unit, "long_name": meaning})
-            for name, (unit, meaning) in _MEANINGS.items()
-        }
+        numbers = {}
+        for name, (unit, meaning) in _MEANINGS.items():
+            for of, what in (("", ""), ("_error", "error of the ")):
+                about = {"units": unit, "long_name": what + meaning}
+                numbers[name + of] = ("parameter", getattr(self, name + of), about)
         coordinates = {"parameter": list(self.parameters), "unit": ("parameter", list(self.units))}
         attrs = {**provenance(self.solid.arm, self.solid.tip_map.frame), "route": self.route}
         return xr.Dataset(numbers, coordinates, attrs)

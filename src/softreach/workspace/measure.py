@@ -54,9 +54,9 @@ def solid_volume(
     signed = signed_volume(rod, None if rough else _NODES, enough=FLUX_PART * accuracy * rough)
     sense = 1 if signed.value >= 0 else -1
     at_fine, at_coarse = _correction(fine, sense), _correction(coarse, sense)
-    beyond = extrapolated(at_fine, at_coarse)
-    removed = abs(beyond.value - at_fine.value)
-    return Estimate(abs(signed.value) + beyond.value, signed.error + removed + at_fine.error)
+    removed = (at_fine.value - at_coarse.value) / 3.0
+    value = abs(signed.value) + (at_fine.value + removed)
+    return Estimate(value, signed.error + abs(removed) + at_fine.error)
 
 
 def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) -> Estimate:
@@ -79,12 +79,6 @@ def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) 
     unknown = 0.0 if at_coarse.value > 0.0 else at_fine.value  # nothing to compare with
     error = abs(removed) + at_fine.error + 0.5 * remainder + unknown
     return Estimate(at_fine.value + removed + remainder, error)
-
-
-def extrapolated(fine: Estimate, coarse: Estimate) -> Estimate:
-    """The limit of values whose error falls by four when the grid is halved (Richardson)."""
-    removed = (fine.value - coarse.value) / 3.0
-    return Estimate(fine.value + removed, _LEFT * abs(removed) + fine.error)
 
 
 def multiply_covered(
@@ -137,7 +131,9 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    return extrapolated(*(Estimate(convex_hull(places).volume, 0.0) for places in (points, fewer)))
+    fine, coarse = convex_hull(points).volume, convex_hull(fewer).volume
+    removed = (fine - coarse) / 3.0
+    return Estimate(fine + removed, _LEFT * abs(removed))
 
 
 def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:
@@ -226,12 +222,12 @@ class Runs(NamedTuple):
 
 def runs_along(crossings: Crossings, axis: int) -> Runs:
     """All runs along an axis."""
-    edges, shape = crossings.edges, crossings.lattice.shape
+    shape = crossings.lattice.shape
     others = [a for a in range(3) if a != axis]
     ends = []
     for sense in (-1, 1):
-        which = np.flatnonzero((edges.axis == axis) & (edges.sense == sense))
-        index = np.unravel_index(edges.cell[which], shape)
+        which = np.flatnonzero((crossings.axis == axis) & (crossings.sense == sense))
+        index = np.unravel_index(crossings.cell[which], shape)
         line = index[others[0]] * shape[others[1]] + index[others[1]]
         order = np.lexsort((index[axis], line))
         center = index[axis][order]

@@ -166,7 +166,7 @@ def _found(
     reached = ReachedCells(flood, cloud, wrap, coarse, hull)
     if reached.is_thick:
         lines, missed = reached.swept
-        area = len(lines.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
+        area = len(lines.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
         seen = line_volume(lines)
         error = seen.error + missed + area * (ENOUGH * edge + rod.tol * rod.length)
         if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
