@@ -151,13 +151,11 @@ class ReachableSolid(ReachableSet):
             fine, coarse = self.image.wrap.area, self.image.coarse.area
             return Estimate(fine, abs(fine - coarse))
         cells = 48 if self.tip_map.supports_unstable else 96
-        faces = [face_image(self.tip_map, count) for count in (cells, cells // 2)]
-        areas = [np.nan if face is None else face.area for face in faces]
-        removed = (areas[0] - areas[1]) / 3.0
+        fine, coarse = (face_image(self.tip_map, count).area for count in (cells, cells // 2))
+        removed = (fine - coarse) / 3.0
         # What is reached more than once counts once, and may be any part of the faces.
-        several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
-        share = several / self.volume if self.volume > 0.0 else 1.0
-        return Estimate(areas[0] + removed, abs(removed) + share * areas[0])
+        share = self._several / self.volume if self.volume > 0.0 else 1.0
+        return Estimate(fine + removed, abs(removed) + share * fine)
 
     def surface(self) -> Surface:
         """The boundary: closed, oriented outwards, without staircase.
@@ -172,8 +170,9 @@ class ReachableSolid(ReachableSet):
         Raises:
             MissingExtra: scikit-image is not installed.
         """
-        image = self._face_image if self.route == "flux" and not self.lost_share else None
-        return without_flakes(self._boundary, self.volume_error) if image is None else image
+        if self.route == "flux":
+            return self._face_image
+        return without_flakes(self._boundary, self.volume_error)
 
     def sheets(self) -> Sheets:
         """The boundary as the sheets it consists of: images of faces of the box, and folds.
@@ -260,6 +259,10 @@ class ReachableSolid(ReachableSet):
             multiplicity=volumes
         )
 
+    @property
+    def _several(self) -> float:
+        return sum(volume for times, volume in self.multiplicity.items() if times > 1)
+
     @lazy
     def _hull(self) -> Estimate:
         return self.measure_hull()
@@ -290,19 +293,15 @@ class ReachableSolid(ReachableSet):
 
     @lazy
     def _sheets(self) -> Sheets:
-        sheets = None
-        if self.route == "flux" and not self.lost_share:
-            sheets = box_sheets(self.tip_map)
-        elif (
-            isinstance(self.image, Image)
-            and self.tip_map.is_smooth
-            and not self.tip_map.supports_unstable
-        ):
-            sheets = outer_sheets(self.tip_map, self.image)
-        return Sheets.of(self.surface()) if sheets is None else sheets
+        rod = self.tip_map
+        if self.route == "flux":
+            return box_sheets(rod)
+        if isinstance(self.image, Image) and rod.is_smooth and not rod.supports_unstable:
+            return outer_sheets(rod, self.image)
+        return Sheets.of(self.surface())
 
     @lazy
-    def _face_image(self) -> Surface | None:
+    def _face_image(self) -> Surface:
         return face_image(self.tip_map)
 
     def _lines(self) -> list[str]:
@@ -312,8 +311,7 @@ class ReachableSolid(ReachableSet):
             sheet = f"a shell of area {quantity(area.value, 'm²', area.error)}, "
             lines.insert(0, f"{sheet}thickness {quantity(thickness.value, 'm', thickness.error)}")
         if self.multiplicity:
-            several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
-            again = quantity(several, "m³", self.multiplicity_error)
+            again = quantity(self._several, "m³", self.multiplicity_error)
             behind = quantity(self.fold_volume, "m³", self.fold_volume_error)
             lines.append(f"reached more than once {again}, behind folds {behind}")
         raster = "" if self.route == "flux" else f", cells of {self.image.lattice.cell:.3g} m"
