@@ -106,14 +106,14 @@ def reachable_set(
         result = _of_three(rod, accuracy, cell, progress)
         finer = f"a grid above {result.cells} and a smaller cell"
     else:
-        cells, volume = searched_set(rod, accuracy, cell, memory, progress)
+        cells = searched_set(rod, accuracy, cell, memory, progress)
         hull = cells.hull
         assert hull is not None
         result = ReachableSolid(
             tip_map=rod,
             cells=0,
-            volume=volume.value,
-            volume_error=volume.error,
+            volume=cells.volume.value,
+            volume_error=cells.volume.error,
             measure_hull=lambda: hull.volume,
             lost_share=lost_share(rod),
             route="search",

@@ -19,11 +19,10 @@ from softreach.support.errors import InvalidInput
 from softreach.support.memory import free_memory
 from softreach.support.progress import Progress
 from softreach.workspace.cells import ReachedCells
-from softreach.workspace.convex import ConvexHull, climbed_hull
+from softreach.workspace.convex import climbed_hull
 from softreach.workspace.image import Lattice
-from softreach.workspace.measure import Estimate, line_volume
-from softreach.workspace.search import ENOUGH, Flood
-from softreach.workspace.wrap import DISTANCE, Wrap, spread, wrapped
+from softreach.workspace.search import Flood
+from softreach.workspace.wrap import DISTANCE, spread, wrapped
 
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
 _CLOUD = 1 << 16  # tips in a cloud that searches start from
@@ -43,13 +42,14 @@ CLIMBERS = 1024
 
 def smallest_memory(rod: TipMap) -> float:
     """Memory that a search cannot do without [bytes]."""
-    return _fixed(rod) + 2e4 * _per_cell(rod)
+    fixed, each = _bytes(rod)
+    return fixed + 2e4 * each
 
 
 def searched_set(
     rod: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
-) -> tuple[ReachedCells, Estimate]:
-    """The image of a box of four free bundles or more, and its volume [m³].
+) -> ReachedCells:
+    """The image of a box of four free bundles or more.
 
     Args:
         rod: The tip map.
@@ -84,27 +84,25 @@ def searched_set(
     hull = climbed_hull(rod, begin.clip(0.0, 1.0), accuracy)
     while True:
         flood = of_cells(edge)
-        found = _found(flood, cloud, coarse, hull)
-        if cell is not None or not _may_meet(*found, accuracy, smallest, mean / _THINNEST):
+        found = ReachedCells(flood, cloud, wrapped(flood), coarse, hull)
+        if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
             return found
-        edge, coarse = edge / _FINER, found[0].wrap
+        edge, coarse = edge / _FINER, found.wrap
 
 
-def _may_meet(
-    cells: ReachedCells, volume: Estimate, accuracy: float, smallest: float, of_sheets: float
-) -> bool:
+def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: float) -> bool:
     """True if an accuracy is not met but may be, by cells that are no smaller than allowed.
 
     Where nothing is seen between both sides of a sheet, its error falls as the square of the edge,
     until the sheet is thin enough for its thickness to be found.
     """
     edge = cells.lattice.cell
-    value, error = volume
+    value, error = cells.volume
     if error <= accuracy * value or edge / _FINER < smallest:
         return False
     if cells.is_thick:
         return True
-    is_sheet = cells.wrap.volume_of_tips != cells.wrap.tight_volume
+    is_sheet = cells.wrap.volume_of_tips.value != cells.wrap.tight_volume
     needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(value, 0.0) / error)
     return needed >= of_sheets
 
@@ -120,7 +118,7 @@ def cells_of(rod: TipMap, cell: float) -> ReachedCells:
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
     flood = flooded(Flood(rod, shifted_lattice(cloud[1], edge)), *cloud)
     wrap = wrapped(flood)
-    return ReachedCells(flood, cloud, wrap, wrap, None)
+    return ReachedCells(flood, cloud, wrap, wrap)
 
 
 def shifted_lattice(tips: Array, cell: float) -> Lattice:
@@ -138,40 +136,19 @@ def lost_share(rod: TipMap) -> float:
     return float(np.isnan(tips[:, 0]).mean())
 
 
-def _fixed(rod: TipMap) -> float:
-    return 16.0 * 8.0 * _CLOUD * (rod.box.bundles + 3)
-
-
-def _per_cell(rod: TipMap) -> float:
-    """Bytes of a center: its gap and activation, masks, and its part of the edges."""
-    return 16.0 * rod.box.bundles + 120.0
+def _bytes(rod: TipMap) -> tuple[float, float]:
+    """Of clouds, and of a center: its gap and activation, masks, and its part of the edges."""
+    return 16.0 * 8.0 * _CLOUD * (rod.box.bundles + 3), 16.0 * rod.box.bundles + 120.0
 
 
 def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
-    most = min((memory - _fixed(rod)) / _per_cell(rod), _MOST_CELLS)
+    fixed, each = _bytes(rod)
+    most = min((memory - fixed) / each, _MOST_CELLS)
     low, high = 0.0, 1.0 + float(sides.max())
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if np.prod(sides / middle + 8.0) <= most else (middle, high)
     return high
-
-
-def _found(
-    flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexHull
-) -> tuple[ReachedCells, Estimate]:
-    """The set by its wrap; by lines of sight if these tell the volume better, and agree."""
-    rod, edge, wrap = flood.rod, flood.lattice.cell, wrapped(flood)
-    change = abs(wrap.volume_of_tips - coarse.volume_of_tips)
-    volume = Estimate(wrap.volume_of_tips, change + wrap.error_of_tips)
-    reached = ReachedCells(flood, cloud, wrap, coarse, hull)
-    if reached.is_thick:
-        lines, missed = reached.swept
-        area = len(lines.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
-        seen = line_volume(lines)
-        error = seen.error + missed + area * (ENOUGH * edge + rod.tol * rod.length)
-        if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
-            volume = Estimate(seen.value, error)
-    return reached, volume
 
 
 def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
