@@ -7,7 +7,6 @@ through the boundary, theory (98), and need no normals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,50 +89,36 @@ class BoundarySamples:
             weights: Of each node, shape (n,): 1 where it is in a region and 0 elsewhere give the
                 derivative of the volume of the part of the set in that region.
         """
-        return self._swept(slopes, weights).sum(axis=0)
+        area = self.area if weights is None else self.area * weights[:, None]
+        return np.einsum("ni,nip->p", area, slopes)
 
-    def noise(self, slopes: Array, weights: Array | None = None) -> Array:
+    def noise(self, slopes: Array) -> Array:
         """Two standard deviations of `derivative` from where the lines lie, shape (parameters,).
 
         Every other line along both directions tells how much.
         """
-        swept = self._swept(slopes, weights)
-        groups = np.zeros((3 * _CLASSES, swept.shape[1]))
-        np.add.at(groups, self.group, swept)
+        groups = np.zeros((3 * _CLASSES, slopes.shape[2]))
+        np.add.at(groups, self.group, np.einsum("ni,nip->np", self.area, slopes))
         of_axes = groups.reshape(3, _CLASSES, -1)
         off = _CLASSES * of_axes - of_axes.sum(axis=1, keepdims=True)
         return np.sqrt((off**2).mean(axis=1).sum(axis=0))
 
-    def _swept(self, slopes: Array, weights: Array | None) -> Array:
-        area = self.area if weights is None else self.area * weights[:, None]
-        return np.einsum("ni,nip->np", area, slopes)
 
-
-def boundary_samples(image: Image | ReachedCells) -> BoundarySamples:
-    """Nodes on all of the boundary of an image; the vertices of what is wrapped."""
-    if isinstance(image, ReachedCells):
-        return _of_cells(image)
-    return _of_image(image, lambda reached, _: reached)
-
-
-def overlap_samples(image: Image, sense: int) -> BoundarySamples:
-    """Nodes where the image is not one to one: the boundary less what of it the degree tells.
-
-    They are nodes for the derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
+def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySamples:
+    """Nodes on all of the boundary of an image; the vertices of what is wrapped.
 
     Args:
-        image: Of three free bundles.
-        sense: Orientation that the larger part of the map keeps, 1 or -1.
+        image: Of three free bundles or more.
+        sense: Of three, the orientation that the larger part of the map keeps, 1 or -1: nodes are
+            then those where the image is not one to one, the boundary less what of it the degree
+            tells, for the derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
     """
-    return _of_image(image, lambda reached, degree: reached - sense * degree)
-
-
-def _of_image(image: Image, jump: Callable[[Index, Index], Index]) -> BoundarySamples:
-    """Nodes where `jump` of the changes of reach (1, 0 or -1) and of the degree is not 0."""
+    if isinstance(image, ReachedCells):
+        return _of_cells(image)
     lattice, rules = image.lattice, []
     for axis, spans in enumerate(image.spans):
-        reached = (spans.cover > 0).astype(np.int64)
-        jumps = jump(np.diff(reached, prepend=0), np.diff(spans.degree, prepend=0))
+        jumps = np.diff((spans.cover > 0).astype(np.int64), prepend=0)
+        jumps -= sense * np.diff(spans.degree, prepend=0)
         which = np.flatnonzero(jumps)
         i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
         at = np.empty((len(which), 3))

@@ -20,7 +20,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import ReachableSet
-from softreach.workspace.boundary import BoundarySamples, boundary_samples, overlap_samples
+from softreach.workspace.boundary import BoundarySamples, boundary_samples
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.convex import HullCorners
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
@@ -223,8 +223,8 @@ def _flowing(solid: ReachableSolid, tips: TipDerivatives, accuracy: float) -> _S
         return value, error
     assert isinstance(solid.image, Image)
     assert solid.coarse_image is not None
-    fine = _sum(overlap_samples(solid.image.with_more_lines(_LINES), sense), tips)
-    coarse = _sum(overlap_samples(solid.coarse_image, sense), tips)
+    fine = _sum(boundary_samples(solid.image.with_more_lines(_LINES), sense), tips)
+    coarse = _sum(boundary_samples(solid.coarse_image, sense), tips)
     removed = (fine.value - coarse.value) / 3.0
     return value + fine.value + removed, error + fine.error + np.abs(removed)
 

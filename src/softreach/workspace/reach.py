@@ -210,9 +210,9 @@ def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> Reacha
         volume = measure.solid_volume(rod, fine, coarse, accuracy)
     if np.isnan(volume.value):
         common = grid.in_common().image(fine.lattice)
-        edge = remainder(rod, fine, grid.stretches, grid.left_out)
-        volume = measure.partial_volume(fine, common, coarse, edge.volume)
-        hull = partial(measure.partial_convex_volume, fine, common, coarse, edge.tips)
+        rest, tips = remainder(rod, fine, grid.stretches, grid.left_out)
+        volume = measure.partial_volume(fine, common, coarse, rest)
+        hull = partial(measure.partial_convex_volume, fine, common, coarse, tips)
     several, change = measure.multiply_covered(fine, coarse, common)
     return ReachableSolid(
         tip_map=rod,
