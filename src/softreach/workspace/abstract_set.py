@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -40,6 +41,7 @@ def with_error(name: str, value: float, error: float, unit: str, meaning: str) -
     }
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachableSet(ABC):
     """The image of the activation box under the map from activations to tips.
 
@@ -55,7 +57,7 @@ class ReachableSet(ABC):
     tip_map: TipMap
     """The map whose image this is, with its arm, activation box and tolerance; drives with dead
     zones by inputs beyond these."""
-    cells: int
+    cells: int = 0
     """Cells of the activation grid along each axis; 0 where there is none."""
     volume: float = 0.0
     """Volume [m³]; places count once however often they are reached. 0 for all but solids."""

@@ -147,7 +147,6 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
     convex = climbed_hull(flat, cube, accuracy, _FlatCorners).volume
     return ReachableRegion(
         tip_map=rod,
-        cells=0,
         area=area.value,
         area_error=area.error,
         convex_area=convex.value,

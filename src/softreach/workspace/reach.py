@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -111,10 +110,10 @@ def reachable_set(
         assert hull is not None
         result = ReachableSolid(
             tip_map=rod,
-            cells=0,
             volume=cells.volume.value,
             volume_error=cells.volume.error,
-            measure_hull=lambda: hull.volume,
+            convex_volume=hull.volume.value,
+            convex_volume_error=hull.volume.error,
             lost_share=lost_share(rod),
             route="search",
             image=cells,
@@ -187,7 +186,7 @@ def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
     cells, flux = len(grid.left_out), signed_volume(rod)
     faces = np.rint(grid_faces(cells) * cells).astype(int)
     tips = grid.tips[np.ravel_multi_index(tuple(faces.T), (cells + 1,) * 3)]
-    coarse = tips[(faces % 2 == 0).all(axis=1)]
+    convex = measure.extrapolated_hull(tips, tips[(faces % 2 == 0).all(axis=1)])
     return ReachableSolid(
         tip_map=rod,
         cells=cells,
@@ -196,7 +195,8 @@ def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
         multiplicity={1: abs(flux.value)},
         fold_volume=0.0,
         route="flux",
-        measure_hull=partial(measure.extrapolated_hull, tips, coarse),
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
         image=fine,
     )
 
@@ -204,15 +204,15 @@ def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
 def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> ReachableSolid:
     """The solid of any image; without the integral over the box where parts of it are left out."""
     coarse, common = grid.every_second().image(fine.lattice), None
-    hull = partial(measure.convex_volume, fine, coarse)
-    volume = measure.Estimate(np.nan, np.nan)
+    volume = convex = measure.Estimate(np.nan, np.nan)
     if not grid.left_out.any():
         volume = measure.solid_volume(rod, fine, coarse, accuracy)
+        convex = measure.convex_volume(fine, coarse)
     if np.isnan(volume.value):
         common = grid.in_common().image(fine.lattice)
         rest, tips = remainder(rod, fine, grid.stretches, grid.left_out)
         volume = measure.partial_volume(fine, common, coarse, rest)
-        hull = partial(measure.partial_convex_volume, fine, common, coarse, tips)
+        convex = measure.partial_convex_volume(fine, common, coarse, tips)
     several, change = measure.multiply_covered(fine, coarse, common)
     return ReachableSolid(
         tip_map=rod,
@@ -223,7 +223,8 @@ def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> Reacha
         fold_volume=measure.fold_volume(fine),
         lost_share=float(grid.left_out.mean()),
         route="raster",
-        measure_hull=hull,
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
         image=fine,
         coarse_image=coarse,
     )

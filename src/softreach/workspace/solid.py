@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.geometry.surface import Surface, without_flakes
-from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra
@@ -63,11 +62,6 @@ class ReachableSolid(ReachableSet):
     dimension: ClassVar[int] = 3
     _stored: ClassVar[tuple[str, ...]] = "volume", "convex_volume", "unreachability"
 
-    tip_map: TipMap
-    cells: int
-    volume: float
-    volume_error: float
-    lost_share: float = 0.0
     multiplicity: Mapping[int, float] = field(default_factory=dict)
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""
@@ -79,22 +73,10 @@ class ReachableSolid(ReachableSet):
     flows through the images of the six faces of the activation box. "raster": the image folds or
     overlaps, or may do so under loads and at kinks; a signed volume by flux makes it exact
     elsewhere. "search": more than three free bundles."""
-    measure_hull: Callable[[], Estimate] = field(repr=False)
-    """Measures the convex hull [m³]."""
     image: Image | ReachedCells = field(repr=False)
     """The mapped activation grid, rasterized; of more than three bundles what was found."""
     coarse_image: Image | None = field(default=None, repr=False)
     """The image of half as fine a grid, for the route "raster"."""
-
-    @property
-    def convex_volume(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Volume of the convex hull [m³], measured when first asked for."""
-        return self._hull.value
-
-    @property
-    def convex_volume_error(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Error of `convex_volume`, estimated from two grids [m³]."""
-        return self._hull.error
 
     @property
     def multiplicity_error(self) -> float:
@@ -262,10 +244,6 @@ class ReachableSolid(ReachableSet):
     @property
     def _several(self) -> float:
         return sum(volume for times, volume in self.multiplicity.items() if times > 1)
-
-    @lazy
-    def _hull(self) -> Estimate:
-        return self.measure_hull()
 
     @lazy
     def _field(self) -> Array:

@@ -30,15 +30,10 @@ class ReachableSurface(ReachableSet):
     dimension: ClassVar[int] = 2
     _stored: ClassVar[tuple[str, ...]] = "area", "convex_volume", "unreachability"
 
-    tip_map: TipMap
-    cells: int
     area: float
     """Area [m²]; places count as often as they are reached."""
     area_error: float
     """Error of `area`, estimated from two numbers of Gauss nodes [m²]."""
-    convex_volume: float = 0.0
-    convex_volume_error: float = 0.0
-    lost_share: float = 0.0
     mapped_grid: Surface = field(repr=False)
     """The mapped activation grid, without cells that are left out."""
 
@@ -63,15 +58,10 @@ class ReachableCurve(ReachableSet):
     dimension: ClassVar[int] = 1
     _stored: ClassVar[tuple[str, ...]] = "curve_length", "convex_volume", "unreachability"
 
-    tip_map: TipMap
-    cells: int
     curve_length: float
     """Length [m]; places count as often as they are reached."""
     curve_length_error: float
     """Error of `curve_length`, estimated from two numbers of Gauss nodes [m]."""
-    convex_volume: float = 0.0
-    convex_volume_error: float = 0.0
-    lost_share: float = 0.0
     path: Array = field(repr=False)
     """Points along the curve [m], from the lower bound to the upper one, shape (cells + 1, 3); NaN
     where there is no stable equilibrium."""
@@ -98,10 +88,8 @@ class ReachablePoint(ReachableSet):
 
     dimension: ClassVar[int] = 0
 
-    tip_map: TipMap
     tip: Array
     """Position [m], shape (3,)."""
-    cells: int = field(init=False, default=1)
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the tip [m]."""
@@ -122,7 +110,7 @@ def thin_set(rod: TipMap) -> ReachableSet:
     """The reachable set of a tip map with fewer than three free bundles."""
     m = rod.box.dimension
     if m == 0:
-        return ReachablePoint(tip_map=rod, tip=grid_tips(rod, 1)[0])
+        return ReachablePoint(tip_map=rod, cells=1, tip=grid_tips(rod, 1)[0])
     cells = _CELLS[m]
     ticks = None if rod.supports_unstable else grid_ticks(rod, cells)  # on whose lines kinks are
     tips = grid_tips(rod, cells, ticks=ticks)

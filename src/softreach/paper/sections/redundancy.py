@@ -123,7 +123,9 @@ def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
     density, measure = tip_density(cloud), solution_measure(cloud)
     filled = density["density"].where(density["density"] > 0)
     values: np.ndarray = measure["solution_measure"].values
-    size = values[binary_erosion(values > 0)]  # the border cuts cells with an empty neighbor
+    size = values[
+        np.asarray(binary_erosion(values > 0), bool)
+    ]  # the border cuts cells with an empty neighbor
     front = distance.values[cloud.tip.values[distance["sample"].values, 1] < 0]
     behind = distance.values[cloud.tip.values[distance["sample"].values, 1] > 0]
     return {
