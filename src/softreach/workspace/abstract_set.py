@@ -122,7 +122,12 @@ class ReachableSet(ABC):
         if self.lost_share > 0.0:
             share = f"{100 * self.lost_share:.2g} % of the activation box"
             details.append(f"{share} left out: no stable equilibrium, or torn")
-        return "\n  ".join([f"{type(self).__name__}: {size}", *details, self._origin()])
+        box, rod = self.tip_map.box, self.tip_map
+        power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
+        grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
+        free = counted(box.dimension, "free bundle")
+        details.append(f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L")
+        return "\n  ".join([f"{type(self).__name__}: {size}", *details])
 
     def _lines(self) -> list[str]:
         """Lines to print: the size first."""
@@ -150,10 +155,3 @@ class ReachableSet(ABC):
         if unit == "1":
             return quantity(100 * value, "%", 100 * error)
         return quantity(value, unit.translate(_POWERS), error)
-
-    def _origin(self) -> str:
-        box, rod = self.tip_map.box, self.tip_map
-        free = counted(box.dimension, "free bundle")
-        power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
-        grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
-        return f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L"

@@ -332,5 +332,4 @@ def _finer(corners: HullCorners, rod: TipMap, cells: int) -> HullCorners:
 
 def _corners_of(image: Image) -> HullCorners:
     which = outer_vertices(image)
-    tips = image.lattice.origin + image.lattice.cell / image.unit * image.vertices[which]
-    return HullCorners.of(tips, image.cube_vertices(which))
+    return HullCorners.of(image.places[which], image.cube_vertices(which))

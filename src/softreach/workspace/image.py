@@ -141,9 +141,13 @@ class Image:
     @lazy
     def critical_surface(self) -> Surface:
         """All critical triangles: the boundary of the image, and folds and walls inside it."""
-        vertices, faces = compact_surface(self.vertices, self.triangles[:, :3])
-        placed = self.lattice.origin + vertices * (self.lattice.cell / self.unit)
-        return Surface(vertices=placed, faces=faces)
+        vertices, faces = compact_surface(self.places, self.triangles[:, :3])
+        return Surface(vertices=vertices, faces=faces)
+
+    @property
+    def places(self) -> Array:
+        """Mapped vertices [m], shape (n, 3)."""
+        return self.lattice.origin + self.vertices * (self.lattice.cell / self.unit)
 
     @lazy
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

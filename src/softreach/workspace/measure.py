@@ -123,7 +123,7 @@ def fold_volume(image: Image) -> float:
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
     """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
-    return extrapolated_hull(_corners(fine), _corners(coarse))
+    return extrapolated_hull(outer_places(fine), outer_places(coarse))
 
 
 def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
@@ -138,17 +138,18 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
 
 def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:
     """The same of a part of a box, and of some tips beside it [m], shape (n, 3)."""
-    corners = _corners(fine)
+    corners = outer_places(fine)
     value = convex_hull(np.concatenate([corners, tips])).volume
-    removed = (convex_hull(_corners(common)).volume - convex_hull(_corners(coarse)).volume) / 3.0
+    removed = (
+        convex_hull(outer_places(common)).volume - convex_hull(outer_places(coarse)).volume
+    ) / 3.0
     error = abs(removed) + value - convex_hull(corners).volume
     return Estimate(value + removed, error)
 
 
-def _corners(image: Image) -> Array:
-    """Points of the image that may be corners of its convex hull [m], shape (n, 3)."""
-    lattice = image.lattice
-    return lattice.origin + lattice.cell / image.unit * image.vertices[outer_vertices(image)]
+def outer_places(image: Image) -> Array:
+    """Places [m] of `outer_vertices`, shape (n, 3)."""
+    return image.places[outer_vertices(image)]
 
 
 def outer_vertices(image: Image) -> Index:
@@ -284,13 +285,10 @@ def line_volume(crossings: Crossings) -> Estimate:
     return Estimate(value * lattice.cell**3, float(noise) * lattice.cell**3)
 
 
-def _sparse(runs: Runs) -> list[float]:
-    """Sums of lengths from every other line along both directions and every other center."""
+def _sparse(runs: Runs) -> Array:
+    """Sums of lengths from every other line along both directions and every other center, (8,)."""
     i, j = np.divmod(runs.line, runs.width)
-    volumes = []
-    for parity in range(2):
-        lengths = length_sum(runs, 2, parity)
-        for a in range(2):
-            for b in range(2):
-                volumes.append(4.0 * float(lengths[(i % 2 == a) & (j % 2 == b)].sum()))
-    return volumes
+    sums = (length_sum(runs, 2, parity) for parity in range(2))
+    return (
+        4.0 * np.array([np.bincount(2 * (i % 2) + j % 2, each, 4) for each in sums], float).ravel()
+    )

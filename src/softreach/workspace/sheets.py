@@ -226,9 +226,7 @@ class _Beside:
     def __init__(self, rod: TipMap, image: Image) -> None:
         self._rod, self._image = rod, image
         self._n = round(len(image.vertices) ** (1 / 3)) - 1
-        lattice = image.lattice
-        grid = lattice.origin + image.vertices * (lattice.cell / image.unit)
-        self._grid = grid.reshape(*(self._n + 1,) * 3, 3)
+        self._grid = image.places.reshape(*(self._n + 1,) * 3, 3)
         bend = sum(
             np.pad(
                 np.linalg.norm(np.diff(self._grid, 2, axis), axis=-1),
