@@ -14,7 +14,7 @@ from softreach.arm.parameters import changed
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
 from softreach.workspace.flux import grid_faces, signed_volume
 from softreach.workspace.measure import extrapolated_hull
 from softreach.workspace.reach import rasterized_set
@@ -252,6 +252,8 @@ def test_corners_of_the_box_are_corners_of_the_mesh(arm, accuracy):
     tips = found.tip_map.tips(found.tip_map.box.from_free_cube(corners))
     assert found.surface().distance(tips).max() < 1e-12
     assert found.volume_error < 3e-7 * found.volume
+    slope = volume_gradient(arm(), "length", accuracy=accuracy)
+    assert slope.volume_error < 1e-3 * abs(slope.volume)
 
 
 def test_the_route_is_told_in_the_dataset():
