@@ -16,7 +16,7 @@ from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
-from softreach.workspace.boundary import boundary_surface, signed_field
+from softreach.workspace.boundary import boundary_surface
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
@@ -181,16 +181,9 @@ class ReachableSolid(ReachableSet):
         Raises:
             InvalidInput: Points of another shape or not finite.
         """
-        from scipy.ndimage import map_coordinates
-
-        positions = as_points("points", points)
-        asked = self._searched or self.image
-        if isinstance(asked, ReachedCells):
-            inside = asked.are_deep(positions)
-        else:  # a cell's diagonal inside nothing is to be decided
-            at = asked.lattice.coordinates(positions)
-            inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -np.sqrt(3.0)
-        inside[~inside] = asked.counts_at(positions[~inside]) > 0
+        positions, covering = as_points("points", points), self._covering
+        inside = covering.are_deep(positions)
+        inside[~inside] = covering.counts_at(positions[~inside]) > 0
         return inside
 
     def distance(self, points: ArrayLike) -> Array:
@@ -211,11 +204,7 @@ class ReachableSolid(ReachableSet):
         inside = self.contains(positions)
         out = np.empty(len(positions))
         out[inside] = -self._boundary.distance(positions[inside])
-        if (searched := self._searched) is not None:
-            out[~inside] = searched.distance(positions[~inside])
-        else:
-            assert isinstance(self.image, Image)
-            out[~inside] = self.image.critical_surface.distance(positions[~inside])
+        out[~inside] = self._covering.distance(positions[~inside])
         return out
 
     def _repr_html_(self) -> str:
@@ -246,28 +235,21 @@ class ReachableSolid(ReachableSet):
         return sum(volume for times, volume in self.multiplicity.items() if times > 1)
 
     @lazy
-    def _field(self) -> Array:
-        assert isinstance(self.image, Image)
-        return signed_field(self.image)
-
-    @lazy
     def _boundary(self) -> Surface:
-        if self._searched is not None:
-            return self._searched.wrap
-        assert isinstance(self.image, Image)
-        return boundary_surface(self.image, self._field, self.volume)
+        if isinstance(self._covering, ReachedCells):
+            return self._covering.wrap
+        return boundary_surface(self._covering, self.volume)
 
     @lazy
-    def _searched(self) -> ReachedCells | None:
-        """What is searched for instead of rasterized: more than three bundles, and thin sets."""
-        if isinstance(self.image, ReachedCells):
-            return self.image
-        if self.lost_share or self.volume > _NEVER_THIN * self.tip_map.length**3:
-            return None
-        cell = self.image.lattice.cell
-        least = max(_SEEN * cell, _CHORDS * self.tip_map.length / self.cells**2)
-        is_thin = 2.0 * self.volume <= least * self._boundary_area().value  # not of NaN
-        return cells_of(self.tip_map, cell) if is_thin else None
+    def _covering(self) -> Image | ReachedCells:
+        """What tells inside from outside: of sets that are thin to the raster, a search instead."""
+        cell, length = self.image.lattice.cell, self.tip_map.length
+        may_be = not self.lost_share and self.volume <= _NEVER_THIN * length**3
+        if may_be and isinstance(self.image, Image):
+            least = max(_SEEN * cell, _CHORDS * length / self.cells**2)
+            if 2.0 * self.volume <= least * self._boundary_area().value:  # not of NaN
+                return cells_of(self.tip_map, cell)
+        return self.image
 
     @lazy
     def _sheets(self) -> Sheets:
