@@ -18,11 +18,12 @@ from softreach.arm import (
     Tendon,
     designs,
 )
+from softreach.arm.actuators import LengthTendon
 from softreach.atlas.metrics import chosen_metrics
 from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import flat_areas, unreachability
-from softreach.geometry.flat import alpha_triangles, convex_edges, enclosed_area, plane_of
+from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
 from softreach.rod.rods import tip_map
 from softreach.workspace import ReachableRegion, ReachableSolid, reachable_set
 
@@ -84,7 +85,7 @@ def test_tips_lie_in_the_region_and_its_outline_around_them(region):
     rod = region.tip_map
     tips = rod.tips(rod.box.from_cube(np.random.default_rng(1).random((2000, 4))))
     assert region.distance(tips).max() < 2e-4
-    outline = np.concatenate(region.outline)
+    outline = region.outline.vertices
     assert region.distance(outline).max() < 1e-9
     assert region.distance(outline + [0.0, 0.0, 1.0]).min() > 0.5
     mesh = region.surface()
@@ -122,6 +123,15 @@ def test_any_number_of_bundles_leaves_an_area_wherever_the_base_points(pairs, ch
     assert 0.0 < upright.unreachability < 1.0
 
 
+@pytest.mark.parametrize("count", [2, 3])
+def test_tendons_on_the_axis_reach_a_line_without_a_share(count):
+    axial = [LengthTendon(name=f"t{k}", distance_ratio=0.0, activation_bounds=(0.0, 0.01))
+             for k in range(count)]  # fmt: skip
+    text = repr(reachable_set(planar().replace(actuators=tuple(axial))))
+    assert "in one line" in text
+    assert "nan" not in text
+
+
 def test_a_sheet_in_space_is_no_plane():
     assert isinstance(reachable_set(designs.three_tendon_robot(), accuracy=0.1), ReachableSolid)
 
@@ -141,8 +151,8 @@ def test_clouds_in_a_plane_have_areas():
     assert plane is not None
     assert plane.sides[2] < 1e-12
     ring = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.0]], float)
-    triangles, areas = alpha_triangles(ring, 0.6)
-    assert (len(triangles), areas.sum()) == (4, pytest.approx(1.0))
+    assert alpha_area(ring, 0.6) == pytest.approx(1.0)
+    assert alpha_area(ring, 0.4) == 0.0
 
 
 def printed_json(capsys, *arguments):

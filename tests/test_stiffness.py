@@ -33,8 +33,7 @@ from softreach.stiffness import (
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
 from softreach.workspace import reachable_set
-from softreach.workspace.shifts import shifts_along
-from softreach.workspace.tip_derivatives import TipDerivatives
+from softreach.workspace.tip_derivatives import TipDerivatives, shifts_along
 from tests.bodies import rubber
 from tests.laws import arms
 

@@ -133,7 +133,7 @@ def test_a_sheet_of_microns_has_a_thickness_and_leads_with_it(capsys):
     assert next(iter(shown)).startswith("area_middle_of_the_shell")
     # the wrap of the same set, which knows nothing of its faces, pushes tips to both sides
     wrap = cells_of(tip_map(robot), 0.2 / 24).wrap
-    assert wrap.volume_of_tips == pytest.approx(found.volume, rel=5e-3)
+    assert wrap.volume_of_tips.value == pytest.approx(found.volume, rel=5e-3)
     assert wrap.area / 2 == pytest.approx(area.value, rel=1e-3)
 
 

@@ -22,7 +22,7 @@ from softreach.rod.rods import tip_map
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
-from softreach.workspace.boundary_samples import boundary_samples
+from softreach.workspace.boundary import boundary_samples
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.reach import rasterized_set
 from softreach.workspace.tip_derivatives import TipDerivatives

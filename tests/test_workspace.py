@@ -25,7 +25,6 @@ from softreach.workspace import (
     reach,
     reachable_set,
 )
-from softreach.workspace.boundary import critical_surface
 from softreach.workspace.image import Image
 from softreach.workspace.reach import rasterized_set
 from tests.laws import arm_of
@@ -129,7 +128,7 @@ def test_away_from_folds_and_faces_the_count_is_that_of_the_inverse(revolution_d
     found = solid(arm)
     assert isinstance(found.image, Image)
     tips = compute_cloud(arm, n=3000, seed=1).tip.values
-    rough = critical_surface(found.image).distance(tips) < 0.25 * found.grid.attrs["cell"]
+    rough = found.image.critical_surface.distance(tips) < 0.25 * found.grid.attrs["cell"]
     away = tips[~rough]
     assert len(away) > 0.6 * len(tips)
     counted = found.image.counts_at(away)

@@ -14,6 +14,7 @@ __all__ = ["law_warning", "pull_error"]
 
 _STATIONS = 64
 _STEPS = 40  # of a fixed point, whose first step is off by about a tenth of its change
+_SETTLED = 1e-5  # of an angle over L, in a step
 _SAMPLES = 256
 _NOTED = 1e-3  # L
 
@@ -64,7 +65,9 @@ def pull_error(arm: Manipulator) -> float:
     linear = np.einsum("nb,skb->nsk", gamma, table.curvature)
     rest, bent = moments(0.0 * linear, 1.0 + 0.0 * zeta), linear
     for _ in range(_STEPS):
-        bent = linear + (moments(eta[..., None] * bent, zeta) - rest) / resistance
+        before, bent = bent, linear + (moments(eta[..., None] * bent, zeta) - rest) / resistance
+        if np.abs(bent - before).max() * arm.length < _SETTLED:
+            break
     tips = [_tips(eta[..., None] * each * step, zeta * step) for each in (linear, bent)]
     return float(np.linalg.norm(tips[1] - tips[0], axis=1).max())
 

@@ -160,7 +160,8 @@ def _rows(reached: ReachableSet) -> Rows:
         case ReachableRegion():
             size = _size("area (in one plane)", reached.area, reached.area_error, "m²")
             size |= _size("convex area", reached.convex_area, reached.convex_area_error, "m²")
-            return size | {"unreachability": (reached.unreachability, "")}
+            share: Rows = {"unreachability": (reached.unreachability, "")}
+            return size | (share if reached.convex_area > 0.0 else {})
         case ReachableSurface():
             return _size("area", reached.area, reached.area_error, "m²") | convex
         case ReachableCurve():

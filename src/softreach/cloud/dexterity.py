@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -58,7 +58,11 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     sign = np.empty(n, np.int8)
     for rows in parallel.blocks(n, 8 * BLOCK):
         _, slope = rod.tips_and_slopes(cloud.activation[rows].values)
-        parallel.run(_tasks(slope, measure[rows], condition[rows], sign[rows]))
+        results = slope, measure[rows], condition[rows], sign[rows]
+        parallel.run(
+            partial(_measure, *(each[part] for each in results))
+            for part in parallel.blocks(len(slope), 4096)
+        )
     unit = manipulability_unit(activation_units(cloud["activation"]))
     status = {"status": cloud.coords["status"]} if "status" in cloud.coords else {}
     result = xr.Dataset(coords=status, attrs=cloud.attrs)
@@ -138,11 +142,6 @@ def _product(inputs: Sequence[str], count: int) -> str:
 
 def _power(unit: str, count: int) -> str:
     return unit if count == 1 else f"{unit}{count}"
-
-
-def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Iterator[partial[None]]:
-    for rows in parallel.blocks(len(slope), 4096):
-        yield partial(_measure, slope[rows], measure[rows], condition[rows], sign[rows])
 
 
 def _measure(slope: Array, measure: Array, condition: Array, sign: Signs) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
 from softreach.geometry.delaunay import delaunay
-from softreach.geometry.flat import alpha_triangles, convex_edges, enclosed_area, plane_of
+from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
 from softreach.geometry.hull import Hull
 from softreach.schema import AXES, is_stable
 from softreach.support import parallel
@@ -153,8 +153,7 @@ def flat_areas(points: np.ndarray, alpha: float) -> tuple[float, float] | None:
     if plane is None:
         return None
     flat = plane.coordinates(points)
-    area = float(alpha_triangles(flat, alpha)[1].sum())
-    return area, enclosed_area(flat, convex_edges(flat))
+    return alpha_area(flat, alpha), enclosed_area(flat, convex_edges(flat))
 
 
 def volume_curve(points: np.ndarray | xr.DataArray, alphas: ArrayLike) -> np.ndarray:

@@ -60,8 +60,21 @@ class AlphaComplex:
     """Whether a tetrahedron is no thicker than that rounding, shape (m,)."""
 
     def __post_init__(self) -> None:
-        for name, values in _measure(self.triangulation).items():
-            object.__setattr__(self, name, values)
+        mesh = self.triangulation
+        points, exponent = unit_scale(mesh.points)
+        radii, least, volumes = np.empty((3, len(mesh.tetrahedra)))
+        flat, names = np.empty(len(mesh.tetrahedra), bool), np.arange(len(points))
+
+        def task(part: slice) -> Callable[[], object]:
+            results = (each[part] for each in (radii, least, volumes, flat))
+            cells = mesh.tetrahedra[part]
+            return partial(kernels.measure_cells, points, cells, names, WHOLE, scratch(), *results)
+
+        parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))
+        object.__setattr__(self, "radii", np.ldexp(radii, exponent))
+        object.__setattr__(self, "least", np.ldexp(least, exponent))
+        object.__setattr__(self, "volumes", np.ldexp(volumes, 3 * exponent))
+        object.__setattr__(self, "flat", flat)
 
     @lazy
     def _curve(self) -> tuple[np.ndarray, np.ndarray]:
@@ -311,24 +324,3 @@ def _hull(points: Points, faces: Faces, volume: float, alpha: float, regions: in
 def _sum(volumes: Array) -> float:
     """Their sum from the smallest to the largest: the same for every order of tetrahedra."""
     return float(np.sort(volumes).sum())
-
-
-def _measure(mesh: Delaunay) -> dict[str, np.ndarray]:
-    """Radii [m], volumes [m³] and flatness of all tetrahedra, on all threads."""
-    points, exponent = unit_scale(mesh.points)
-    radii, least, volumes = np.empty((3, len(mesh.tetrahedra)))
-    flat = np.empty(len(mesh.tetrahedra), bool)
-    names = np.arange(len(points))
-
-    def task(part: slice) -> Callable[[], object]:
-        results = (each[part] for each in (radii, least, volumes, flat))
-        cells = mesh.tetrahedra[part]
-        return partial(kernels.measure_cells, points, cells, names, WHOLE, scratch(), *results)
-
-    parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))
-    return {
-        "radii": np.ldexp(radii, exponent),
-        "least": np.ldexp(least, exponent),
-        "volumes": np.ldexp(volumes, 3 * exponent),
-        "flat": flat,
-    }

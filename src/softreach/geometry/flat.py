@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 
-__all__ = ["Plane", "alpha_triangles", "are_inside", "convex_edges", "enclosed_area", "plane_of"]
+__all__ = ["Plane", "alpha_area", "are_inside", "convex_edges", "enclosed_area", "plane_of"]
 
 
 class Plane(NamedTuple):
@@ -67,38 +66,36 @@ def enclosed_area(points: Points, edges: Faces) -> float:
     return 0.5 * float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
 
 
-def are_inside(points: Points, curves: Sequence[Points]) -> Mask:
-    """Mask of points inside of closed curves in the plane z = 0, by an odd number of crossings."""
+def are_inside(points: Points, edges: Array) -> Mask:
+    """Mask of points inside of closed curves in the plane z = 0, by an odd number of crossings.
+
+    Args:
+        points: Shape (n, 3).
+        edges: Both ends of each edge of the curves, shape (e, 2, 3).
+    """
     odd = np.zeros(len(points), bool)
-    for curve in curves:
-        for (x, y), (u, v) in zip(curve[:-1, :2], curve[1:, :2], strict=True):
-            if y != v:
-                crossed = (points[:, 1] < y) != (points[:, 1] < v)
-                odd[crossed] ^= points[crossed, 0] < x + (points[crossed, 1] - y) / (v - y) * (
-                    u - x
-                )
+    for (x, y, _), (u, v, _) in edges:
+        if y != v:
+            crossed = (points[:, 1] < y) != (points[:, 1] < v)
+            odd[crossed] ^= points[crossed, 0] < x + (points[crossed, 1] - y) / (v - y) * (u - x)
     return odd
 
 
-def alpha_triangles(points: Points, alpha: float) -> tuple[Index, Array]:
-    """Delaunay triangles of points in the plane z = 0 with a circumradius below α, and their areas.
+def alpha_area(points: Points, alpha: float) -> float:
+    """Area [m²] of the α-shape of points in the plane z = 0, by Delaunay triangles.
 
     Args:
         points: [m], shape (n, 3).
-        alpha: Radius [m].
-
-    Returns:
-        Shapes (t, 3) and (t,).
+        alpha: Radius of the circumscribed circles [m].
     """
     from scipy.spatial import Delaunay, QhullError
 
     try:
         triangles = Delaunay(points[:, :2]).simplices
     except (QhullError, ValueError):  # on one line, or too few
-        return np.empty((0, 3), np.intp), np.empty(0)
+        return 0.0
     a, b, c = np.moveaxis(points[triangles][..., :2], 1, 0)
     (x, y), (u, v) = (b - a).T, (c - a).T
     area = 0.5 * np.abs(x * v - y * u)
     sides = np.prod([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    kept = sides < 4.0 * alpha * area
-    return triangles[kept].astype(np.intp), area[kept]
+    return float(area[sides < 4.0 * alpha * area].sum())

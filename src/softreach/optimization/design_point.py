@@ -20,7 +20,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace import ReachableSolid
-from softreach.workspace.boundary_samples import boundary_samples
+from softreach.workspace.boundary import boundary_samples
 from softreach.workspace.gradient import VolumeGradient, gradient_of
 from softreach.workspace.tip_derivatives import TipDerivatives
 

@@ -27,7 +27,8 @@ __all__ = ["BendingRange", "bending_over_bounds", "some_corners", "worst_inputs"
 
 _MOST_CORNERS = 10  # inputs of which all corners are tried
 _OF_BENDING = 256  # samples for which bending is looked at, which loads make dear
-_AROUND, _ROUNDS, _SHRINK = 32, 12, 0.6
+_AROUND = 64  # samples for each place tried around the worst
+_ROUNDS, _SHRINK = 12, 0.6
 
 
 class BendingRange(NamedTuple):
@@ -104,16 +105,14 @@ def worst_inputs(
     mixed = np.where(rng.random(faces.shape) < 0.5, faces, inside[: len(faces)])
     every = np.concatenate([inside, some_corners(rod), mixed])
     values = of(every)
-    best = []
+    best, around = [], max(samples // _AROUND, 8)
     for column in range(values.shape[1]):
         worst = np.argsort(-values[:, column], kind="stable")[: 4 if samples > _OF_BENDING else 2]
         gamma, value, width = every[worst], values[worst, column], 0.25
         row = np.arange(len(gamma))
         for _ in range(_ROUNDS):
-            around = rng.normal(size=(_AROUND, *gamma.shape)) * width * box.widths
-            tried = box.clip(gamma + around)
-            flat = tried.reshape(_AROUND * len(gamma), box.bundles)
-            found = of(flat)[:, column].reshape(_AROUND, len(gamma))
+            tried = box.clip(gamma + rng.normal(size=(around, *gamma.shape)) * width * box.widths)
+            found = of(tried.reshape(-1, box.bundles))[:, column].reshape(around, -1)
             top = found.argmax(axis=0)
             better = found[top, row] > value
             gamma = np.where(better[:, None], tried[top, row], gamma)

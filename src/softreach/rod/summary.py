@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import Extreme
+from softreach.arm.linear_law import law_warning
 from softreach.arm.lines import line_strains
 from softreach.arm.load_number import (
     VERIFIED_LOAD_NUMBER,
@@ -155,6 +156,7 @@ def design_warnings(arm: Manipulator) -> tuple[str, ...]:
         *_sharp_bending(arm),
         *_large_activations(arm),
         *_large_loads(arm),
+        *filter(None, [law_warning(arm)]),
     )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,28 +19,29 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Number", "ReachableSet", "with_error"]
-
-
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_MEANINGS = {
+    "volume": ("m3", "volume"),
+    "area": ("m2", "area"),
+    "curve_length": ("m", "length"),
+    "convex_volume": ("m3", "convex hull's volume"),
+    "convex_area": ("m2", "convex hull's area"),
+    "unreachability": ("1", "share of the convex hull out of reach"),
+}
+
+Stored = dict[str, tuple[tuple[()], float, dict[str, str]]]
+"""Variables of a dataset, each one number."""
 
 
-class Number(NamedTuple):
-    """One number of a reachable set, as it is stored."""
-
-    value: float
-    units: str
-    long_name: str
-
-
-def with_error(name: str, value: float, error: float, unit: str, meaning: str) -> dict[str, Number]:
+def with_error(name: str, value: float, error: float, unit: str, meaning: str) -> Stored:
     """A number and its error, as they are stored."""
     return {
-        name: Number(value, unit, meaning),
-        f"{name}_error": Number(error, unit, f"error of the {meaning}"),
+        name: ((), value, {"units": unit, "long_name": meaning}),
+        f"{name}_error": ((), error, {"units": unit, "long_name": f"error of the {meaning}"}),
     }
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachableSet(ABC):
     """The image of the activation box under the map from activations to tips.
 
@@ -49,21 +51,23 @@ class ReachableSet(ABC):
 
     dimension: ClassVar[int]
     """3 for a solid, 2 for a surface, 1 for a curve, 0 for a point."""
+    _stored: ClassVar[tuple[str, ...]]
+    """Names of the numbers that are stored with an error: its size and its hull's first."""
 
     tip_map: TipMap
     """The map whose image this is, with its arm, activation box and tolerance; drives with dead
     zones by inputs beyond these."""
-    cells: int
+    cells: int = 0
     """Cells of the activation grid along each axis; 0 where there is none."""
-    volume: float
+    volume: float = 0.0
     """Volume [m³]; places count once however often they are reached. 0 for all but solids."""
-    volume_error: float
+    volume_error: float = 0.0
     """Error of `volume`, estimated from two resolutions [m³]."""
-    convex_volume: float
+    convex_volume: float = 0.0
     """Volume of the convex hull [m³]."""
-    convex_volume_error: float
+    convex_volume_error: float = 0.0
     """Error of `convex_volume`, estimated from two grids [m³]."""
-    lost_share: float
+    lost_share: float = 0.0
     """Share of the activation box that is left out, by volume [-]: cells of the activation grid
     with a corner that has no stable equilibrium, or with neighbors on different branches. It
     shrinks on finer grids toward the share of activations that have no stable equilibrium. For more
@@ -105,10 +109,10 @@ class ReachableSet(ABC):
         """All numbers of the set with their errors and units, and where they come from."""
         import xarray as xr
 
-        variables = {
-            name: ((), number.value, {"units": number.units, "long_name": number.long_name})
-            for name, number in {**self._numbers(), **self._lost()}.items()
-        }
+        variables = self._numbers()
+        if self.tip_map.supports_unstable:
+            meaning = "share of the activation box left out: no stable equilibrium, or torn"
+            variables["lost_share"] = ((), self.lost_share, {"units": "1", "long_name": meaning})
         attrs = {**provenance(self.arm, self.tip_map.frame), "tol": self.tip_map.tol}
         attrs |= {"activation_grid": self.cells} if self.cells else {}
         return xr.Dataset(variables, attrs=attrs | {"dimension": self.dimension})
@@ -118,40 +122,36 @@ class ReachableSet(ABC):
         if self.lost_share > 0.0:
             share = f"{100 * self.lost_share:.2g} % of the activation box"
             details.append(f"{share} left out: no stable equilibrium, or torn")
-        return "\n  ".join([f"{type(self).__name__}: {size}", *details, self._origin()])
+        box, rod = self.tip_map.box, self.tip_map
+        power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
+        grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
+        free = counted(box.dimension, "free bundle")
+        details.append(f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L")
+        return "\n  ".join([f"{type(self).__name__}: {size}", *details])
 
-    def _lost(self) -> dict[str, Number]:
-        if not self.tip_map.supports_unstable:
-            return {}
-        meaning = "share of the activation box left out: no stable equilibrium, or torn"
-        return {"lost_share": Number(self.lost_share, "1", meaning)}
-
-    @abstractmethod
     def _lines(self) -> list[str]:
         """Lines to print: the size first."""
+        size, hull = self._stored[:2]
+        lines = [f"{_MEANINGS[size][1]} {self._text(size)}", f"convex hull {self._text(hull)}"]
+        if _MEANINGS[size][0] == _MEANINGS[hull][0] and getattr(self, hull) > 0.0:
+            lines[1] += f", of which {self._text('unreachability')} are out of reach"
+        return lines
 
-    @abstractmethod
-    def _numbers(self) -> dict[str, Number]:
+    def _numbers(self) -> Stored:
         """Numbers to store."""
+        each = (
+            with_error(name, getattr(self, name), getattr(self, f"{name}_error"), *_MEANINGS[name])
+            for name in self._stored
+        )
+        return {name: number for numbers in each for name, number in numbers.items()}
 
     def _sizes(self) -> tuple[float, float, float, float]:
         """Size and error of the set, and of its convex hull."""
         return self.volume, self.volume_error, self.convex_volume, self.convex_volume_error
 
-    def _convex_numbers(self) -> dict[str, Number]:
-        convex = self.convex_volume, self.convex_volume_error
-        share = self.unreachability, self.unreachability_error
-        return {
-            **with_error("convex_volume", *convex, "m3", "convex hull's volume"),
-            **with_error("unreachability", *share, "1", "share of the convex hull out of reach"),
-        }
-
-    def _convex_text(self) -> str:
-        return f"convex hull {quantity(self.convex_volume, 'm³', self.convex_volume_error)}"
-
-    def _origin(self) -> str:
-        box, rod = self.tip_map.box, self.tip_map
-        free = counted(box.dimension, "free bundle")
-        power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
-        grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
-        return f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L"
+    def _text(self, name: str) -> str:
+        """A number with its error, shares in percent."""
+        value, error, unit = getattr(self, name), getattr(self, f"{name}_error"), _MEANINGS[name][0]
+        if unit == "1":
+            return quantity(100 * value, "%", 100 * error)
+        return quantity(value, unit.translate(_POWERS), error)

@@ -1,18 +1,25 @@
-"""The boundary of a solid reachable set as triangles."""
+"""The boundary of a solid reachable set: as triangles, and as nodes of a rule of integration.
+
+Lines of sight through cell centers along an axis cut the boundary at places that each stand for a
+square of a cell, seen along the axis. Together those along all three axes are nodes for what flows
+through the boundary, theory (98), and need no normals.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from softreach.geometry.surface import Surface, compact_surface, level_set
-from softreach.support.arrays import Array
+from softreach.geometry.surface import Surface, level_set
+from softreach.support.arrays import Array, Index
+from softreach.workspace.cells import ReachedCells
 from softreach.workspace.image import Image
 
-_BAND = 2.5  # cells from the boundary beyond which the field is constant
-_CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
+_CLASSES = 4  # every other line along both directions
 
 
-def boundary_surface(image: Image, field: Array, volume: float) -> Surface:
+def boundary_surface(image: Image, volume: float) -> Surface:
     """The closed surface around a volume where the field is constant, by marching cubes.
 
     The image of a grid is a little small where it is convex: a small offset, the same everywhere,
@@ -21,47 +28,101 @@ def boundary_surface(image: Image, field: Array, volume: float) -> Surface:
     Raises:
         MissingExtra: scikit-image is not installed.
     """
-    surface = _level_set(image, field, 0.0)
+    surface = _level_set(image, 0.0)
     if surface.area == 0.0:
         return surface
     offset = (volume - surface.volume) / (surface.area * image.lattice.cell)
-    return _level_set(image, field, float(np.clip(offset, -0.5, 0.5)))
+    return _level_set(image, float(np.clip(offset, -0.5, 0.5)))
 
 
-def critical_surface(image: Image) -> Surface:
-    """All critical triangles: the boundary of the image, and folds and walls inside it."""
-    vertices, faces = compact_surface(image.vertices, image.triangles[:, :3])
-    lattice = image.lattice
-    placed = lattice.origin + vertices * (lattice.cell / image.unit)
-    return Surface(vertices=placed, faces=faces)
-
-
-def signed_field(image: Image) -> Array:
-    """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
-
-    Along each axis the boundary is located to rounding between two centers. A plane that cuts the
-    axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between centers
-    gives the crossings back, to second order in the cell on a curved boundary.
-
-    Returns:
-        Of the lattice's shape.
-    """
-    inverse_square = np.zeros(image.lattice.shape)
-    for axis in range(3):
-        along = np.full(image.lattice.shape, np.inf)  # beyond two cells from the boundary
-        index, behind = image.boundary_crossings(axis)
-        for step in (-1, 0, 1, 2):
-            shifted = list(index)
-            shifted[axis] = index[axis] + step
-            np.minimum.at(along, tuple(shifted), np.abs(behind - step).clip(_CLOSEST))
-        inverse_square += along**-2
-    with np.errstate(divide="ignore"):
-        distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
-    return np.where(image.counts[0] > 0, -distance, distance)
-
-
-def _level_set(image: Image, field: Array, level: float) -> Surface:
+def _level_set(image: Image, level: float) -> Surface:
+    field, lattice = image.signed_field, image.lattice
     if not (field < level).any():
         return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
-    (vertices, faces), lattice = level_set(field, level), image.lattice
+    vertices, faces = level_set(field, level)
     return Surface(vertices=lattice.origin + lattice.cell * vertices, faces=faces)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundarySamples:
+    """Nodes on the boundary, with the activations that lead there."""
+
+    cube: Array
+    """In the unit cube of the free bundles, shape (n, dimension)."""
+    places: Array
+    """Places [m], shape (n, 3)."""
+    area: Array
+    """Outward area vectors [m²], shape (n, 3)."""
+    group: Index
+    """Number of the set of lines that each is on: an axis, and every other line, shape (n,)."""
+
+    def derivative(self, slopes: Array, weights: Array | None = None) -> Array:
+        """Derivatives of the volume, swept by the boundary, theory (98), shape (parameters,).
+
+        Args:
+            slopes: ∂r/∂p at the nodes, shape (n, 3, parameters).
+            weights: Of each node, shape (n,): 1 where it is in a region and 0 elsewhere give the
+                derivative of the volume of the part of the set in that region.
+        """
+        area = self.area if weights is None else self.area * weights[:, None]
+        return np.einsum("ni,nip->p", area, slopes)
+
+    def noise(self, slopes: Array) -> Array:
+        """Two standard deviations of `derivative` from where the lines lie, shape (parameters,).
+
+        Every other line along both directions tells how much.
+        """
+        groups = np.zeros((3 * _CLASSES, slopes.shape[2]))
+        np.add.at(groups, self.group, np.einsum("ni,nip->np", self.area, slopes))
+        of_axes = groups.reshape(3, _CLASSES, -1)
+        off = _CLASSES * of_axes - of_axes.sum(axis=1, keepdims=True)
+        return np.sqrt((off**2).mean(axis=1).sum(axis=0))
+
+
+def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySamples:
+    """Nodes on all of the boundary of an image; the vertices of what is wrapped.
+
+    Args:
+        image: Of three free bundles or more.
+        sense: Of three, the orientation that the larger part of the map keeps, 1 or -1: nodes are
+            then those where the image is not one to one, the boundary less what of it the degree
+            tells, for the derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
+    """
+    if isinstance(image, ReachedCells):
+        return _of_cells(image)
+    lattice, rules = image.lattice, []
+    for axis, spans in enumerate(image.spans):
+        jumps = np.diff((spans.cover > 0).astype(np.int64), prepend=0)
+        jumps -= sense * np.diff(spans.degree, prepend=0)
+        which = np.flatnonzero(jumps)
+        i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
+        at = np.empty((len(which), 3))
+        at[:, axis], at[:, (axis + 1) % 3], at[:, (axis + 2) % 3] = spans.start[which], i, j
+        area = np.zeros((len(which), 3))
+        area[:, axis] = -(lattice.cell**2) * jumps[which]
+        places = lattice.origin + lattice.cell * at
+        rules.append((image.cube_places(spans, axis, which), places, area, _group(axis, i, j)))
+    return BoundarySamples(*(np.concatenate(parts) for parts in zip(*rules, strict=True)))
+
+
+def _of_cells(cells: ReachedCells) -> BoundarySamples:
+    rod, wrap = cells.rod, cells.wrap
+    if not cells.is_thick:
+        group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
+        return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
+    crossings, _ = cells.swept
+    every, axis, lattice = np.arange(len(crossings.cell)), crossings.axis, cells.lattice
+    index = np.stack(np.unravel_index(crossings.cell, lattice.shape), axis=-1)
+    i, j = index[every, (axis + 1) % 3], index[every, (axis + 2) % 3]
+    area = np.zeros((len(every), 3))
+    area[every, axis] = lattice.cell**2 * crossings.sense
+    return BoundarySamples(
+        rod.box.to_cube(crossings.beyond)[:, rod.box.free].clip(0.0, 1.0),
+        crossings.points(every, crossings.place),
+        area,
+        _group(axis, i, j),
+    )
+
+
+def _group(axis: int | Index, i: Index, j: Index) -> Index:
+    return _CLASSES * axis + 2 * (i % 2) + j % 2

@@ -16,13 +16,12 @@ from softreach.support.lazy import lazy
 from softreach.workspace.convex import ConvexHull
 from softreach.workspace.crossings import Crossings, swept_crossings
 from softreach.workspace.image import Lattice, covered_cubes
-from softreach.workspace.search import Flood, nearest_tips
+from softreach.workspace.measure import Estimate, line_volume
+from softreach.workspace.search import ENOUGH, Flood, nearest_tips
 from softreach.workspace.wrap import Wrap
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
-
-__all__ = ["ReachedCells"]
 
 _STARTS = 6  # tips nearby from which places are searched
 _MORE_STARTS, _NEAR = 24, 0.1  # of places that are nearer than this, in cells, to a tip
@@ -42,7 +41,7 @@ class ReachedCells:
     wrap: Wrap
     coarse: Wrap
     """The same on cells one and a half times as large."""
-    hull: ConvexHull | None
+    hull: ConvexHull | None = None
 
     @property
     def rod(self) -> TipMap:
@@ -68,6 +67,21 @@ class ReachedCells:
     def swept(self) -> tuple[Crossings, float]:
         """Places where edges between centers are cut, and what they may miss [m³]."""
         return swept_crossings(self.flood)
+
+    @lazy
+    def volume(self) -> Estimate:
+        """By the wrap; by lines of sight if these tell the volume better, and agree [m³]."""
+        tight, edge = self.wrap.volume_of_tips, self.lattice.cell
+        change = abs(tight.value - self.coarse.volume_of_tips.value)
+        volume = Estimate(tight.value, change + tight.error)
+        if self.is_thick:
+            lines, missed = self.swept
+            area = len(lines.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
+            seen = line_volume(lines)
+            error = seen.error + missed + area * (ENOUGH * edge + self.rod.tol * self.rod.length)
+            if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
+                volume = Estimate(seen.value, error)
+        return volume
 
     @property
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -17,8 +17,6 @@ from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Faces
 from softreach.workspace.measure import Estimate
 
-__all__ = ["ConvexHull", "HullCorners", "climbed_hull"]
-
 _ROUNDS = 8
 _LESS = 0.5  # of the error before, that another round must leave
 _CLIMBS = 25  # steps of a climb
@@ -38,12 +36,14 @@ class HullCorners(NamedTuple):
     faces: Faces
     """Outwards, shape (f, 3)."""
 
+    hull_of = staticmethod(convex_faces)
+
     @classmethod
     def of(cls, tips: Array, cube: Array) -> Self:
         """Corners of the hull of some tips at places of the cube; tips that are NaN are none."""
         known = np.isfinite(tips[:, 0])
         tips, cube = tips[known], cube[known]
-        every = convex_faces(tips)
+        every = cls.hull_of(tips)
         vertices, faces = compact_surface(tips, every)
         return cls(cube[np.unique(every)], vertices, faces)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,38 +11,12 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Lattice
 from softreach.workspace.search import ENOUGH, Flood, Nearest, nearest_tips
 
-__all__ = ["Crossings", "Edges", "boundary_edges", "swept_crossings"]
-
-
 _PROBE = 0.01  # cells: how closely crossings are enclosed
 _ROUNDS = 24
 _SWEEPS = 3
 _BEYOND = 0.05  # cells by which a sweep looks beyond a crossing
 _APART = 0.05  # ranges: activations nearer to each other lead to the same end
 _STEEP = 0.02  # cosine below which the tangent plane does not tell where it is cut
-
-
-class Edges(NamedTuple):
-    """Pairs of neighboring centers of which one is reached."""
-
-    cell: Index
-    """The center that is reached, as a flat index, shape (n,)."""
-    axis: Index
-    """Along which axis the other lies, shape (n,)."""
-    sense: Index
-    """Side, 1 or -1, shape (n,)."""
-
-
-def boundary_edges(reached: Mask) -> Edges:
-    """All edges of a lattice that the boundary cuts."""
-    flat, parts = np.arange(reached.size).reshape(reached.shape), []
-    for axis in range(3):
-        before, after = np.moveaxis(reached, axis, 0)[:-1], np.moveaxis(reached, axis, 0)[1:]
-        cells = np.moveaxis(flat, axis, 0)
-        leaving, entering = cells[:-1][before & ~after], cells[1:][after & ~before]
-        for sense, places in ((1, leaving), (-1, entering)):
-            parts.append((places, np.full(len(places), axis), np.full(len(places), sense)))
-    return Edges(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 @dataclass
@@ -56,7 +29,12 @@ class Crossings:
 
     rod: TipMap
     lattice: Lattice
-    edges: Edges
+    cell: Index
+    """The center that is reached, as a flat index, shape (n,)."""
+    axis: Index
+    """Along which axis the center that is not lies, shape (n,)."""
+    sense: Index
+    """On which side, 1 or -1, shape (n,)."""
     low: Array
     """In cells from the reached center, shape (n,)."""
     high: Array
@@ -70,16 +48,25 @@ class Crossings:
     @classmethod
     def of(cls, flood: Flood) -> Crossings:
         """The crossings of all edges at the boundary of what was reached."""
-        edges = boundary_edges(flood.reached)
-        n = len(edges.cell)
-        outside = edges.cell + edges.sense * flood.steps[edges.axis]
+        reached, parts = flood.reached, []
+        flat = np.arange(reached.size).reshape(reached.shape)
+        for k in range(3):
+            before, after = np.moveaxis(reached, k, 0)[:-1], np.moveaxis(reached, k, 0)[1:]
+            cells = np.moveaxis(flat, k, 0)
+            leaving, entering = cells[:-1][before & ~after], cells[1:][after & ~before]
+            for side, places in ((1, leaving), (-1, entering)):
+                parts.append((places, np.full(len(places), k), np.full(len(places), side)))
+        cell, axis, sense = (np.concatenate(column) for column in zip(*parts, strict=True))
+        n, outside = len(cell), cell + sense * flood.steps[axis]
         crossings = cls(
             rod=flood.rod,
             lattice=flood.lattice,
-            edges=edges,
+            cell=cell,
+            axis=axis,
+            sense=sense,
             low=np.zeros(n),
             high=np.ones(n),
-            gamma=flood.gamma[edges.cell],
+            gamma=flood.gamma[cell],
             beyond=flood.gamma[outside],
             place=np.zeros(n),
         )
@@ -89,9 +76,9 @@ class Crossings:
 
     def points(self, which: Index, t: Array) -> Array:
         """Places on edges, t cells from the reached center [m], shape (n, 3)."""
-        lattice, edges = self.lattice, self.edges
-        index = np.stack(np.unravel_index(edges.cell[which], lattice.shape), axis=-1).astype(float)
-        index[np.arange(len(which)), edges.axis[which]] += edges.sense[which] * t
+        lattice = self.lattice
+        index = np.stack(np.unravel_index(self.cell[which], lattice.shape), axis=-1).astype(float)
+        index[np.arange(len(which)), self.axis[which]] += self.sense[which] * t
         return lattice.origin + lattice.cell * index
 
     def enclose(self, which: Index) -> None:
@@ -132,8 +119,7 @@ class Crossings:
             tips = self.rod.tips(self.beyond[which])
         away = (self.points(which, self.high[which]) - tips) / self.lattice.cell
         distance = np.linalg.norm(away, axis=1).clip(1e-12)
-        edges = self.edges
-        along = away[np.arange(len(which)), edges.axis[which]] * edges.sense[which] / distance
+        along = away[np.arange(len(which)), self.axis[which]] * self.sense[which] / distance
         low, high = self.low[which], self.high[which]
         back = np.where(along > _STEEP, distance / along.clip(_STEEP), 0.5 * (high - low))
         self.place[which] = np.clip(high - back, low, high)
@@ -158,7 +144,7 @@ def swept_crossings(flood: Flood) -> tuple[Crossings, float]:
     volume = flood.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
     gain = 0.0
     for sweep in range(1, _SWEEPS + 1):
-        count = len(crossings.edges.cell)
+        count = len(crossings.cell)
         if count <= sweep:
             return crossings, 0.0
         places = crossings.points(np.arange(count), crossings.place)

@@ -6,8 +6,6 @@ cell of the box that holds such a place would be mapped across a gap through whi
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,7 +52,7 @@ def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Mask:
     return lost
 
 
-def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Remainder:
+def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> tuple[float, Array]:
     """Reach of cells with a stable corner that are left out, by eight places in each.
 
     A place counts with the |det J| of the cell's corners, the median of those that are stable, if
@@ -67,6 +65,9 @@ def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Re
         image: Of the other cells.
         stretches: det J at the vertices of the grid, 0 where there is no stable equilibrium.
         left_out: Mask of the cells that are left out, shape (cells, cells, cells).
+
+    Returns:
+        Volume outside the image [m³], right to a half of itself, and some tips [m], shape (n, 3).
     """
     cells = left_out.shape[0]
     corners = corner_values(np.abs(stretches).reshape((cells + 1,) * 3)).reshape(-1, 8)
@@ -83,16 +84,7 @@ def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Re
     stretch = np.nanmedian(np.where(values > 0.0, values, np.nan), axis=1) if len(looked) else 0.0
     swept = float((stretch * counted.reshape(-1, 8).mean(axis=1)).sum())
     each = rod.box.volume / cells**3 * len(cut) / max(len(looked), 1)
-    return Remainder(_TAKEN * swept * each, tips[stable])
-
-
-class Remainder(NamedTuple):
-    """Remaining reach of cells that are left out."""
-
-    volume: float
-    """Outside the image [m³], right to a half of itself."""
-    tips: Array
-    """Some of the tips [m], shape (n, 3)."""
+    return _TAKEN * swept * each, tips[stable]
 
 
 def corner_values(values: NDArray, axes: list[int] | None = None) -> NDArray:

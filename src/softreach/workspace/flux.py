@@ -107,7 +107,7 @@ def flux_tol(rod: TipMap) -> float:
     return min(rod.tol, _ROUGH_TOL if rod.supports_unstable else _TOL)
 
 
-def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
+def face_image(rod: TipMap, cells: int = _CELLS) -> Surface:
     """The closed image of the surface of the box of three free bundles, oriented outwards.
 
     Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
@@ -118,12 +118,10 @@ def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
         cells: Of the grid along each edge of the box.
 
     Returns:
-        None if some activation on the faces has no stable equilibrium.
+        With vertices of NaN where an activation on the faces has no stable equilibrium.
     """
     cube = grid_faces(cells)
     tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
-    if not np.isfinite(tips).all():
-        return None
     surface = Surface(vertices=tips, faces=face_triangles(cube, cells))
     if surface.volume < 0:  # the map turns the box over
         surface = Surface(vertices=tips, faces=surface.faces[:, ::-1].copy())

@@ -20,20 +20,15 @@ from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import ReachableSet
-from softreach.workspace.boundary_samples import (
-    BoundarySamples,
-    boundary_samples,
-    overlap_samples,
-)
+from softreach.workspace.boundary import BoundarySamples, boundary_samples
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.convex import HullCorners
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
 from softreach.workspace.image import Image
 from softreach.workspace.measure import FLUX_PART, Estimate, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
-from softreach.workspace.shifts import Shifts, shifts_along
 from softreach.workspace.solid import ReachableSolid
-from softreach.workspace.tip_derivatives import TipDerivatives
+from softreach.workspace.tip_derivatives import Shifts, TipDerivatives, shifts_along
 from softreach.workspace.wrap import Wrap
 
 if TYPE_CHECKING:
@@ -49,11 +44,8 @@ _RASTER_STEP = 2e-2  # of a parameter, where neighbors are rasterized, which is 
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
 _MEANINGS = {
     "volume": ("m3 per unit", "derivative of the reachable volume"),
-    "volume_error": ("m3 per unit", "error of the derivative of the reachable volume"),
     "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
-    "convex_volume_error": ("m3 per unit", "error of the derivative of the convex hull's volume"),
     "unreachability": ("1 per unit", "derivative of the unreachability"),
-    "unreachability_error": ("1 per unit", "error of the derivative of the unreachability"),
 }
 
 
@@ -128,10 +120,10 @@ def gradient_of(
         solid=solid,
         parameters=names,
         units=tuple(each.unit for each in wanted),
-        volume=volume.value,
-        volume_error=volume.error,
-        convex_volume=convex.value,
-        convex_volume_error=convex.error,
+        volume=volume[0],
+        volume_error=volume[1],
+        convex_volume=convex[0],
+        convex_volume_error=convex[1],
     )
 
 
@@ -175,10 +167,11 @@ class VolumeGradient:
         """All derivatives with their errors over `parameter`, and where they come from."""
         import xarray as xr
 
-        numbers = {
-            name: ("parameter", getattr(self, name), {"units": unit, "long_name": meaning})
-            for name, (unit, meaning) in _MEANINGS.items()
-        }
+        numbers = {}
+        for name, (unit, meaning) in _MEANINGS.items():
+            for of, what in (("", ""), ("_error", "error of the ")):
+                about = {"units": unit, "long_name": what + meaning}
+                numbers[name + of] = ("parameter", getattr(self, name + of), about)
         coordinates = {"parameter": list(self.parameters), "unit": ("parameter", list(self.units))}
         attrs = {**provenance(self.solid.arm, self.solid.tip_map.frame), "route": self.route}
         return xr.Dataset(numbers, coordinates, attrs)
@@ -192,11 +185,8 @@ class VolumeGradient:
         return "\n  ".join([f"VolumeGradient: route {self.route}", *lines])
 
 
-class _Swept(NamedTuple):
-    """Derivatives by all parameters, shape (parameters,) each."""
-
-    value: Array
-    error: Array
+_Swept = tuple[Array, Array]
+"""Derivatives by all parameters, and their errors, shape (parameters,) each."""
 
 
 def _swept(
@@ -215,11 +205,11 @@ def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
     assert isinstance(solid.image, ReachedCells)
     if not solid.image.is_thick:
         wrap, coarse = (_sum(each, tips) for each in (solid.image.wrap, solid.image.coarse))
-        return _Swept(wrap.value, wrap.error + _CHANGES * np.abs(wrap.value - coarse.value))
+        return wrap.value, wrap.error + _CHANGES * np.abs(wrap.value - coarse.value)
     swept = _sum(boundary_samples(solid.image), tips)
     # What no search meets is at rims of either sign.
     missing = _MISSING * solid.volume_error / solid.volume * swept.size
-    return _Swept(swept.value, swept.error + missing)
+    return swept.value, swept.error + missing
 
 
 def _flowing(solid: ReachableSolid, tips: TipDerivatives, accuracy: float) -> _Swept:
@@ -230,13 +220,13 @@ def _flowing(solid: ReachableSolid, tips: TipDerivatives, accuracy: float) -> _S
     whole = _sum(flux, tips)
     value, error = sense * whole.value, whole.error + flux.error / abs(flux.value) * whole.size
     if solid.route == "flux":
-        return _Swept(value, error)
+        return value, error
     assert isinstance(solid.image, Image)
     assert solid.coarse_image is not None
-    fine = _sum(overlap_samples(solid.image.with_more_lines(_LINES), sense), tips)
-    coarse = _sum(overlap_samples(solid.coarse_image, sense), tips)
+    fine = _sum(boundary_samples(solid.image.with_more_lines(_LINES), sense), tips)
+    coarse = _sum(boundary_samples(solid.coarse_image, sense), tips)
     removed = (fine.value - coarse.value) / 3.0
-    return _Swept(value + fine.value + removed, error + fine.error + np.abs(removed))
+    return value + fine.value + removed, error + fine.error + np.abs(removed)
 
 
 def _dragged(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
@@ -253,7 +243,7 @@ def _dragged(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
     missing = abs(hull + (hull - rough) / 3.0 - solid.convex_volume) / hull
     share = np.max(np.abs(removed) / np.maximum(fine.size, np.finfo(float).tiny))
     error = fine.error + np.abs(removed) + (share + missing) * fine.size
-    return _Swept(fine.value + removed, error)
+    return fine.value + removed, error
 
 
 class _Sum(NamedTuple):
@@ -300,7 +290,7 @@ def _by_differences(
         estimates.append((volume, convex))
         progress(1)
     volumes, convexes = np.moveaxis(np.array(estimates), 0, 2)
-    return _Swept(*volumes), _Swept(*convexes)
+    return (volumes[0], volumes[1]), (convexes[0], convexes[1])
 
 
 def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
@@ -342,5 +332,4 @@ def _finer(corners: HullCorners, rod: TipMap, cells: int) -> HullCorners:
 
 def _corners_of(image: Image) -> HullCorners:
     which = outer_vertices(image)
-    tips = image.lattice.origin + image.lattice.cell / image.unit * image.vertices[which]
-    return HullCorners.of(tips, image.cube_vertices(which))
+    return HullCorners.of(image.places[which], image.cube_vertices(which))

@@ -11,25 +11,10 @@ from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Mask
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
-from softreach.workspace.discontinuities import corner_values
-
-__all__ = [
-    "corners_of",
-    "cube_grid",
-    "every_second",
-    "grid_stretches",
-    "grid_ticks",
-    "grid_tips",
-    "image_measure",
-    "least_in_cells",
-    "second_differences",
-]
-
 
 _BLOCK = 1 << 16  # vertices
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
 _NEARLY_ALL = 0.9
-_MARGIN = 1.5  # on second differences, for those between the vertices
 _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
 
@@ -132,40 +117,6 @@ def every_second(values: Array, cells: int, m: int) -> Array:
     fields = values.shape[1:]
     every = values.reshape(*(cells + 1,) * m, *fields)[(slice(None, None, 2),) * m]
     return np.ascontiguousarray(every).reshape(-1, *fields)
-
-
-def second_differences(values: Array) -> Array:
-    """Sums over the axes of second differences of what is known at the vertices of a grid.
-
-    At the sides they are those of the next vertex.
-
-    Args:
-        values: Numbers, shape (n + 1, n + 1, n + 1), or vectors, whose differences have a length.
-
-    Returns:
-        Shape (n + 1, n + 1, n + 1).
-    """
-    total, inside = np.zeros(values.shape[:3]), np.arange(len(values)).clip(1, len(values) - 2) - 1
-    for axis in range(3):
-        change = np.diff(values, 2, axis)
-        size = np.abs(change) if values.ndim == 3 else np.sqrt((change**2).sum(axis=-1))
-        total += size.take(inside, axis)
-    return total
-
-
-def least_in_cells(values: Array, curved: Array) -> Array:
-    """What a function may fall to in each cell of a grid of n³, shape (n, n, n).
-
-    A function differs from its trilinear interpolant by no more than the sum of its second
-    differences over 8. Where a matrix does, so does its least eigenvalue, which between the corners
-    is no less than at one of them.
-
-    Args:
-        values: At the vertices, shape (n + 1, n + 1, n + 1).
-        curved: Second differences there, of the same shape.
-    """
-    largest = corner_values(curved).max(axis=-1)
-    return corner_values(values).min(axis=-1) - _MARGIN / 8.0 * largest
 
 
 def image_measure(rod: TipMap, nodes: int) -> float:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.image import contour, point_cover, raster
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
@@ -17,11 +18,10 @@ from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
 
-__all__ = ["Image", "Lattice", "Spans", "image_of"]
-
-
 _STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
 _BYTES = 16  # of a cell: two counts, and what questions make of them
+_BAND = 2.5  # cells from the boundary beyond which the field is constant
+_CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
 _MARGIN = 3  # empty cells around the image
 _ROWS = 1 << 20  # triangles a task may have to judge
 _POINTS = 1 << 14
@@ -139,6 +139,49 @@ class Image:
         """Vertices of the grid of n³ boxes in the unit cube by number, shape (*which.shape, 3)."""
         n = round(len(self.vertices) ** (1 / 3)) - 1
         return np.stack(np.unravel_index(which, (n + 1,) * 3), axis=-1) / n
+
+    @lazy
+    def critical_surface(self) -> Surface:
+        """All critical triangles: the boundary of the image, and folds and walls inside it."""
+        vertices, faces = compact_surface(self.places, self.triangles[:, :3])
+        return Surface(vertices=vertices, faces=faces)
+
+    def distance(self, points: Array) -> Array:
+        """Distance from points outside to the image [m], shape (n,)."""
+        return self.critical_surface.distance(points)
+
+    def are_deep(self, points: Array) -> Mask:
+        """Mask of points [m] inside by the diagonal of a cell, where nothing is to be decided."""
+        from scipy.ndimage import map_coordinates
+
+        at = self.lattice.coordinates(points).T
+        return map_coordinates(self.signed_field, at, order=1, cval=np.inf) < -np.sqrt(3.0)
+
+    @lazy
+    def signed_field(self) -> Array:
+        """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
+
+        Along each axis the boundary is located to rounding between two centers. A plane that cuts
+        the axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between
+        centers gives the crossings back, to second order in the cell on a curved boundary.
+        """
+        inverse_square = np.zeros(self.lattice.shape)
+        for axis in range(3):
+            along = np.full(self.lattice.shape, np.inf)  # beyond two cells from the boundary
+            index, behind = self.boundary_crossings(axis)
+            for step in (-1, 0, 1, 2):
+                shifted = list(index)
+                shifted[axis] = index[axis] + step
+                np.minimum.at(along, tuple(shifted), np.abs(behind - step).clip(_CLOSEST))
+            inverse_square += along**-2
+        with np.errstate(divide="ignore"):
+            distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
+        return np.where(self.counts[0] > 0, -distance, distance)
+
+    @property
+    def places(self) -> Array:
+        """Mapped vertices [m], shape (n, 3)."""
+        return self.lattice.origin + self.vertices * (self.lattice.cell / self.unit)
 
     @lazy
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

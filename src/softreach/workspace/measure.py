@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.geometry.hull import convex_faces
-from softreach.geometry.surface import compact_surface, enclosed_volume
+from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 from softreach.workspace.crossings import Crossings
@@ -55,9 +54,9 @@ def solid_volume(
     signed = signed_volume(rod, None if rough else _NODES, enough=FLUX_PART * accuracy * rough)
     sense = 1 if signed.value >= 0 else -1
     at_fine, at_coarse = _correction(fine, sense), _correction(coarse, sense)
-    beyond = extrapolated(at_fine, at_coarse)
-    removed = abs(beyond.value - at_fine.value)
-    return Estimate(abs(signed.value) + beyond.value, signed.error + removed + at_fine.error)
+    removed = (at_fine.value - at_coarse.value) / 3.0
+    value = abs(signed.value) + (at_fine.value + removed)
+    return Estimate(value, signed.error + abs(removed) + at_fine.error)
 
 
 def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) -> Estimate:
@@ -80,12 +79,6 @@ def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) 
     unknown = 0.0 if at_coarse.value > 0.0 else at_fine.value  # nothing to compare with
     error = abs(removed) + at_fine.error + 0.5 * remainder + unknown
     return Estimate(at_fine.value + removed + remainder, error)
-
-
-def extrapolated(fine: Estimate, coarse: Estimate) -> Estimate:
-    """The limit of values whose error falls by four when the grid is halved (Richardson)."""
-    removed = (fine.value - coarse.value) / 3.0
-    return Estimate(fine.value + removed, _LEFT * abs(removed) + fine.error)
 
 
 def multiply_covered(
@@ -123,20 +116,14 @@ def multiply_covered(
     return dict(sorted(measures.items())), error
 
 
-def fold_volume(fine: Image, coarse: Image, common: Image | None = None) -> Estimate:
-    """Volume reached with both orientations [m³], and its change by half as fine a grid."""
-
-    def folded(spans: Spans) -> float:
-        return spans.length[spans.cover > np.abs(spans.degree)].sum()
-
-    images = (fine, fine if common is None else common, coarse)
-    value, same, rough = (float(_mean(image, folded)) for image in images)
-    return Estimate(value, abs(same - rough))
+def fold_volume(image: Image) -> float:
+    """Volume reached with both orientations [m³]; it errs by as much as the volume itself."""
+    return float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
 
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
     """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
-    return extrapolated_hull(_corners(fine), _corners(coarse))
+    return extrapolated_hull(outer_places(fine), outer_places(coarse))
 
 
 def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
@@ -144,26 +131,25 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    return extrapolated(*(Estimate(_hull_volume(places), 0.0) for places in (points, fewer)))
+    fine, coarse = convex_hull(points).volume, convex_hull(fewer).volume
+    removed = (fine - coarse) / 3.0
+    return Estimate(fine + removed, _LEFT * abs(removed))
 
 
 def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:
     """The same of a part of a box, and of some tips beside it [m], shape (n, 3)."""
-    corners = _corners(fine)
-    value = _hull_volume(np.concatenate([corners, tips]))
-    removed = (_hull_volume(_corners(common)) - _hull_volume(_corners(coarse))) / 3.0
-    error = abs(removed) + value - _hull_volume(corners)
+    corners = outer_places(fine)
+    value = convex_hull(np.concatenate([corners, tips])).volume
+    removed = (
+        convex_hull(outer_places(common)).volume - convex_hull(outer_places(coarse)).volume
+    ) / 3.0
+    error = abs(removed) + value - convex_hull(corners).volume
     return Estimate(value + removed, error)
 
 
-def _hull_volume(points: Array) -> float:
-    return enclosed_volume(*compact_surface(points, convex_faces(points)))
-
-
-def _corners(image: Image) -> Array:
-    """Points of the image that may be corners of its convex hull [m], shape (n, 3)."""
-    lattice = image.lattice
-    return lattice.origin + lattice.cell / image.unit * image.vertices[outer_vertices(image)]
+def outer_places(image: Image) -> Array:
+    """Places [m] of `outer_vertices`, shape (n, 3)."""
+    return image.places[outer_vertices(image)]
 
 
 def outer_vertices(image: Image) -> Index:
@@ -237,12 +223,12 @@ class Runs(NamedTuple):
 
 def runs_along(crossings: Crossings, axis: int) -> Runs:
     """All runs along an axis."""
-    edges, shape = crossings.edges, crossings.lattice.shape
+    shape = crossings.lattice.shape
     others = [a for a in range(3) if a != axis]
     ends = []
     for sense in (-1, 1):
-        which = np.flatnonzero((edges.axis == axis) & (edges.sense == sense))
-        index = np.unravel_index(edges.cell[which], shape)
+        which = np.flatnonzero((crossings.axis == axis) & (crossings.sense == sense))
+        index = np.unravel_index(crossings.cell[which], shape)
         line = index[others[0]] * shape[others[1]] + index[others[1]]
         order = np.lexsort((index[axis], line))
         center = index[axis][order]
@@ -299,13 +285,10 @@ def line_volume(crossings: Crossings) -> Estimate:
     return Estimate(value * lattice.cell**3, float(noise) * lattice.cell**3)
 
 
-def _sparse(runs: Runs) -> list[float]:
-    """Sums of lengths from every other line along both directions and every other center."""
+def _sparse(runs: Runs) -> Array:
+    """Sums of lengths from every other line along both directions and every other center, (8,)."""
     i, j = np.divmod(runs.line, runs.width)
-    volumes = []
-    for parity in range(2):
-        lengths = length_sum(runs, 2, parity)
-        for a in range(2):
-            for b in range(2):
-                volumes.append(4.0 * float(lengths[(i % 2 == a) & (j % 2 == b)].sum()))
-    return volumes
+    sums = (length_sum(runs, 2, parity) for parity in range(2))
+    return (
+        4.0 * np.array([np.bincount(2 * (i % 2) + j % 2, each, 4) for each in sums], float).ravel()
+    )

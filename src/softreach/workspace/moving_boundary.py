@@ -12,15 +12,13 @@ import numpy as np
 from softreach.arm.parameters import Parameter
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
-from softreach.workspace.boundary_samples import boundary_samples
+from softreach.workspace.boundary import boundary_samples
 from softreach.workspace.flux import face_image, grid_faces
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tip_derivatives import TipDerivatives
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
-
-__all__ = ["MovingBoundary"]
 
 _CELLS = 40  # along each edge of the box, where its faces are the boundary
 _BLOCK = 1 << 21  # numbers at once
@@ -58,17 +56,17 @@ class MovingBoundary:
             MissingExtra: scikit-image is not installed.
         """
         tips = TipDerivatives(solid.tip_map, parameters)
-        surface = face_image(solid.tip_map, _CELLS) if solid.route == "flux" else None
-        if surface is None:
+        by_faces = solid.route == "flux"
+        surface = face_image(solid.tip_map, _CELLS) if by_faces else solid.surface()
+        centers = surface.vertices[surface.faces].mean(axis=1)
+        if by_faces:
+            velocity = tips.at(grid_faces(_CELLS))[surface.faces].mean(axis=1)
+        else:
             from scipy.spatial import KDTree
 
-            surface, nodes = solid.surface(), boundary_samples(solid.image)
-            centers = surface.vertices[surface.faces].mean(axis=1)
+            nodes = boundary_samples(solid.image)
             used, which = np.unique(KDTree(nodes.places).query(centers)[1], return_inverse=True)
             velocity = tips.at(nodes.cube[used])[which]
-        else:
-            centers = surface.vertices[surface.faces].mean(axis=1)
-            velocity = tips.at(grid_faces(_CELLS))[surface.faces].mean(axis=1)
         a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
         area = 0.5 * np.cross(b - a, c - a)
         swept = np.nan_to_num(np.einsum("ni,nip->np", area, velocity))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Self
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,12 +14,9 @@ from softreach.geometry.surface import Surface, compact_surface
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import PlacedRod, stable_tips
 from softreach.sampling import cube_blocks
-from softreach.support.arrays import Array, as_points
+from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import MissingExtra
-from softreach.support.lazy import lazy
 from softreach.support.progress import Progress
-from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, with_error
 from softreach.workspace.convex import HullCorners, climbed_hull
 from softreach.workspace.flux import box_slopes
 from softreach.workspace.grid import cube_grid
@@ -36,8 +33,6 @@ from softreach.workspace.search import ENOUGH, Flood
 from softreach.workspace.thin import ReachableSurface, by_nodes, threads
 from softreach.workspace.wrap import DISTANCE, drawn_tight
 
-__all__ = ["ReachableRegion", "planar_set", "plane_of_tips"]
-
 _SAMPLES = 256  # of the box, that tell whether all tips lie in one plane
 _FLAT = 4.0  # tolerances of a tip: what is no thicker is flat
 _RULE = 2.5  # cells along the mean side, times the root of the accuracy
@@ -51,39 +46,28 @@ _SIGNS = 16  # cells of the grid that tells whether two bundles fold
 class ReachableRegion(ReachableSurface):
     """A region of a plane, which has an area, each place counted once, and no volume."""
 
+    _stored: ClassVar[tuple[str, ...]] = "area", "convex_area", "convex_volume", "unreachability"
+
     convex_area: float
     """Area of the convex hull [m²]."""
     convex_area_error: float
     """Half of what is between two bounds [m²]."""
-    outline: tuple[Array, ...] = field(repr=False)
-    """Closed curves of tips around the region and its holes [m], shape (n, 3) each."""
+    outline: Surface = field(repr=False)
+    """Closed curves of tips around the region and its holes [m]: lines from tip to tip, as
+    triangles that repeat a corner. Parts of them may enclose nothing."""
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the region [m], never negative."""
         return np.minimum(
-            super().distance(points), self._curves.distance(as_points("points", points))
+            super().distance(points), self.outline.distance(as_points("points", points))
         )
-
-    @lazy
-    def _curves(self) -> Surface:
-        """The outline as triangles that repeat a corner: parts of it may enclose nothing."""
-        ends = np.cumsum([len(curve) for curve in self.outline])
-        return threads(np.concatenate(self.outline), np.delete(np.arange(ends[-1]), ends - 1))
 
     def _sizes(self) -> tuple[float, float, float, float]:
         return self.area, self.area_error, self.convex_area, self.convex_area_error
 
     def _lines(self) -> list[str]:
-        convex = quantity(self.convex_area, "m²", self.convex_area_error)
-        share = quantity(100 * self.unreachability, "%", 100 * self.unreachability_error)
-        return [
-            f"area {quantity(self.area, 'm²', self.area_error)} in one plane",
-            f"convex hull {convex}, of which {share} are out of reach",
-        ]
-
-    def _numbers(self) -> dict[str, Number]:
-        convex = self.convex_area, self.convex_area_error
-        return super()._numbers() | with_error("convex_area", *convex, "m2", "convex hull's area")
+        size, hull = super()._lines()
+        return [f"{size} in one {'plane' if self.convex_area else 'line'}", hull]
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,15 +86,7 @@ class _FlatCorners(HullCorners):
     """Corners of a convex hull in the plane z = 0, with edges for faces and an area for volume."""
 
     __slots__ = ()
-
-    @classmethod
-    def of(cls, tips: Array, cube: Array) -> Self:
-        known = np.isfinite(tips[:, 0])
-        tips, cube = tips[known], cube[known]
-        edges = convex_edges(tips)
-        used = edges[:, 0]
-        row = np.arange(len(used))
-        return cls(cube[used], tips[used], np.stack([row, np.roll(row, -1)], axis=1))
+    hull_of = staticmethod(convex_edges)
 
     @property
     def facets(self) -> Array:
@@ -154,8 +130,9 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
     edge = max(min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * mean, float(sides.max()) / _MOST)
 
     def outline(edge: float) -> _Outline:
-        flood = Flood(flat, _lattice(tips, edge), progress, is_flat=True)
-        return _outline(flooded(flood, *cloud))
+        x, y, _ = (lattice := shifted_lattice(tips, edge)).shape
+        layers = Lattice(np.array([*lattice.origin[:2], -2.0 * edge]), edge, (x, y, 5))
+        return _Outline.of(flooded(Flood(flat, layers, progress, is_flat=True), *cloud))
 
     coarse = outline(_FINER * edge)
     while True:
@@ -166,60 +143,53 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
             break
         edge, coarse = edge / _FINER, found
     area = _smooth(rod, flat, area)
-    cube = rod.box.to_cube(np.concatenate([gamma[:CLIMBERS], *found.gamma]))[:, rod.box.free]
+    cube = rod.box.to_cube(np.concatenate([gamma[:CLIMBERS], found.gamma]))[:, rod.box.free]
     convex = climbed_hull(flat, cube, accuracy, _FlatCorners).volume
     return ReachableRegion(
         tip_map=rod,
-        cells=0,
         area=area.value,
         area_error=area.error,
         convex_area=convex.value,
         convex_area_error=convex.error,
-        convex_volume=0.0,
-        convex_volume_error=0.0,
         lost_share=lost_share(rod),
-        outline=tuple(plane.places(curve) for curve in found.curves),
+        outline=threads(plane.places(found.tips), found.edges[:, 0]),
         mapped_grid=_mesh(found, plane),
     )
 
 
-def _lattice(tips: Array, cell: float) -> Lattice:
-    """Five layers of cells, the third in the plane."""
-    lattice = shifted_lattice(tips, cell)
-    return Lattice(np.array([*lattice.origin[:2], -2.0 * cell]), cell, (*lattice.shape[:2], 5))
-
-
-@dataclass(frozen=True)
-class _Outline:
+class _Outline(NamedTuple):
     """Closed curves of tips around a region."""
 
-    curves: list[Array]
-    gamma: list[Array]
-    """Activations that lead to them, shape (n, bundles) each."""
+    tips: Array
+    """Shape (n, 3)."""
+    gamma: Array
+    """Activations that lead to them, shape (n, bundles)."""
+    edges: Index
+    """From each tip to the next of its curve, shape (e, 2)."""
     centers: Array
-    """Of cells that are reached [m], shape (n, 3)."""
+    """Of cells that are reached [m], shape (c, 3)."""
+
+    @classmethod
+    def of(cls, flood: Flood) -> _Outline:
+        """The level set of the distances, drawn tight."""
+        try:
+            from skimage.measure import find_contours
+        except ImportError as error:
+            raise MissingExtra(("scikit-image", "surface")) from error
+        curves = find_contours(flood.distances[:, :, 2], DISTANCE, positive_orientation="low")
+        at = np.insert(np.concatenate([np.empty((0, 2)), *curves]), 2, 2.0, axis=1)
+        first = np.delete(np.arange(len(at)), np.cumsum([len(curve) for curve in curves]) - 1)
+        gamma, tips, _ = drawn_tight(flood, at)
+        edges = np.stack([first, first + 1], axis=1)
+        return cls(tips, gamma, edges, flood.centers(np.flatnonzero(flood.gap == 0.0)))
 
     @property
     def area(self) -> float:
-        rows = (np.arange(len(each) - 1)[:, None] + [0, 1] for each in self.curves)
-        return sum(map(enclosed_area, self.curves, rows))
+        return enclosed_area(self.tips, self.edges)
 
     @property
     def length(self) -> float:
-        return sum(
-            float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in self.curves
-        )
-
-
-def _outline(flood: Flood) -> _Outline:
-    try:
-        from skimage.measure import find_contours
-    except ImportError as error:
-        raise MissingExtra(("scikit-image", "surface")) from error
-    places = find_contours(flood.distances[:, :, 2], DISTANCE, positive_orientation="low")
-    drawn = [drawn_tight(flood, np.insert(at, 2, 2.0, axis=1)) for at in places]
-    curves, gamma = [each.tips for each in drawn], [each.gamma for each in drawn]
-    return _Outline(curves, gamma, flood.centers(np.flatnonzero(flood.gap == 0.0)))
+        return float(np.linalg.norm(np.diff(self.tips[self.edges], axis=1), axis=2).sum())
 
 
 def _smooth(rod: TipMap, flat: TipMap, area: Estimate) -> Estimate:
@@ -237,11 +207,11 @@ def _mesh(outline: _Outline, plane: Plane) -> Surface:
     """Triangles of the region: those of its outline and of centers inside."""
     from scipy.spatial import Delaunay
 
-    points = np.concatenate([*outline.curves, outline.centers])
+    points = np.concatenate([outline.tips, outline.centers])
     if len(points) < 3 or not outline.area > 0.0:
         return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
     points = np.unique(points, axis=0)
     faces = Delaunay(points[:, :2], qhull_options="QJ Pp").simplices
-    kept = are_inside(points[faces].mean(axis=1), outline.curves)
+    kept = are_inside(points[faces].mean(axis=1), outline.tips[outline.edges])
     vertices, faces = compact_surface(plane.places(points), faces[kept].astype(np.int32))
     return Surface(vertices=vertices, faces=faces)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,22 +12,20 @@ from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
 from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, warn
-from softreach.support.memory import free_memory
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.discontinuities import coarser, finer, left_out_cells, remainder
+from softreach.workspace.flux import grid_faces, signed_volume
 from softreach.workspace.grid import corners_of, every_second, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.injective import MappedFaces, is_injective, solid_by_flux
 from softreach.workspace.planar import planar_set, plane_of_tips
-from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
+from softreach.workspace.redundant import lost_share, searched_set
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import thin_set
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26
-T = TypeVar("T")
 
 ACCURACIES = Range(1e-6, 0.2)
 """Relative errors of a volume that can be asked for."""
@@ -55,9 +51,9 @@ def reachable_set(
     cube root of the volume of the bounding box. The volume itself is then far more accurate than
     asked. Where the map folds, what lies behind the fold is reached more than once: n is doubled
     until the volume of that changes by less than ε as well. A fold thinner than a cell of the grid
-    may be missed. Where the map is found to be one to one (`route` is "flux"), what flows through
-    the six faces of the box gives the volume to nine digits or so, the hull of their images the
-    convex volume, and nothing is rasterized until a question needs it.
+    may be missed. Where the raster finds no place reached twice and no fold (`route` is "flux"),
+    what flows through the six faces of the box gives the volume to nine digits or so, and their
+    images are the surface; under loads and of maps with kinks this is not asked.
 
     More free bundles: simplices would be too many, so the image is searched for in space, from tips
     of a cloud and from neighbors: how far is the center of each cell from the nearest tip? A closed
@@ -109,7 +105,19 @@ def reachable_set(
         result = _of_three(rod, accuracy, cell, progress)
         finer = f"a grid above {result.cells} and a smaller cell"
     else:
-        result = _of_many(rod, accuracy, cell, memory, progress)
+        cells = searched_set(rod, accuracy, cell, memory, progress)
+        hull = cells.hull
+        assert hull is not None
+        result = ReachableSolid(
+            tip_map=rod,
+            volume=cells.volume.value,
+            volume_error=cells.volume.error,
+            convex_volume=hull.volume.value,
+            convex_volume_error=hull.volume.error,
+            lost_share=lost_share(rod),
+            route="search",
+            image=cells,
+        )
         finer = "a smaller cell" if cell is not None else "more memory"
     if result.volume_error > accuracy * result.volume:
         warn(
@@ -138,64 +146,8 @@ def rasterized_set(
     Raises:
         InvalidInput: All cells of the grid are left out, or memory does not hold those in space.
     """
-    tips = grid_tips(rod, cells, progress)
-    left_out = left_out_cells(rod, tips, cells)
-    used = corners_of(~left_out).ravel()
-    if not used.any():
-        fault = f"no cell of an activation grid of {cells}³ has a stable, untorn image"
-        raise loads_too_heavy(fault)
-    lattice = lattice_for(tips[used], cell=cell, accuracy=accuracy)
-    stretches = grid_stretches(rod, tips, cells, left_out)
-    grid = _Grid(tips, stretches, left_out)
-    fine, coarse = grid.image(lattice, progress), grid.every_second().image(lattice)
-    measures = None if left_out.any() else _entire(rod, fine, coarse, accuracy)
-    volume, convex, overlaps = measures or _in_part(rod, grid, fine, coarse)
-    return ReachableSolid(
-        tip_map=rod,
-        cells=cells,
-        volume=volume.value,
-        volume_error=overlaps.multiplicity_error,
-        measure_hull=partial(_known, convex),
-        lost_share=float(left_out.mean()),
-        route="raster",
-        rasterize=partial(_known, fine),
-        coarse_image=coarse,
-        **overlaps._asdict(),
-    )
-
-
-def grid_for(accuracy: float) -> int:
-    """The rule for n: even, within what memory and patience hold.
-
-    Args:
-        accuracy: Relative error of the volume.
-    """
-    most = np.cbrt(_MOST_VERTICES) - 1.0
-    return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
-
-
-def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
-    """Cells in space around tips.
-
-    Args:
-        tips: [m], shape (n, 3).
-        cell: Edge of a cell [m]; by the rule for h if None.
-        accuracy: Relative error of the volume that the rule is for.
-
-    Raises:
-        InvalidInput: Cells so small that memory does not hold them.
-    """
-    sides = np.ptp(tips, axis=0)
-    if cell is not None:
-        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
-        if not smallest <= cell < np.inf:  # NaN too
-            raise InvalidInput(
-                "cell", cell, f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
-            )
-        return Lattice.around(tips, float(cell))
-    edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
-    # An image that is almost flat would need countless cells along it.
-    return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
+    grid = _Grid.of(rod, cells, progress)
+    return _by_raster(rod, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
 
 
 def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
@@ -216,45 +168,66 @@ def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
 def _of_three(
     rod: TipMap, accuracy: float, cell: float | None, progress: Progress
 ) -> ReachableSolid:
-    cells = grid_for(accuracy)
-    if is_injective(rod):
-        lattice = partial(lattice_for, cell=cell, accuracy=accuracy)
-        if cell is not None:  # which may be too small
-            lattice(MappedFaces(rod, cells).tips)
-        return solid_by_flux(rod, cells, lattice, progress)
-    solid = rasterized_set(rod, cells, cell, accuracy, progress)
-    while is_worthwhile(solid, accuracy):
-        solid = rasterized_set(rod, 2 * solid.cells, cell, accuracy, progress)
-    return solid
+    most = np.cbrt(_MOST_VERTICES) - 1.0
+    cells = max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
+    while True:
+        grid = _Grid.of(rod, cells, progress)
+        fine = grid.image(grid.lattice(cell, accuracy), progress)
+        if rod.is_smooth and not rod.supports_unstable and grid.is_one_to_one(fine):
+            return _by_faces(rod, grid, fine)
+        solid = _by_raster(rod, grid, fine, accuracy)
+        if not is_worthwhile(solid, accuracy):
+            return solid
+        cells *= 2
 
 
-def _of_many(
-    rod: TipMap,
-    accuracy: float,
-    cell: float | None,
-    memory: float | None,
-    progress: Progress,
-) -> ReachableSolid:
-    memory = max(free_memory() / 4.0, smallest_memory(rod)) if memory is None else memory
-    if not smallest_memory(rod) <= memory < np.inf:
-        raise InvalidInput("memory", memory, f"at least {smallest_memory(rod):.3g} bytes")
-    search = searched_set(rod, accuracy, cell, memory, progress)
+def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
+    """The solid of an image that is one to one, by what flows through the faces of the box."""
+    cells, flux = len(grid.left_out), signed_volume(rod)
+    faces = np.rint(grid_faces(cells) * cells).astype(int)
+    tips = grid.tips[np.ravel_multi_index(tuple(faces.T), (cells + 1,) * 3)]
+    convex = measure.extrapolated_hull(tips, tips[(faces % 2 == 0).all(axis=1)])
     return ReachableSolid(
         tip_map=rod,
-        cells=0,
-        volume=search.volume.value,
-        volume_error=search.volume.error,
-        measure_hull=partial(_known, search.convex_volume),
-        lost_share=lost_share(rod),
-        route="search",
-        rasterize=partial(_known, search.cells),
-        **_NO_OVERLAPS._asdict(),
+        cells=cells,
+        volume=abs(flux.value),
+        volume_error=flux.error,
+        multiplicity={1: abs(flux.value)},
+        fold_volume=0.0,
+        route="flux",
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
+        image=fine,
     )
 
 
-def _known(result: T) -> T:
-    """A result that is there already, where it might be made when asked for."""
-    return result
+def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> ReachableSolid:
+    """The solid of any image; without the integral over the box where parts of it are left out."""
+    coarse, common = grid.every_second().image(fine.lattice), None
+    volume = convex = measure.Estimate(np.nan, np.nan)
+    if not grid.left_out.any():
+        volume = measure.solid_volume(rod, fine, coarse, accuracy)
+        convex = measure.convex_volume(fine, coarse)
+    if np.isnan(volume.value):
+        common = grid.in_common().image(fine.lattice)
+        rest, tips = remainder(rod, fine, grid.stretches, grid.left_out)
+        volume = measure.partial_volume(fine, common, coarse, rest)
+        convex = measure.partial_convex_volume(fine, common, coarse, tips)
+    several, change = measure.multiply_covered(fine, coarse, common)
+    return ReachableSolid(
+        tip_map=rod,
+        cells=len(grid.left_out),
+        volume=volume.value,
+        volume_error=volume.error + change,  # a fold out of place errs by as much in both
+        multiplicity={1: volume.value - sum(several.values()), **several},
+        fold_volume=measure.fold_volume(fine),
+        lost_share=float(grid.left_out.mean()),
+        route="raster",
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
+        image=fine,
+        coarse_image=coarse,
+    )
 
 
 class _Grid(NamedTuple):
@@ -266,6 +239,48 @@ class _Grid(NamedTuple):
     """det J, shape ((n + 1)³,)."""
     left_out: Mask
     """Cells without an image, shape (n, n, n)."""
+
+    @classmethod
+    def of(cls, rod: TipMap, cells: int, progress: Progress) -> _Grid:
+        """The grid of cells³ boxes over the activation box."""
+        tips = grid_tips(rod, cells, progress)
+        left_out = left_out_cells(rod, tips, cells)
+        return cls(tips, grid_stretches(rod, tips, cells, left_out), left_out)
+
+    def lattice(self, cell: float | None, accuracy: float) -> Lattice:
+        """Cells in space around the image, of an edge by the rule for h if `cell` is None [m].
+
+        Raises:
+            InvalidInput: All cells of the grid are left out, or memory does not hold those in
+                space.
+        """
+        used = corners_of(~self.left_out).ravel()
+        if not used.any():
+            fault = f"no cell of an activation grid of {len(self.left_out)}³ has a stable, untorn "
+            raise loads_too_heavy(fault + "image")
+        tips = self.tips[used]
+        sides = np.ptp(tips, axis=0)
+        if cell is None:
+            edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
+            # An image that is almost flat would need countless cells along it.
+            return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
+        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
+        if not smallest <= cell < np.inf:  # NaN too
+            allowed = f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
+            raise InvalidInput("cell", cell, allowed)
+        return Lattice.around(tips, float(cell))
+
+    def is_one_to_one(self, image: Image) -> bool:
+        """True if no place of the image is found to be reached twice; none may be left out.
+
+        det J keeps its sign at the vertices, and no line of sight meets a second layer, or one that
+        both orientations cover. Pieces that none covers may have a degree: walls thinner than the
+        triangles are flat cross each other.
+        """
+        return bool(self.stretches.min() * self.stretches.max() > 0.0) and all(
+            (spans.cover <= np.minimum(1, np.abs(spans.degree)))[spans.length > 0.0].all()
+            for spans in image.spans
+        )
 
     def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
         """Image of the cells that are not left out."""
@@ -282,48 +297,3 @@ class _Grid(NamedTuple):
     def in_common(self) -> _Grid:
         """The grid without all cells that `every_second` leaves out."""
         return self._replace(left_out=finer(coarser(self.left_out)))
-
-
-class _Overlaps(NamedTuple):
-    """Multiplicity and folds of the reach of three bundles: fields of a `ReachableSolid`."""
-
-    multiplicity: Mapping[int, float]
-    multiplicity_error: float
-    fold_volume: float
-    fold_volume_error: float
-
-
-_NO_OVERLAPS = _Overlaps({}, np.nan, np.nan, np.nan)
-
-
-_Measures = tuple[measure.Estimate, measure.Estimate, _Overlaps]
-"""Volume, volume of the convex hull, overlaps."""
-
-
-def _entire(rod: TipMap, fine: Image, coarse: Image, accuracy: float) -> _Measures | None:
-    """Measures of the image of all of the box; None if not all of it is stable after all."""
-    volume = measure.solid_volume(rod, fine, coarse, accuracy)
-    if np.isnan(volume.value):
-        return None
-    return volume, measure.convex_volume(fine, coarse), _overlaps(volume, fine, coarse)
-
-
-def _in_part(rod: TipMap, grid: _Grid, fine: Image, coarse: Image) -> _Measures:
-    """Measures of the image of the cells that are not left out, and of the rest of those."""
-    common = grid.in_common().image(fine.lattice)
-    edge = remainder(rod, fine, grid.stretches, grid.left_out)
-    volume = measure.partial_volume(fine, common, coarse, edge.volume)
-    convex = measure.partial_convex_volume(fine, common, coarse, edge.tips)
-    return volume, convex, _overlaps(volume, fine, coarse, common)
-
-
-def _overlaps(
-    volume: measure.Estimate, fine: Image, coarse: Image, common: Image | None = None
-) -> _Overlaps:
-    """Volumes by multiplicity; a fold out of place errs by as much here as in the volume."""
-    several, change = measure.multiply_covered(fine, coarse, common)
-    return _Overlaps(
-        {1: volume.value - sum(several.values()), **several},
-        volume.error + change,
-        *measure.fold_volume(fine, coarse, common),
-    )

@@ -9,8 +9,6 @@ it; what searches miss is missing from the volume.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
@@ -18,24 +16,13 @@ from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.memory import free_memory
 from softreach.support.progress import Progress
 from softreach.workspace.cells import ReachedCells
-from softreach.workspace.convex import ConvexHull, climbed_hull
+from softreach.workspace.convex import climbed_hull
 from softreach.workspace.image import Lattice
-from softreach.workspace.measure import Estimate, line_volume
-from softreach.workspace.search import ENOUGH, Flood
-from softreach.workspace.wrap import DISTANCE, Wrap, spread, wrapped
-
-__all__ = [
-    "Searched",
-    "cloud_on_faces",
-    "flooded",
-    "lost_share",
-    "searched_set",
-    "shifted_lattice",
-    "smallest_memory",
-]
-
+from softreach.workspace.search import Flood
+from softreach.workspace.wrap import DISTANCE, spread, wrapped
 
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
 _CLOUD = 1 << 16  # tips in a cloud that searches start from
@@ -53,17 +40,15 @@ CLIMBERS = 1024
 """Of these, for the convex hull beside tips on the boundary: more make countless facets."""
 
 
-class Searched(NamedTuple):
-    """A reachable set found by search."""
-
-    cells: ReachedCells
-    volume: Estimate
-    convex_volume: Estimate
+def smallest_memory(rod: TipMap) -> float:
+    """Memory that a search cannot do without [bytes]."""
+    fixed, each = _bytes(rod)
+    return fixed + 2e4 * each
 
 
 def searched_set(
-    rod: TipMap, accuracy: float, cell: float | None, memory: float, progress: Progress
-) -> Searched:
+    rod: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
+) -> ReachedCells:
     """The image of a box of four free bundles or more.
 
     Args:
@@ -71,12 +56,17 @@ def searched_set(
         accuracy: Relative error asked of the volume: cells become smaller until it is met, or
             `memory` is used.
         cell: Edge of a cell [m], instead of the rule's.
-        memory: Memory that the search may use [bytes].
+        memory: Memory that the search may use [bytes]; a quarter of what is free if None.
         progress: Called with the number of centers searched since its last call.
 
     Raises:
-        InvalidInput: No activation has a stable equilibrium, or cells are too small for the memory.
+        InvalidInput: No activation has a stable equilibrium, too little memory, or cells too small
+            for it.
     """
+    least = smallest_memory(rod)
+    memory = max(free_memory() / 4.0, least) if memory is None else memory
+    if not least <= memory < np.inf:
+        raise InvalidInput("memory", memory, f"at least {least:.3g} bytes")
     cloud = gamma, tips = cloud_on_faces(rod, 0)
     sides = np.ptp(tips, axis=0)
     smallest = _smallest_cell(rod, sides, memory)
@@ -94,26 +84,26 @@ def searched_set(
     hull = climbed_hull(rod, begin.clip(0.0, 1.0), accuracy)
     while True:
         flood = of_cells(edge)
-        found = _found(flood, cloud, coarse, hull)
+        found = ReachedCells(flood, cloud, wrapped(flood), coarse, hull)
         if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
             return found
-        edge, coarse = edge / _FINER, found.cells.wrap
+        edge, coarse = edge / _FINER, found.wrap
 
 
-def _may_meet(found: Searched, accuracy: float, smallest: float, of_sheets: float) -> bool:
+def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: float) -> bool:
     """True if an accuracy is not met but may be, by cells that are no smaller than allowed.
 
     Where nothing is seen between both sides of a sheet, its error falls as the square of the edge,
     until the sheet is thin enough for its thickness to be found.
     """
-    (volume, error), cells = found.volume, found.cells
     edge = cells.lattice.cell
-    if error <= accuracy * volume or edge / _FINER < smallest:
+    value, error = cells.volume
+    if error <= accuracy * value or edge / _FINER < smallest:
         return False
     if cells.is_thick:
         return True
-    is_sheet = cells.wrap.volume_of_tips != cells.wrap.tight_volume
-    needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(volume, 0.0) / error)
+    is_sheet = cells.wrap.volume_of_tips.value != cells.wrap.tight_volume
+    needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(value, 0.0) / error)
     return needed >= of_sheets
 
 
@@ -128,18 +118,13 @@ def cells_of(rod: TipMap, cell: float) -> ReachedCells:
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
     flood = flooded(Flood(rod, shifted_lattice(cloud[1], edge)), *cloud)
     wrap = wrapped(flood)
-    return ReachedCells(flood, cloud, wrap, wrap, None)
+    return ReachedCells(flood, cloud, wrap, wrap)
 
 
 def shifted_lattice(tips: Array, cell: float) -> Lattice:
     """A lattice around tips [m], shape (n, 3), that shares no plane of symmetry with them."""
     lattice = Lattice.around(tips, cell)
     return lattice._replace(origin=lattice.origin + cell * _SHIFT)
-
-
-def smallest_memory(rod: TipMap) -> float:
-    """Memory that a search cannot do without [bytes]."""
-    return _fixed(rod) + 2e4 * _per_cell(rod)
 
 
 def lost_share(rod: TipMap) -> float:
@@ -151,38 +136,19 @@ def lost_share(rod: TipMap) -> float:
     return float(np.isnan(tips[:, 0]).mean())
 
 
-def _fixed(rod: TipMap) -> float:
-    return 16.0 * 8.0 * _CLOUD * (rod.box.bundles + 3)
-
-
-def _per_cell(rod: TipMap) -> float:
-    """Bytes of a center: its gap and activation, masks, and its part of the edges."""
-    return 16.0 * rod.box.bundles + 120.0
+def _bytes(rod: TipMap) -> tuple[float, float]:
+    """Of clouds, and of a center: its gap and activation, masks, and its part of the edges."""
+    return 16.0 * 8.0 * _CLOUD * (rod.box.bundles + 3), 16.0 * rod.box.bundles + 120.0
 
 
 def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
-    most = min((memory - _fixed(rod)) / _per_cell(rod), _MOST_CELLS)
+    fixed, each = _bytes(rod)
+    most = min((memory - fixed) / each, _MOST_CELLS)
     low, high = 0.0, 1.0 + float(sides.max())
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if np.prod(sides / middle + 8.0) <= most else (middle, high)
     return high
-
-
-def _found(flood: Flood, cloud: tuple[Array, Array], coarse: Wrap, hull: ConvexHull) -> Searched:
-    """The set by its wrap; by lines of sight if these tell the volume better, and agree."""
-    rod, edge, wrap = flood.rod, flood.lattice.cell, wrapped(flood)
-    change = abs(wrap.volume_of_tips - coarse.volume_of_tips)
-    volume = Estimate(wrap.volume_of_tips, change + wrap.error_of_tips)
-    reached = ReachedCells(flood, cloud, wrap, coarse, hull)
-    if reached.is_thick:
-        lines, missed = reached.swept
-        area = len(lines.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
-        seen = line_volume(lines)
-        error = seen.error + missed + area * (ENOUGH * edge + rod.tol * rod.length)
-        if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
-            volume = Estimate(seen.value, error)
-    return Searched(reached, volume, hull.volume)
 
 
 def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:

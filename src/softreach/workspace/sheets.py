@@ -82,16 +82,10 @@ def outer_sheets(rod: TipMap, image: Image) -> Sheets:
     return _sheets(rod, np.concatenate([cube, _between(cube[pairs], shares)]), faces)
 
 
-def box_sheets(rod: TipMap) -> Sheets | None:
-    """The faces of the box, which bound the image of a map that is one to one.
-
-    Returns:
-        None if some activation on the faces has no stable equilibrium.
-    """
+def box_sheets(rod: TipMap) -> Sheets:
+    """The faces of the box, which bound the image of a map that is one to one."""
     cube = grid_faces(_FACE_CELLS)
     sheets = _sheets(rod, cube, face_triangles(cube, _FACE_CELLS))
-    if not np.isfinite(sheets.vertices).all():
-        return None
     turned = sheets.volume < 0
     return replace(sheets, faces=sheets.faces[:, ::-1].copy()) if turned else sheets
 
@@ -232,9 +226,7 @@ class _Beside:
     def __init__(self, rod: TipMap, image: Image) -> None:
         self._rod, self._image = rod, image
         self._n = round(len(image.vertices) ** (1 / 3)) - 1
-        lattice = image.lattice
-        grid = lattice.origin + image.vertices * (lattice.cell / image.unit)
-        self._grid = grid.reshape(*(self._n + 1,) * 3, 3)
+        self._grid = image.places.reshape(*(self._n + 1,) * 3, 3)
         bend = sum(
             np.pad(
                 np.linalg.norm(np.diff(self._grid, 2, axis), axis=-1),

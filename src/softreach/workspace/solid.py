@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.geometry.surface import Surface, without_flakes
-from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, ReachableSet, with_error
-from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
+from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
+from softreach.workspace.boundary import boundary_surface
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
@@ -27,8 +26,6 @@ from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["ReachableSolid", "Route"]
 
 Route = Literal["flux", "raster", "search"]
 
@@ -63,52 +60,36 @@ class ReachableSolid(ReachableSet):
     """
 
     dimension: ClassVar[int] = 3
+    _stored: ClassVar[tuple[str, ...]] = "volume", "convex_volume", "unreachability"
 
-    tip_map: TipMap
-    cells: int
-    volume: float
-    volume_error: float
-    lost_share: float = 0.0
-    multiplicity: Mapping[int, float]
+    multiplicity: Mapping[int, float] = field(default_factory=dict)
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""
-    multiplicity_error: float
-    """Error of the volume reached more than once, the same as that of the volume itself [m³];
-    NaN for more than three free bundles."""
-    fold_volume: float
+    fold_volume: float = np.nan
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     NaN for more than three free bundles."""
-    fold_volume_error: float
-    """Change of `fold_volume` from half as fine a grid [m³]."""
     route: Route
     """Source of the volume. "flux": the map is found to be one to one, and the volume is what
     flows through the images of the six faces of the activation box. "raster": the image folds or
-    overlaps, or this is not clear; it is rasterized, and a signed volume by flux makes it exact
+    overlaps, or may do so under loads and at kinks; a signed volume by flux makes it exact
     elsewhere. "search": more than three free bundles."""
-    measure_hull: Callable[[], Estimate] = field(repr=False)
-    """Measures the convex hull [m³]."""
-    rasterize: Callable[[], Image | ReachedCells] = field(repr=False)
-    """Makes `image`."""
+    image: Image | ReachedCells = field(repr=False)
+    """The mapped activation grid, rasterized; of more than three bundles what was found."""
     coarse_image: Image | None = field(default=None, repr=False)
     """The image of half as fine a grid, for the route "raster"."""
 
     @property
-    def convex_volume(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Volume of the convex hull [m³]; for the route "flux" measured when first asked for."""
-        return self._hull.value
+    def multiplicity_error(self) -> float:
+        """Error of the volume reached more than once [m³]; NaN for more than three free bundles.
+
+        The same as that of the volume itself, and 0 for the route "flux".
+        """
+        return {"flux": 0.0, "raster": self.volume_error, "search": np.nan}[self.route]
 
     @property
-    def convex_volume_error(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Error of `convex_volume`, estimated from two grids [m³]."""
-        return self._hull.error
-
-    @lazy
-    def image(self) -> Image | ReachedCells:
-        """The mapped activation grid, rasterized; of more than three bundles what was found.
-
-        For the route "flux" it is made when it is first asked for.
-        """
-        return self.rasterize()
+    def fold_volume_error(self) -> float:
+        """Error of `fold_volume`, as that of the volume reached more than once [m³]."""
+        return self.multiplicity_error
 
     @lazy
     def grid(self) -> xr.Dataset:
@@ -152,13 +133,11 @@ class ReachableSolid(ReachableSet):
             fine, coarse = self.image.wrap.area, self.image.coarse.area
             return Estimate(fine, abs(fine - coarse))
         cells = 48 if self.tip_map.supports_unstable else 96
-        faces = [face_image(self.tip_map, count) for count in (cells, cells // 2)]
-        areas = [np.nan if face is None else face.area for face in faces]
-        removed = (areas[0] - areas[1]) / 3.0
+        fine, coarse = (face_image(self.tip_map, count).area for count in (cells, cells // 2))
+        removed = (fine - coarse) / 3.0
         # What is reached more than once counts once, and may be any part of the faces.
-        several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
-        share = several / self.volume if self.volume > 0.0 else 1.0
-        return Estimate(areas[0] + removed, abs(removed) + share * areas[0])
+        share = self._several / self.volume if self.volume > 0.0 else 1.0
+        return Estimate(fine + removed, abs(removed) + share * fine)
 
     def surface(self) -> Surface:
         """The boundary: closed, oriented outwards, without staircase.
@@ -173,8 +152,9 @@ class ReachableSolid(ReachableSet):
         Raises:
             MissingExtra: scikit-image is not installed.
         """
-        image = self._face_image if self.route == "flux" and not self.lost_share else None
-        return without_flakes(self._boundary, self.volume_error) if image is None else image
+        if self.route == "flux":
+            return self._face_image
+        return without_flakes(self._boundary, self.volume_error)
 
     def sheets(self) -> Sheets:
         """The boundary as the sheets it consists of: images of faces of the box, and folds.
@@ -201,16 +181,9 @@ class ReachableSolid(ReachableSet):
         Raises:
             InvalidInput: Points of another shape or not finite.
         """
-        from scipy.ndimage import map_coordinates
-
-        positions = as_points("points", points)
-        asked = self._searched or self.image
-        if isinstance(asked, ReachedCells):
-            inside = asked.are_deep(positions)
-        else:  # a cell's diagonal inside nothing is to be decided
-            at = asked.lattice.coordinates(positions)
-            inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -np.sqrt(3.0)
-        inside[~inside] = asked.counts_at(positions[~inside]) > 0
+        positions, covering = as_points("points", points), self._covering
+        inside = covering.are_deep(positions)
+        inside[~inside] = covering.counts_at(positions[~inside]) > 0
         return inside
 
     def distance(self, points: ArrayLike) -> Array:
@@ -231,8 +204,7 @@ class ReachableSolid(ReachableSet):
         inside = self.contains(positions)
         out = np.empty(len(positions))
         out[inside] = -self._boundary.distance(positions[inside])
-        outside = self._searched or self._critical
-        out[~inside] = outside.distance(positions[~inside])
+        out[~inside] = self._covering.distance(positions[~inside])
         return out
 
     def _repr_html_(self) -> str:
@@ -248,9 +220,8 @@ class ReachableSolid(ReachableSet):
         """All numbers with their errors and units; `multiplicity` over `activations`."""
         import xarray as xr
 
-        dataset = super().to_dataset().assign_attrs(route=self.route)
-        if self.route != "flux":  # else there may be no raster yet
-            dataset = dataset.assign_attrs(cell=self.image.lattice.cell)
+        attrs = {"route": self.route, "cell": self.image.lattice.cell}
+        dataset = super().to_dataset().assign_attrs(attrs)
         if not self.multiplicity:
             return dataset
         name = {"units": "m3", "long_name": "volume that so many activations reach"}
@@ -259,89 +230,62 @@ class ReachableSolid(ReachableSet):
             multiplicity=volumes
         )
 
-    @lazy
-    def _hull(self) -> Estimate:
-        return self.measure_hull()
-
-    @lazy
-    def _field(self) -> Array:
-        assert isinstance(self.image, Image)
-        return signed_field(self.image)
+    @property
+    def _several(self) -> float:
+        return sum(volume for times, volume in self.multiplicity.items() if times > 1)
 
     @lazy
     def _boundary(self) -> Surface:
-        if self._searched is not None:
-            return self._searched.wrap
-        assert isinstance(self.image, Image)
-        return boundary_surface(self.image, self._field, self.volume)
+        if isinstance(self._covering, ReachedCells):
+            return self._covering.wrap
+        return boundary_surface(self._covering, self.volume)
 
     @lazy
-    def _searched(self) -> ReachedCells | None:
-        """What is searched for instead of rasterized: more than three bundles, and thin sets."""
-        if isinstance(self.image, ReachedCells):
-            return self.image
-        if self.lost_share or self.volume > _NEVER_THIN * self.tip_map.length**3:
-            return None
-        cell = self.image.lattice.cell
-        least = max(_SEEN * cell, _CHORDS * self.tip_map.length / self.cells**2)
-        is_thin = 2.0 * self.volume <= least * self._boundary_area().value  # not of NaN
-        return cells_of(self.tip_map, cell) if is_thin else None
+    def _covering(self) -> Image | ReachedCells:
+        """What tells inside from outside: of sets that are thin to the raster, a search instead."""
+        cell, length = self.image.lattice.cell, self.tip_map.length
+        may_be = not self.lost_share and self.volume <= _NEVER_THIN * length**3
+        if may_be and isinstance(self.image, Image):
+            least = max(_SEEN * cell, _CHORDS * length / self.cells**2)
+            if 2.0 * self.volume <= least * self._boundary_area().value:  # not of NaN
+                return cells_of(self.tip_map, cell)
+        return self.image
 
     @lazy
     def _sheets(self) -> Sheets:
-        sheets = None
-        if self.route == "flux" and not self.lost_share:
-            sheets = box_sheets(self.tip_map)
-        elif (
-            isinstance(self.image, Image)
-            and self.tip_map.is_smooth
-            and not self.tip_map.supports_unstable
-        ):
-            sheets = outer_sheets(self.tip_map, self.image)
-        return Sheets.of(self.surface()) if sheets is None else sheets
+        rod = self.tip_map
+        if self.route == "flux":
+            return box_sheets(rod)
+        if isinstance(self.image, Image) and rod.is_smooth and not rod.supports_unstable:
+            return outer_sheets(rod, self.image)
+        return Sheets.of(self.surface())
 
     @lazy
-    def _face_image(self) -> Surface | None:
+    def _face_image(self) -> Surface:
         return face_image(self.tip_map)
 
-    @lazy
-    def _critical(self) -> Surface:
-        assert isinstance(self.image, Image)
-        return critical_surface(self.image)
-
     def _lines(self) -> list[str]:
-        share, error = 100 * self.unreachability, 100 * self.unreachability_error
-        lines = [
-            f"volume {quantity(self.volume, 'm³', self.volume_error)}",
-            f"{self._convex_text()}, of which {quantity(share, '%', error)} are out of reach",
-        ]
+        lines = super()._lines()
         if self.shell is not None:
             area, thickness = self.shell
             sheet = f"a shell of area {quantity(area.value, 'm²', area.error)}, "
             lines.insert(0, f"{sheet}thickness {quantity(thickness.value, 'm', thickness.error)}")
         if self.multiplicity:
-            several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
-            again = quantity(several, "m³", self.multiplicity_error)
+            again = quantity(self._several, "m³", self.multiplicity_error)
             behind = quantity(self.fold_volume, "m³", self.fold_volume_error)
             lines.append(f"reached more than once {again}, behind folds {behind}")
         raster = "" if self.route == "flux" else f", cells of {self.image.lattice.cell:.3g} m"
         return [*lines, _ROUTES[self.route] + raster]
 
-    def _numbers(self) -> dict[str, Number]:
-        numbers = {
-            **with_error("volume", self.volume, self.volume_error, "m3", "volume"),
-            **self._convex_numbers(),
-        }
-        for name, size, unit in (("area", 0, "m2"), ("thickness", 1, "m")):
-            if self.shell is not None:
-                value, error = self.shell[size]
-                numbers[f"shell_{name}"] = Number(value, unit, f"{name} of the thin set")
-                numbers[f"shell_{name}_error"] = Number(error, unit, f"error of the {name}")
-        if not self.multiplicity:
-            return numbers
-        again = "error of the volume reached more than once"
-        fold = self.fold_volume, self.fold_volume_error
-        return numbers | {
-            "multiplicity_error": Number(self.multiplicity_error, "m3", again),
-            **with_error("fold_volume", *fold, "m3", "volume reached with both orientations"),
-        }
+    def _numbers(self) -> Stored:
+        numbers = super()._numbers()
+        if self.shell is not None:
+            area, thickness = self.shell
+            numbers |= with_error("shell_area", *area, "m2", "area of the thin set")
+            numbers |= with_error("shell_thickness", *thickness, "m", "thickness of the thin set")
+        if self.multiplicity:
+            about = {"units": "m3", "long_name": "error of the volume reached more than once"}
+            numbers["multiplicity_error"] = ((), self.multiplicity_error, about)
+            behind = self.fold_volume, self.fold_volume_error, "m3"
+            numbers |= with_error("fold_volume", *behind, "volume reached with both orientations")
+        return numbers

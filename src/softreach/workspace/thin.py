@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,17 +14,12 @@ from softreach.kernels.box.simplices import chains, corner_steps
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask, as_points
 from softreach.support.lazy import lazy
-from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import Number, ReachableSet, with_error
+from softreach.workspace.abstract_set import ReachableSet, Stored
 from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
 from softreach.workspace.grid import every_second, grid_ticks, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
 
-__all__ = ["ReachableCurve", "ReachablePoint", "ReachableSurface", "thin_set"]
-
-
-# Cells of the grids of a surface and of a curve, for distances and pictures.
-_SURFACE_CELLS, _CURVE_CELLS = 128, 1024
+_CELLS = {1: 1024, 2: 128}  # of the grids of a curve and of a surface, for distances and pictures
 _NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
 
 
@@ -33,44 +28,14 @@ class ReachableSurface(ReachableSet):
     """A surface that two free bundles sweep, which has an area and no volume."""
 
     dimension: ClassVar[int] = 2
+    _stored: ClassVar[tuple[str, ...]] = "area", "convex_volume", "unreachability"
 
-    tip_map: TipMap
-    cells: int
     area: float
     """Area [m²]; places count as often as they are reached."""
     area_error: float
     """Error of `area`, estimated from two numbers of Gauss nodes [m²]."""
-    convex_volume: float
-    convex_volume_error: float
-    lost_share: float = 0.0
     mapped_grid: Surface = field(repr=False)
     """The mapped activation grid, without cells that are left out."""
-    volume: float = field(init=False, default=0.0)
-    volume_error: float = field(init=False, default=0.0)
-
-    @classmethod
-    def of(cls, rod: TipMap) -> Self:
-        """The surface of a tip map with two free bundles."""
-        cells = _SURFACE_CELLS
-        tips = _grid_tips(rod, cells)
-        left_out = left_out_cells(rod, tips, cells)
-        area, error = _measure(rod, tips, left_out)
-        base = np.flatnonzero(~left_out)
-        base += base // cells  # each row of vertices has one more
-        corners = corner_steps((cells, cells))[chains(2, 2)]
-        faces = (base[:, None, None] + corners).reshape(-1, 3)
-        convex = _convex_volume(tips, cells, 2)
-        vertices, faces = (tips, faces) if len(base) == cells**2 else compact_surface(tips, faces)
-        return cls(
-            tip_map=rod,
-            cells=cells,
-            area=area,
-            area_error=error,
-            convex_volume=convex.value,
-            convex_volume_error=convex.error,
-            lost_share=float(left_out.mean()),
-            mapped_grid=Surface(vertices=vertices, faces=faces),
-        )
 
     def surface(self) -> Surface:
         """The surface as triangles."""
@@ -85,57 +50,23 @@ class ReachableSurface(ReachableSet):
 
         return html_card(repr(self), Skin(self.mapped_grid.vertices, self.mapped_grid.faces))
 
-    def _lines(self) -> list[str]:
-        return [f"area {quantity(self.area, 'm²', self.area_error)}", self._convex_text()]
-
-    def _numbers(self) -> dict[str, Number]:
-        return {
-            **with_error("area", self.area, self.area_error, "m2", "area"),
-            **self._convex_numbers(),
-        }
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachableCurve(ReachableSet):
     """A curve that one free bundle draws, which has a length and no volume."""
 
     dimension: ClassVar[int] = 1
+    _stored: ClassVar[tuple[str, ...]] = "curve_length", "convex_volume", "unreachability"
 
-    tip_map: TipMap
-    cells: int
     curve_length: float
     """Length [m]; places count as often as they are reached."""
     curve_length_error: float
     """Error of `curve_length`, estimated from two numbers of Gauss nodes [m]."""
-    convex_volume: float
-    convex_volume_error: float
-    lost_share: float = 0.0
     path: Array = field(repr=False)
     """Points along the curve [m], from the lower bound to the upper one, shape (cells + 1, 3); NaN
     where there is no stable equilibrium."""
     left_out: Mask = field(repr=False)
     """Mask of the pieces between neighboring points that are left out, shape (cells,)."""
-    volume: float = field(init=False, default=0.0)
-    volume_error: float = field(init=False, default=0.0)
-
-    @classmethod
-    def of(cls, rod: TipMap) -> Self:
-        """The curve of a tip map with one free bundle."""
-        path = _grid_tips(rod, _CURVE_CELLS)
-        left_out = left_out_cells(rod, path, _CURVE_CELLS)
-        length, error = _measure(rod, path, left_out)
-        convex = _convex_volume(path, _CURVE_CELLS, 1)
-        return cls(
-            tip_map=rod,
-            cells=_CURVE_CELLS,
-            curve_length=length,
-            curve_length_error=error,
-            convex_volume=convex.value,
-            convex_volume_error=convex.error,
-            lost_share=float(left_out.mean()),
-            path=path,
-            left_out=left_out,
-        )
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the chords of `path` [m], never negative."""
@@ -150,17 +81,6 @@ class ReachableCurve(ReachableSet):
 
         return html_card(repr(self), Dots(_found(self.path)))
 
-    def _lines(self) -> list[str]:
-        length = quantity(self.curve_length, "m", self.curve_length_error)
-        return [f"length {length}", self._convex_text()]
-
-    def _numbers(self) -> dict[str, Number]:
-        length, error = self.curve_length, self.curve_length_error
-        return {
-            **with_error("curve_length", length, error, "m", "length"),
-            **self._convex_numbers(),
-        }
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachablePoint(ReachableSet):
@@ -168,20 +88,8 @@ class ReachablePoint(ReachableSet):
 
     dimension: ClassVar[int] = 0
 
-    tip_map: TipMap
     tip: Array
     """Position [m], shape (3,)."""
-    lost_share: float = field(init=False, default=0.0)
-    cells: int = field(init=False, default=1)
-    volume: float = field(init=False, default=0.0)
-    volume_error: float = field(init=False, default=0.0)
-    convex_volume: float = field(init=False, default=0.0)
-    convex_volume_error: float = field(init=False, default=0.0)
-
-    @classmethod
-    def of(cls, rod: TipMap) -> Self:
-        """The point of a tip map without a free bundle."""
-        return cls(tip_map=rod, tip=grid_tips(rod, 1)[0])
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the tip [m]."""
@@ -191,19 +99,39 @@ class ReachablePoint(ReachableSet):
         x, y, z = self.tip
         return [f"({x:.6g}, {y:.6g}, {z:.6g}) m"]
 
-    def _numbers(self) -> dict[str, Number]:
+    def _numbers(self) -> Stored:
         return {
-            name: Number(float(value), "m", f"{name} of the tip")
+            name: ((), float(value), {"units": "m", "long_name": f"{name} of the tip"})
             for name, value in zip("xyz", self.tip, strict=True)
         }
 
 
-_KINDS = ReachablePoint, ReachableCurve, ReachableSurface
-
-
 def thin_set(rod: TipMap) -> ReachableSet:
     """The reachable set of a tip map with fewer than three free bundles."""
-    return _KINDS[rod.box.dimension].of(rod)
+    m = rod.box.dimension
+    if m == 0:
+        return ReachablePoint(tip_map=rod, cells=1, tip=grid_tips(rod, 1)[0])
+    cells = _CELLS[m]
+    ticks = None if rod.supports_unstable else grid_ticks(rod, cells)  # on whose lines kinks are
+    tips = grid_tips(rod, cells, ticks=ticks)
+    left_out = left_out_cells(rod, tips, cells)
+    size, convex = _measure(rod, tips, left_out), _convex_volume(tips, cells, m)
+    common: dict[str, Any] = {
+        "tip_map": rod,
+        "cells": cells,
+        "convex_volume": convex.value,
+        "convex_volume_error": convex.error,
+        "lost_share": float(left_out.mean()),
+    }
+    if m == 1:
+        length = {"curve_length": size.value, "curve_length_error": size.error}
+        return ReachableCurve(path=tips, left_out=left_out, **length, **common)
+    base = np.flatnonzero(~left_out)
+    base += base // cells  # each row of vertices has one more
+    faces = (base[:, None, None] + corner_steps((cells, cells))[chains(2, 2)]).reshape(-1, 3)
+    vertices, faces = (tips, faces) if len(base) == cells**2 else compact_surface(tips, faces)
+    mesh = Surface(vertices=vertices, faces=faces)
+    return ReachableSurface(area=size.value, area_error=size.error, mapped_grid=mesh, **common)
 
 
 def threads(points: Array, first: Index) -> Surface:
@@ -220,11 +148,6 @@ def by_nodes(rod: TipMap) -> Estimate:
     """Length [m] or area [m²] of the image, and by how much fewer Gauss nodes change it."""
     fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
     return Estimate(fine, abs(fine - rough))
-
-
-def _grid_tips(rod: TipMap, cells: int) -> Array:
-    """Tips of a grid [m], on whose lines kinks are; even where some tips may be unstable."""
-    return grid_tips(rod, cells, ticks=None if rod.supports_unstable else grid_ticks(rod, cells))
 
 
 def _measure(rod: TipMap, tips: Array, left_out: Mask) -> Estimate:

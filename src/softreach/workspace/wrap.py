@@ -16,9 +16,8 @@ from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
+from softreach.workspace.measure import Estimate
 from softreach.workspace.search import CLEARLY, ENOUGH, Flood, Nearest, nearest_tips
-
-__all__ = ["DISTANCE", "Wrap", "drawn_tight", "spread", "wrapped"]
 
 DISTANCE = 0.75
 """Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
@@ -43,24 +42,19 @@ class Wrap(Surface):
     tight_volume: float
     """Volume inside of the tips themselves [m³]."""
 
-    @property
-    def error_of_tips(self) -> float:
-        """Of this volume, by where tips count as found and by their own errors [m³]."""
-        if self.volume_of_tips != self.tight_volume:
-            return self.area * _SHEET_TOL * self.rod.length
-        return self.area * (ENOUGH * self.cell + self.rod.tol * self.rod.length)
-
     @lazy
-    def volume_of_tips(self) -> float:
+    def volume_of_tips(self) -> Estimate:
         """The same; of a sheet that is far thinner than cells, its thickness over its area [m³].
 
         No search for the nearest tip sees so small a change; so from each vertex the tip is pushed
-        along its normal, to which all columns of ∂r/∂γ are nearly square, to both sides.
+        along its normal, to which all columns of ∂r/∂γ are nearly square, to both sides. It errs by
+        where tips count as found and by their own errors.
         """
         half = 0.5 * self.area
         thickness = self.tight_volume / half if half > 0.0 else np.inf
         if self.rod.supports_unstable or thickness > _SHEET * np.sqrt(half):
-            return self.tight_volume
+            off = ENOUGH * self.cell + self.rod.tol * self.rod.length
+            return Estimate(self.tight_volume, self.area * off)
         rod, areas = refined(self.rod, _SHEET_TOL), np.linalg.norm(self.corner_areas, axis=1)
         tips, slopes = rod.tips_and_slopes(self.gamma)
         normals = np.linalg.svd(slopes * rod.box.scales)[0][:, :, 2]
@@ -69,7 +63,7 @@ class Wrap(Surface):
             ways = (2.0 * thickness * normals, -2.0 * thickness * normals)
             found = sum(_pushed(rod, self.gamma, tips, way) for way in ways)
             thickness = float(np.quantile(found, _WIDEST))
-        return 0.5 * float(areas @ found)
+        return Estimate(0.5 * float(areas @ found), self.area * _SHEET_TOL * rod.length)
 
     @lazy
     def cube(self) -> Array:

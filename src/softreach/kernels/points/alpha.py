@@ -164,18 +164,12 @@ def boundary_faces(cells, neighbors, kept, faces, owners):
     count = 0
     for t in range(len(cells)):
         for i in range(4):
-            if is_boundary(neighbors, kept, t, i):
+            if kept[t] and (neighbors[t, i] < 0 or not kept[neighbors[t, i]]):
                 owners[count] = t
                 for k in range(3):
                     faces[count, k] = cells[t, FACES[i, k]]
                 count += 1
     return count
-
-
-@strict
-def is_boundary(neighbors, kept, t, i):
-    """True if cell t is kept and its neighbor i is not."""
-    return kept[t] and (neighbors[t, i] < 0 or not kept[neighbors[t, i]])
 
 
 @strict

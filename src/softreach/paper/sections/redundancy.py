@@ -14,7 +14,6 @@ from softreach.cloud.dexterity import solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
 from softreach.paper.claims import Finding, Numbers, Verdict, judged
 from softreach.paper.notebook import Notebook, Settings
-from softreach.support.arrays import Array
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -118,10 +117,15 @@ def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> 
 
 
 def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
+    from scipy.ndimage import binary_erosion
+
     summary = redundancy_summary(cloud, distance)
     density, measure = tip_density(cloud), solution_measure(cloud)
     filled = density["density"].where(density["density"] > 0)
-    size = _inside(measure["solution_measure"].values)
+    values: np.ndarray = measure["solution_measure"].values
+    size = values[
+        np.asarray(binary_erosion(values > 0), bool)
+    ]  # the border cuts cells with an empty neighbor
     front = distance.values[cloud.tip.values[distance["sample"].values, 1] < 0]
     behind = distance.values[cloud.tip.values[distance["sample"].values, 1] > 0]
     return {
@@ -139,13 +143,6 @@ def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
         "solution_low": float(np.quantile(size, 0.05)),
         "solution_largest": float(size.max(initial=0.0)),
     }
-
-
-def _inside(values: Array) -> Array:
-    """Values of cells none of whose neighbors is empty: the border cuts others."""
-    from scipy.ndimage import binary_erosion
-
-    return values[binary_erosion(values > 0)]
 
 
 def _draw(
