@@ -30,13 +30,16 @@ from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.calibration.uncertainty import Uncertainty, uncertainty
 from softreach.rod.summary import design_warnings
-from softreach.support.arguments import as_flag, as_integer, as_number, as_path
+from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.errors import InvalidInput, Range, warn
-from softreach.support.files.atomic import writing
+from softreach.support.files.text import write_text
 from softreach.support.progress import Progress, as_progress
+from softreach.support.report import Report
+from softreach.support.units import as_unit
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 __all__ = ["Calibration", "Rival", "calibrate", "leave_one_run_out"]
@@ -463,48 +466,35 @@ class Calibration:
             InvalidInput: Something is there, and `overwrite` is not given.
             NotWritten: It cannot be written.
         """
-        lines = [f"# {key}: {value}" for key, value in self.provenance.items()]
         free, sigma = self.fit.free.numbers, self.sigma
         pairs = zip(free, self.fit.values.tolist(), strict=True)
-        numbers = [f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs]
-        head = "\n".join(["# Calibrated from measured poses.", *lines, *numbers])
-        text = f"{head}\n\n{self.arm.file_text}"
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, overwrite=overwrite) as stream:
-            stream.write(text.encode())
+        lines = [
+            "# Calibrated from measured poses.",
+            *(f"# {key}: {value}" for key, value in self.provenance.items()),
+            *(f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs),
+        ]
+        write_text(path, "\n".join(lines) + f"\n\n{self.arm.file_text}", overwrite=overwrite)
 
-    def save_table(
-        self, path: str | PathLike[str], *, unit: str = "m", overwrite: bool = False
-    ) -> None:
-        """Write inputs, measured and predicted places and their distances, a row for each sample.
+    def table(self, unit: str = "m") -> pd.DataFrame:
+        """Inputs, measured and predicted places and their distances, a row for each sample.
 
         Args:
-            path: A .csv file.
             unit: Of lengths: m, cm, mm or L.
-            overwrite: Whether it may replace any file, and not only such a table.
         """
-        from softreach.calibration.report import write_table
+        from softreach.calibration.report import table_of
 
-        write_table(self, path, unit, overwrite=overwrite)
+        return table_of(self, as_unit(unit, self.arm.length))
 
-    def save_report(
-        self, path: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
-    ) -> None:
-        """Write a report in one .html file: numbers, errors, verdict and pictures.
+    def report(self, unit: str | None = None) -> Report:
+        """Numbers, errors, verdict and pictures, to be printed, or saved as an .html file.
 
         Args:
-            path: The file.
             unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
-            overwrite: Whether it may replace any file, and not only an older report.
-
-        Raises:
-            MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        from softreach.calibration.report import write_report
+        from softreach.calibration.report import report_of
 
-        write_report(self, path, unit, overwrite=overwrite)
+        arm = self.arm
+        return report_of(self, arm.length_unit if unit is None else as_unit(unit, arm.length))
 
     def __repr__(self) -> str:
-        from softreach.calibration.report import summary_text
-
-        return summary_text(self)
+        return str(self.report())

@@ -17,9 +17,9 @@ from softreach.calibration.free_numbers import FreeNumbers, free_numbers
 from softreach.calibration.model import MarkerModel
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
-from softreach.support.arguments import as_flag, as_integer, as_names, as_number, as_path
+from softreach.support.arguments import as_integer, as_names, as_number
 from softreach.support.errors import InvalidInput, Range, did_you_mean
-from softreach.support.files.atomic import writing
+from softreach.support.files.text import write_text
 
 __all__ = ["PosePlan", "plan_poses"]
 
@@ -90,11 +90,6 @@ class PosePlan:
             InvalidInput: Something else is there.
             NotWritten: It cannot be written.
         """
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, overwrite=overwrite) as file:
-            file.write(self._csv().encode())
-
-    def _csv(self) -> str:
         arm = self.free.arm
         sizes = [_WRITTEN.get(unit, ("", 1.0)) for unit in arm.input_units]
         inputs = [
@@ -108,7 +103,7 @@ class PosePlan:
         table.writerow(["sample", *inputs, *places])
         for k, row in enumerate(values):
             table.writerow([k, *(f"{value:.6g}" for value in row), *("" for _ in places)])
-        return text.getvalue()
+        write_text(path, text.getvalue(), overwrite=overwrite)
 
     def __repr__(self) -> str:
         seen = ", ".join(self.markers)

@@ -122,9 +122,9 @@ def calibrate(
     """
     from softreach import calibration
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.calibration.report import summary_text
     from softreach.support import progress
     from softreach.support.files.formats import TABLES
+    from softreach.support.files.text import write_table
     from softreach.support.report import REPORT
 
     arm = design_from(design, changes)
@@ -154,14 +154,14 @@ def calibrate(
     if json:
         console.json(_record(result))
     else:
-        console.line(f"calibration of {design}: {summary_text(result, lengths.unit)}")
+        console.line(f"calibration of {design}: {result.report(lengths.unit.name)}")
     if out is not None:
         result.save(out, overwrite=overwrite)
     if table is not None:
-        result.save_table(table, unit=lengths.written.name, overwrite=overwrite)
+        write_table(table, result.table(lengths.written.name), overwrite=overwrite)
         console.written(table, lengths)
     if report is not None:
-        result.save_report(report, unit=lengths.unit.name, overwrite=overwrite)
+        result.report(lengths.unit.name).save(report, overwrite=overwrite)
 
 
 def read_noise(text: str) -> float:

@@ -47,9 +47,9 @@ def plan_poses(
     Example: softreach plan-poses arm.toml --free pose --free "rings*modulus" -o poses.csv
     """
     from softreach import calibration
-    from softreach.calibration.report import sigma_rows
     from softreach.support.files.formats import TABLES
-    from softreach.support.quantity import columns
+    from softreach.support.quantity import columns, quantity
+    from softreach.support.units import readable_unit
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
@@ -80,8 +80,13 @@ def plan_poses(
     else:
         seen = ", ".join(plan.markers)
         console.line(f"{n} poses of {design} with {seen}, noise {lengths.text(width)}")
-        rows = sigma_rows(plan.free, sigma.values(), lengths.unit)
-        for line in columns([("number", "to be known", "share"), *rows]):
+        rows = [("number", "to be known", "share")]
+        for number, width in zip(plan.free.numbers, sigma.values(), strict=True):
+            name, size = readable_unit(number.unit, number.start, lengths.unit)
+            known = quantity(number.start / size, name, width / size, digits=2)
+            share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
+            rows.append((number.name, known, share))
+        for line in columns(rows):
             console.line(f"  {line}")
     if out is not None:
         plan.save(out, overwrite=overwrite)

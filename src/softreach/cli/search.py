@@ -144,9 +144,7 @@ def search(
     if json:
         console.json(_record(result, out))
     else:
-        from softreach.optimization.report import summary_text
-
-        console.line(summary_text(result, lengths.unit))
+        console.line(result.report(lengths.unit.name))
     result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
     return EXIT[result.verdict]
 

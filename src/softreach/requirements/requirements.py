@@ -19,7 +19,6 @@ from softreach.requirements.parts import LONGEST, MOST_PLACES, Keep, Limits, Tar
 from softreach.requirements.requirements_file import read, written
 from softreach.support.arguments import (
     POSITIVE,
-    as_flag,
     as_given,
     as_instance,
     as_number,
@@ -28,8 +27,7 @@ from softreach.support.arguments import (
 )
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
-from softreach.support.files.atomic import writing
-from softreach.support.files.text import read_text
+from softreach.support.files.text import read_text, write_text
 
 __all__ = ["Requirements"]
 
@@ -158,10 +156,7 @@ class Requirements:
             InvalidInput: Something else is there.
             NotWritten: It cannot be written.
         """
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        text = self.to_toml()
-        with writing(path, overwrite=overwrite) as stream:
-            stream.write(text.encode())
+        write_text(path, self.to_toml(), overwrite=overwrite)
 
     def __repr__(self) -> str:
         parts = [

@@ -9,9 +9,8 @@ from os import PathLike
 from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.exchange.activefilaments.filament import Angle, Filament, FilamentRing, filament_of
-from softreach.support.arguments import as_flag, as_path
-from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.text import write_text
 
 __all__ = ["FILAMENT_SCRIPT", "design_script", "write_design"]
 
@@ -39,10 +38,7 @@ def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool
             a bore, or other actuators than fibers along all of it; or something else is there.
         NotWritten: It cannot be written.
     """
-    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    script = design_script(arm)
-    with writing(path, overwrite=overwrite) as file:
-        file.write(script.encode())
+    write_text(path, design_script(arm), overwrite=overwrite)
 
 
 def design_script(arm: Manipulator) -> str:

@@ -1,4 +1,4 @@
-"""Text that others wrote, read up to a limit."""
+"""Text that others wrote, read up to a limit, and text of ours, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ import stat
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import InvalidInput
+from softreach.support.files.atomic import writing
+from softreach.support.files.formats import TABLES, format_of
 
-__all__ = ["MEGABYTE", "read_text", "tables_of", "text_of"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["MEGABYTE", "read_text", "tables_of", "text_of", "write_table", "write_text"]
 
 MEGABYTE = 1_000_000
 
@@ -53,6 +59,25 @@ def text_of(name: str, shown: str, content: bytes, most: int) -> str:
         allowed = f"text in UTF-8, but character {place} is NUL: save it in that encoding"
         raise InvalidInput(name, shown, allowed)
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> None:
+    """Write text in UTF-8.
+
+    Raises:
+        InvalidInput: Something is there, and `overwrite` is not given.
+        NotWritten: It cannot be written.
+    """
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    with writing(path, overwrite=overwrite) as file:
+        file.write(text.encode())
+
+
+def write_table(path: str | os.PathLike[str], table: pd.DataFrame, *, overwrite: bool) -> None:
+    """Write a CSV, as `write_text`."""
+    format_of(as_path("path", path), TABLES)
+    text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
+    write_text(path, text, overwrite=overwrite)
 
 
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
