@@ -124,9 +124,13 @@ def calibrate(
     train = table.of(~held)
     numbers = free_numbers(arm, free, prior)
     model = MarkerModel.of(numbers, train)
-    model = replace(model, free=started(model, train.places))
     progress = as_progress(progress)
-    fit = fitted(model, train.places, robust=robust, noise=noise, progress=progress)
+
+    def fit_to(model: MarkerModel, places: Array) -> Fit:
+        model = replace(model, free=started(model, places))
+        return fitted(model, places, robust=robust, noise=noise, progress=progress)
+
+    fit = fit_to(model, train.places)
     if not fit.converged:
         warn(f"the fit did not converge in {fit.evaluations} evaluations: look at its residuals")
     if fit.at_bound.any():
@@ -147,10 +151,7 @@ def calibrate(
     _warn_of_numbers(result)
     spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
-        found = exchanged_columns(
-            fit, model, train.places, robust=robust, noise=noise, progress=progress
-        )
-        result = replace(result, exchange=found)
+        result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
     return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
 
 
@@ -322,8 +323,7 @@ class Calibration:
         if self.exchange is not None:
             columns, less = self.exchange
             said = (
-                f"{columns} seem to be exchanged, or counted the other way round: "
-                f"the same numbers then fit to "
+                f"{columns}: the same numbers then fit to "
                 f"{1e3 * less:.3g} mm rms instead of {1e3 * self.train.rms:.3g} mm"
             )
         repeated = self.repeatability

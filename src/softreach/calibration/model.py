@@ -6,9 +6,7 @@ equilibrium; all that follows from them, how the arm moves, is the linear respon
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +37,7 @@ from softreach.rod.response import (
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
 
-__all__ = ["MarkerModel", "Prediction", "exchanged_inputs", "marker_stations"]
+__all__ = ["MarkerModel", "Prediction", "marker_stations"]
 
 Array = NDArray[np.float64]
 
@@ -90,24 +88,6 @@ def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
         return np.array([arm.length]), np.zeros((1, 3))
     places = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
     return places, np.array([marker.offset for marker in arm.markers])
-
-
-def exchanged_inputs(arm: Manipulator) -> Iterator[tuple[str, list[int]]]:
-    """Orders of the inputs with two of one unit exchanged, and what is exchanged.
-
-    Of several actuators with three bundles or more also with all counted the other way round.
-    """
-    names, units = arm.input_names, arm.input_units
-    for j, k in combinations(range(arm.inputs), 2):
-        if units[j] == units[k]:
-            order = list(range(arm.inputs))
-            order[j], order[k] = k, j
-            yield f"the inputs {names[j]} and {names[k]}", order
-    counts = [] if arm.drives else [actuator.bundles for actuator in arm.actuators]
-    if sum(count > 2 for count in counts) > 1:
-        ends = np.cumsum([0, *counts]).tolist()
-        turned = ([a, *range(b - 1, a, -1)] for a, b in pairwise(ends))
-        yield "the senses in which bundles are counted", [k for part in turned for k in part]
 
 
 @dataclass(frozen=True, eq=False)
