@@ -147,8 +147,8 @@ def _verdict(places_of, count=300):
     data = read_measurements(arm, columns(arm, inputs, places - left))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        every = np.ones(count, bool)
-        return judged(data, left, repeatability(data, left), "error", every, ~every)
+        none = np.zeros(count, bool)
+        return judged(data, left, repeatability(data, left), none, none)
 
 
 def test_verdicts_tell_noise_memory_and_missing_physics_apart():
@@ -177,8 +177,7 @@ def test_samples_far_off_are_slips_if_they_are_few_and_of_different_inputs():
     def verdict(rows):
         far = np.isin(np.arange(len(inputs)), rows)
         off = left + 0.05 * far[:, None, None]
-        every = np.ones(len(inputs), bool)
-        return judged(data, off, repeatability(data, left), "error", every, far)
+        return judged(data, off, repeatability(data, left), np.zeros(len(inputs), bool), far)
 
     slips, many, one = verdict([3, 52]), verdict(range(0, 99, 9)), verdict(range(5, 120, 8))
     assert slips.limit == "noise"

@@ -119,8 +119,13 @@ def calibrate(
     robust, rivals = as_flag("robust", robust), as_flag("rivals", rivals)
     noise = None if noise is None else as_number("noise", noise, Range(0.0, 1.0, "m", True))
     table = read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
-    _warn_of_copies(table)
-    held = _held_out(table, hold_out, as_integer("seed", seed))
+    rows = np.concatenate([table.inputs, table.places.reshape(len(table), -1)], axis=1)
+    if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
+        warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
+    held, count = np.zeros(len(table), bool), round(hold_out * len(table))
+    if count == len(table):
+        raise InvalidInput("hold_out", hold_out, f"such that some of {count} samples are left")
+    held[np.random.default_rng(as_integer("seed", seed)).permutation(len(table))[:count]] = True
     train = table.of(~held)
     numbers = free_numbers(arm, free, prior)
     model = MarkerModel.of(numbers, train)
@@ -152,7 +157,15 @@ def calibrate(
     spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
         result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
-    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+    if rivals:
+        laws = {
+            "constant curvature": constant_curvature(arm, train, table, progress),
+            "quadratic ridge": quadratic(train, table),
+        }
+        left = {name: (places - table.places, count) for name, (places, count) in laws.items()}
+        each = (Rival(k, n, misses(x[~held]), misses(x[held])) for k, (x, n) in left.items())
+        result = replace(result, rivals=tuple(each))
+    return result
 
 
 def leave_one_run_out(
@@ -205,37 +218,6 @@ def _warn_of_numbers(result: Calibration) -> None:
     for text in design_warnings(result.arm):
         if re.sub(r"[\d.]+", "", text) not in before:
             warn(f"the calibrated arm: {text}")
-
-
-def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
-    held = np.zeros(len(data), bool)
-    count = round(share * len(data))
-    if count == len(data):
-        raise InvalidInput("hold_out", share, f"such that some of {len(data)} samples are left")
-    held[np.random.default_rng(seed).permutation(len(data))[:count]] = True
-    return held
-
-
-def _warn_of_copies(data: Measurements) -> None:
-    rows = np.concatenate([data.inputs, data.places.reshape(len(data), -1)], axis=1)
-    if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
-        warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
-
-
-def _rivals(
-    arm: Manipulator, data: Measurements, held: NDArray[np.bool_], progress: Progress
-) -> tuple[Rival, ...]:
-    train = data.of(~held)
-    laws = {
-        "constant curvature": lambda test: constant_curvature(arm, train, test, progress),
-        "quadratic ridge": lambda test: quadratic(train, test),
-    }
-    result = []
-    for name, law in laws.items():
-        places, count = law(data)
-        left = places - data.places
-        result.append(Rival(name, count, misses(left[~held]), misses(left[held])))
-    return tuple(result)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -316,18 +298,12 @@ class Calibration:
     @cached_property
     def verdict(self) -> Verdict:
         """Limitation of the fit; samples far off are left out if they are few."""
-        held = bool(self.held.any())
-        rows, name = (self.held, "held-out") if held else (~self.held, "fitted")
-        far = np.isin(self.data.rows, self.outliers)
-        said = ""
         if self.exchange is not None:
             columns, less = self.exchange
-            said = (
-                f"{columns}: the same numbers then fit to "
-                f"{1e3 * less:.3g} mm rms instead of {1e3 * self.train.rms:.3g} mm"
-            )
-        repeated = self.repeatability
-        return judged(self.data, self.residuals, repeated, f"{name} error", rows, far, said)
+            said = f"{columns}: the same numbers then fit to {1e3 * less:.3g} mm rms instead of "
+            return Verdict("columns", f"{said}{1e3 * self.train.rms:.3g} mm")
+        far = np.isin(self.data.rows, self.outliers)
+        return judged(self.data, self.residuals, self.repeatability, self.held, far)
 
     @property
     def outliers(self) -> NDArray[np.intp]:
@@ -346,12 +322,9 @@ class Calibration:
     @property
     def correlated(self) -> list[tuple[str, str, float]]:
         """Pairs of numbers that the data hardly tells apart, with their correlation."""
-        matrix = self.uncertainty.correlation
-        j, k = np.nonzero(np.triu(np.abs(matrix) > _CORRELATED, 1))
-        return [
-            (self.names[a], self.names[b], float(matrix[a, b]))
-            for a, b in zip(j.tolist(), k.tolist(), strict=True)
-        ]
+        matrix, names = self.uncertainty.correlation, self.names
+        pairs = np.argwhere(np.triu(np.abs(matrix) > _CORRELATED, 1)).tolist()
+        return [(names[a], names[b], float(matrix[a, b])) for a, b in pairs]
 
     def errors_on(self, data: Any, **columns: Any) -> Misses:
         """Errors of the calibrated arm on other measurements."""
