@@ -39,16 +39,15 @@ def ridge(features: Array, target: Array) -> Callable[[Array], Array]:
     left, values, axes = np.linalg.svd(scaled, full_matrices=False)
     along, n = left.T @ (target - mean), len(features)
     total = ((target - mean) ** 2).sum() - (along**2).sum()
-    best = min(_PENALTIES, key=lambda penalty: _cross_validation(penalty, values, along, total, n))
+
+    def cross_validation(penalty: float) -> float:
+        keep = values**2 / (values**2 + n * penalty)
+        left = total + (((1.0 - keep)[:, None] * along) ** 2).sum()
+        return left / max(n - 1.0 - keep.sum(), 1e-3) ** 2
+
+    best = min(_PENALTIES, key=cross_validation)
     weights = axes.T @ ((values / (values**2 + n * best))[:, None] * along)
     return lambda rows: mean + ((rows - middle) / size) @ weights
-
-
-def _cross_validation(penalty: float, values: Array, along: Array, beyond: float, n: int) -> float:
-    keep = values**2 / (values**2 + n * penalty)
-    left = beyond + (((1.0 - keep)[:, None] * along) ** 2).sum()
-    freedom = max(n - 1.0 - keep.sum(), 1e-3)
-    return left / freedom**2
 
 
 def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:

@@ -19,7 +19,6 @@ from softreach.arm.tensions import LengthLaw
 from softreach.calibration.free_numbers import FreeNumbers
 from softreach.calibration.measurements import Measurements
 from softreach.kernels.rod.linear_response import WEIGHTS
-from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.pulled import LoadedLengths
 from softreach.rod.loaded.rod import LoadedRod
@@ -127,10 +126,7 @@ class MarkerModel:
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors: list[list[tuple[float, Manipulator | Base]]] = []
         if values is not None:
-            neighbors = [
-                [*(free.base_neighbors if free.moves_base(k) else free.neighbors)(values, k)]
-                for k in range(len(free))
-            ]
+            neighbors = [free.neighbors(values, k) for k in range(len(free))]
         blocks = [
             self._block(arm, neighbors, grid, rows, values is not None)
             for rows in parallel.blocks(len(self.inputs), _BLOCK)
@@ -168,14 +164,6 @@ class MarkerModel:
             rest,
         )
 
-    def _beside(
-        self, arm: Manipulator, at: _Explicit, other: Manipulator, grid: StepGrid, inputs: Array
-    ) -> _Explicit:
-        """The same of another arm; tables are not made again where its body is the same."""
-        if any(getattr(arm, part) != getattr(other, part) for part in _BODY):
-            return self._explicit(other, grid, inputs)
-        return at._replace(bundles=Driving(other).bundles(inputs))
-
     def _block(
         self,
         arm: Manipulator,
@@ -186,13 +174,19 @@ class MarkerModel:
     ) -> tuple[Array, Array | None, NDArray[np.int8]]:
         inputs = self.inputs[rows]
         at = self._explicit(arm, grid, inputs)
-        rod = _rod(arm, grid)
-        gamma = _activations(arm, rod, at.bundles)
+        body = body_of(arm)
+        bounds = body.bounds * 0.0  # which decide nothing
+        bounds[arm.bundles :] = 1.0
+        rod = (FreeRod if arm.loads is None else LoadedRod)(body.with_bounds(bounds), _TOL)
+        rod, law, gamma = rod.in_steps(int(grid.counts.sum())), LengthLaw(body), at.bundles
+        if len(law.columns):  # tensions in place of displacements
+            lengths = law if arm.loads is None else LoadedLengths(law, rod)
+            gamma = law.inner(gamma, lengths.tensions(gamma).tension)
         lost = np.asarray(~np.isfinite(gamma).all(axis=1))
         gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
         state = rod_state(rod, gamma, at.table)
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
-        places = _places(at, state)
+        places = at.position + _beyond(at, state)[1] @ at.rotation.T
         places[lost] = np.nan
         if not slopes:
             return places, None, state.status
@@ -212,54 +206,23 @@ class MarkerModel:
         inputs: Array,
     ) -> _Explicit:
         """Derivative of all that is explicit by one number."""
-        factors = [factor for factor, _ in neighbors]
-        each = [
-            self._beside(arm, at, other, grid, inputs)
-            if isinstance(other, Manipulator)
-            else _on_base(arm, at, other)
-            for _, other in neighbors
-        ]
+        factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
+        for _, other in neighbors:
+            if isinstance(other, Base):  # gravity alone is another one in its frame
+                force = dead_force(arm, other, at.table.stations, at.table.length)
+                table = replace(at.table, force=force, weight=payload_weight(arm, other))
+                place = np.array(other.position)
+                each.append(at._replace(table=table, rotation=other.rotation, position=place))
+            elif any(getattr(arm, part) != getattr(other, part) for part in _BODY):
+                each.append(self._explicit(other, grid, inputs))
+            else:  # the same body, and so the same tables
+                each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([one.table for one in each], factors)
         others = (
             np.tensordot(factors, np.stack(columns), axes=1)
             for columns in zip(*(one[1:] for one in each), strict=True)
         )
         return _Explicit(table, *others)
-
-
-def _on_base(arm: Manipulator, at: _Explicit, base: Base) -> _Explicit:
-    """The same on another base: gravity alone is another one in its frame."""
-    table = at.table
-    force = dead_force(arm, base, table.stations, table.length)
-    return at._replace(
-        table=replace(table, force=force, weight=payload_weight(arm, base)),
-        rotation=base.rotation,
-        position=np.array(base.position),
-    )
-
-
-def _rod(arm: Manipulator, grid: StepGrid) -> ArmRod:
-    """The rod of an inner arm in as many steps as the grid has, whatever its bounds."""
-    body = body_of(arm)
-    bounds = body.bounds * 0.0
-    bounds[arm.bundles :] = 1.0
-    inner = body.with_bounds(bounds)
-    rod = (FreeRod if arm.loads is None else LoadedRod)(inner, _TOL)
-    return rod.in_steps(int(grid.counts.sum()))
-
-
-def _activations(arm: Manipulator, rod: ArmRod, bundles: Array) -> Array:
-    """Activations of the inner arm: tensions in place of displacements."""
-    law = LengthLaw(body_of(arm))
-    if not len(law.columns):
-        return bundles
-    lengths = law if arm.loads is None else LoadedLengths(law, rod)
-    return law.inner(bundles, lengths.tensions(bundles).tension)
-
-
-def _places(at: _Explicit, state: RodState) -> Array:
-    """p + R (r + offset in the directors)."""
-    return at.position + _beyond(at, state)[1] @ at.rotation.T
 
 
 def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:

@@ -160,7 +160,14 @@ def plan_poses(
     if not least <= n <= len(inputs):
         allowed = f"from {least} for these {len(numbers)} numbers to {len(inputs):,} candidates"
         raise InvalidInput("n", n, allowed)
-    chosen = _chosen(_trusted(slopes * numbers.scale), _in_box(arm, inputs), n)
+    low, high = arm.input_bounds.T
+    moving = low < high
+    at = (inputs[:, moving] - low[moving]) / (high - low)[moving]
+    # An arm about to snap reacts to everything, and that at activations which are not known yet.
+    trusted = slopes * numbers.scale
+    size = np.linalg.norm(trusted, axis=(1, 2))
+    trusted /= np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
+    chosen = _chosen(trusted, at, n)
     np.random.default_rng(seed).shuffle(chosen)
     own = slopes[chosen].reshape(-1, len(numbers))
     identifiable(numbers, own)
@@ -197,22 +204,6 @@ def _candidates(arm: Manipulator, count: int, seed: int) -> Array:
     inputs = np.tile(low, (len(cube), 1))
     inputs[:, free] = low[free] + cube * (high - low)[free]
     return inputs
-
-
-def _trusted(slopes: Array) -> Array:
-    """Slopes of poses, those of poses that react far more than most no larger than a limit.
-
-    An arm about to snap reacts to everything, and that at activations which nobody knows yet.
-    """
-    size = np.linalg.norm(slopes, axis=(1, 2))
-    return slopes / np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
-
-
-def _in_box(arm: Manipulator, inputs: Array) -> Array:
-    """Inputs between 0 and 1, (n, free input)."""
-    low, high = arm.input_bounds.T
-    free = low < high
-    return (inputs[:, free] - low[free]) / (high - low)[free]
 
 
 def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
@@ -256,12 +247,8 @@ def _within(at: Array, place: int, room: float) -> NDArray[np.bool_]:
 
 
 def _best(slopes: Array, total: Array, near: NDArray[np.int_]) -> int:
-    """The candidate that adds most to the determinant, of those that are near the fewest others."""
-    return int(np.argmax(np.where(near == near.min(), _gains(slopes, total), -np.inf)))
-
-
-def _gains(slopes: Array, total: Array) -> Array:
-    """By how much each candidate raises ln det of the information."""
+    """The candidate that adds most to ln det of the information, of those near the fewest."""
     half = np.linalg.cholesky(np.linalg.inv(0.5 * (total + total.T)))
     along = slopes @ half
-    return np.linalg.slogdet(np.eye(slopes.shape[1]) + along @ along.transpose(0, 2, 1))[1]
+    gains = np.linalg.slogdet(np.eye(slopes.shape[1]) + along @ along.transpose(0, 2, 1))[1]
+    return int(np.argmax(np.where(near == near.min(), gains, -np.inf)))

@@ -21,7 +21,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 
-__all__ = ["PoseRules", "Worst", "worst_pose"]
+__all__ = ["PoseRules", "worst_pose"]
 
 _LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""
@@ -55,16 +55,11 @@ class PoseRules:
 
     @classmethod
     def of(
-        cls,
-        arm: Manipulator,
-        keeps: Sequence[Keep],
-        limits: Limits,
-        tolerance: float,
-        rod: TipMap | None = None,
+        cls, arm: Manipulator, keeps: Sequence[Keep], limits: Limits, tolerance: float
     ) -> PoseRules:
         """The rules for single poses among regions and limits."""
         poses = {name: x for name, x in limits.given.items() if name in POSE_LIMITS}
-        return cls(arm, tuple(keeps), poses, tolerance, rod)
+        return cls(arm, tuple(keeps), poses, tolerance)
 
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
@@ -226,29 +221,18 @@ def _tips_missed(keep: Keep, tips: Array) -> Array:
     return missed
 
 
-class Worst(NamedTuple):
-    """The pose that misses a region by most, as far as a search found it."""
-
-    gamma: Array
-    """Its inputs, shape (inputs,)."""
-    judged: Judged
-    """Of it alone."""
-
-
-def worst_pose(rules: PoseRules) -> Worst:
+def worst_pose(rules: PoseRules) -> tuple[Array, Judged]:
     """The pose within the bounds that misses the one region of some rules by most, by search."""
-    worst, _ = worst_inputs(rules.rod, lambda gamma: _coarse(rules, gamma)[:, None])
-    return Worst(worst[0], rules.judged(worst))
-
-
-def _coarse(rules: PoseRules, gamma: Array) -> Array:
-    """Distances by which poses miss the one region, at few stations [m], shape (n,)."""
     (keep,) = rules.keeps
-    if keep.of == "tip":
-        values = _tips_missed(keep, rules.rod.tips(gamma))
-    else:
-        blocks = parallel.blocks(len(gamma), _BLOCK)
-        bodies = (Body.of(rules.rod, gamma[block], _LEVELS[0]) for block in blocks)
-        values = [body.missed(keep, np.arange(len(body.lost)))[0] for body in bodies]
-        values = np.concatenate(values)
-    return np.nan_to_num(values, nan=-np.inf)
+
+    def missed(gamma: Array) -> Array:  # at few stations
+        if keep.of == "tip":
+            values = [_tips_missed(keep, rules.rod.tips(gamma))]
+        else:
+            blocks = parallel.blocks(len(gamma), _BLOCK)
+            bodies = (Body.of(rules.rod, gamma[block], _LEVELS[0]) for block in blocks)
+            values = [body.missed(keep, np.arange(len(body.lost)))[0] for body in bodies]
+        return np.nan_to_num(np.concatenate(values), nan=-np.inf)[:, None]
+
+    worst, _ = worst_inputs(rules.rod, missed)
+    return worst[0], rules.judged(worst)

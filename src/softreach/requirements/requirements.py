@@ -191,12 +191,8 @@ def _named(parts: Sequence[Any]) -> Iterator[Any]:
         if names.count(name) > 1:
             raise InvalidInput("name", repr(name), "of one target, or of one region, only")
     for number, part in enumerate(parts, 1):
-        if not part.name:
-            kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
-            given, part = vars(part), object.__new__(type(part))
-            for key, value in {**given, "name": f"{kind} {number}"}.items():
-                object.__setattr__(part, key, value)
-        yield part
+        kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
+        yield part if part.name else dataclasses.replace(part, name=f"{kind} {number}")
 
 
 def _limits_of(name: str, ends: Any) -> tuple[float | None, float | None]:
