@@ -48,7 +48,13 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     Raises:
         InvalidInput: A key or value that is wrong, with what is allowed.
     """
-    document = _document(text)
+    try:
+        document = document_of(text, "space", float)
+    except InvalidDesign as error:
+        raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
+    for key in document:
+        if key not in _KEYS:
+            raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
     base = design_from(str(document.get("design", "minimal_trunk")))
     table = document.get("parameters", {})
     if not isinstance(table, dict):
@@ -82,17 +88,6 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
         raise unknown_parameter(key, known)
     numbers, parameter = _numbers(key, value), known[key]
     return parameter.name, [from_written(x, parameter.unit) for x in numbers]
-
-
-def _document(text: str) -> dict[str, Any]:
-    try:
-        document = document_of(text, "space", float)
-    except InvalidDesign as error:
-        raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
-    for key in document:
-        if key not in _KEYS:
-            raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
-    return document
 
 
 def _space(

@@ -55,11 +55,23 @@ class PoseRules:
 
     @classmethod
     def of(
-        cls, arm: Manipulator, keeps: Sequence[Keep], limits: Limits, tolerance: float
+        cls,
+        arm: Manipulator,
+        keeps: Sequence[Keep],
+        limits: Limits,
+        tolerance: float,
+        rod: TipMap | None = None,
     ) -> PoseRules:
         """The rules for single poses among regions and limits."""
         poses = {name: x for name, x in limits.given.items() if name in POSE_LIMITS}
-        return cls(arm, tuple(keeps), poses, tolerance)
+        return cls(arm, tuple(keeps), poses, tolerance, rod)
+
+    @property
+    def rooms(self) -> tuple[Array, Array]:
+        """Largest value that each rule allows, and its scale: L, or the limit; (rule,) each."""
+        none, limits = [0.0] * len(self.keeps), [*self.limits.values()]
+        scales = [self.arm.length] * len(self.keeps) + [limit or 1.0 for limit in limits]
+        return np.array(none + limits), np.array(scales)
 
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
@@ -87,8 +99,7 @@ class PoseRules:
             for column, name in enumerate(self.limits, k):
                 value[block, column] = self._limited(name, gamma[block])
         value = np.nan_to_num(value, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
-        scale = [self.arm.length] * len(self.keeps) + [x or 1.0 for x in self.limits.values()]
-        most = [0.0] * len(self.keeps) + list(self.limits.values())
+        most, scale = self.rooms
         excess = np.maximum((value - most) / scale, 0.0)
         # What rounding alone makes of a bound that is met to the last bit is no excess.
         error = np.where(error > 1e-9 * self.arm.length, error, 0.0)

@@ -54,7 +54,10 @@ def design_script(arm: Manipulator) -> str:
 def _body(filament: Filament) -> Iterator[str]:
     yield "rings = ["
     for ring in filament.rings:
-        yield f"    {_ring(ring, filament.length)},{_comment(ring)}"
+        mechanics = _mechanics(ring.young_modulus, ring.poisson_ratio)
+        geometry = f"Geometry({ring.inner_radius!r}, {ring.outer_radius!r})"
+        fibers = f"FiberArchitecture({_angle(ring.angle, filament.length)})"
+        yield f"    Ring({mechanics}, {geometry}, {fibers}),{_comment(ring)}"
     yield "]"
     inside = _mechanics(filament.core_modulus, filament.core_poisson_ratio)
     inner = filament.rings[0].inner_radius
@@ -79,12 +82,6 @@ def _activation(rings: Sequence[FilamentRing]) -> Iterator[str]:
         lows, highs = (_vector(pair[side] for pair in ring.bounds) for side in (0, 1))
         yield f"    ({lows}, {highs}),"
     yield "]"
-
-
-def _ring(ring: FilamentRing, length: float) -> str:
-    mechanics = _mechanics(ring.young_modulus, ring.poisson_ratio)
-    geometry = f"Geometry({ring.inner_radius!r}, {ring.outer_radius!r})"
-    return f"Ring({mechanics}, {geometry}, FiberArchitecture({_angle(ring.angle, length)}))"
 
 
 def _comment(ring: FilamentRing) -> str:
