@@ -167,9 +167,10 @@ class _Reader:
         self, bases: Mapping[str, Manipulator]
     ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
         """Ranges and ties, and choices, by parameter."""
-        if not bases:
-            return {}, {}
         choices: dict[str, list[Any]] = {}
+        free: dict[str, Any] = {}
+        if not bases:
+            return free, choices
         for path, key, value in self._entries("choices"):
             if key in NAMED_CHOICES:
                 self._add(path, choices, key, self._named_choice(bases, path, key, value))
@@ -178,31 +179,21 @@ class _Reader:
             if key not in NAMED_CHOICES and (name := self._name(names, path, key)):
                 listed = value.split(",") if isinstance(value, str) else value
                 self._add(path, choices, name, self._numbers(names, path, key, listed, None))
-        free: dict[str, Any] = {}
         for path, key, value in self._entries("free", names):
             if name := self._name(names, path, key):
                 self._add(path, free, name, self._range(names, path, key, value))
-        self._check(bases, names, free, choices)
-        return free, choices
-
-    def _check(
-        self,
-        bases: Mapping[str, Manipulator],
-        names: _Names,
-        free: dict[str, Any],
-        choices: dict[str, list[Any]],
-    ) -> None:
-        """Ties, and whether anything is free."""
         ranges = {name: ends for name, ends in free.items() if not isinstance(ends, str)}
         if not (ranges or choices or len(bases) > 1):
             if not self.faults:
                 allowed = "needs one parameter or more with a range, or choices: taper_deg = [0, 3]"
                 self._refuse("search.free", None, allowed)
-            return
+            return free, choices
         for path, key, value in self._entries("free", names):
-            if key in names.by_key and isinstance(free.get(names.by_key[key].name), str):
-                tied = {**ranges, names.by_key[key].name: value}
+            name = names.by_key[key].name if key in names.by_key else ""
+            if isinstance(free.get(name), str):
+                tied = {**ranges, name: value}
                 self._tried(path, value, partial(free_parameters, dict(bases), tied, choices))
+        return free, choices
 
     def options(self, needs: Requirements | None) -> dict[str, Any]:
         options: dict[str, Any] = {word: self._objectives(word) for word in _SENSES}

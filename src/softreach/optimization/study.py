@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from softreach.optimization.free_parameters import FreeParameter, Values
+from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
 from softreach.support.arguments import as_one_of, as_path
 from softreach.support.errors import InvalidInput, MissingExtra, in_short
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     import optuna
@@ -68,9 +69,8 @@ class Study:
 
     def ask(self, count: int) -> list[tuple[Any, dict[str, float | str]]]:
         """Trials to be told, and their designs."""
-        space = {each.name: self._distribution(each) for each in self.problem.parameters.free}
         with _quiet():
-            trials = [self._study.ask(space) for _ in range(count)]
+            trials = [self._study.ask(self._space) for _ in range(count)]
         return [(trial, dict(trial.params)) for trial in trials]
 
     def tell(self, trial: Any, candidate: Candidate) -> None:
@@ -81,22 +81,17 @@ class Study:
 
     def add(self, candidate: Candidate) -> None:
         """Keep a design that came from elsewhere, such as a polish."""
-        space = {each.name: self._distribution(each) for each in self.problem.parameters.free}
-        params = {
-            each.name: float(np.clip(float(candidate.values[each.name]), each.low, each.high))
-            if each.is_real
-            else candidate.values[each.name]
-            for each in self.problem.parameters.free
-        }
+        params = dict(candidate.values)
+        for each in self.problem.parameters.real:
+            params[each.name] = float(np.clip(float(params[each.name]), each.low, each.high))
         with _quiet():
-            self._study.add_trial(
-                self._optuna.trial.create_trial(
-                    params=params,
-                    distributions=space,
-                    values=self._costs(candidate),
-                    user_attrs={_JUDGED: candidate.to_dict()},
-                )
+            trial = self._optuna.trial.create_trial(
+                params=params,
+                distributions=self._space,
+                values=self._costs(candidate),
+                user_attrs={_JUDGED: candidate.to_dict()},
             )
+            self._study.add_trial(trial)
 
     def candidates(self) -> list[Candidate]:
         """All designs that were judged, by this process or another, in their order."""
@@ -188,13 +183,17 @@ class Study:
             "random": lambda: samplers.RandomSampler(seed=seed),
         }[self.kind]()
 
-    def _distribution(self, parameter: FreeParameter) -> Any:
-        kinds = self._optuna.distributions
-        if parameter.choices:
-            return kinds.CategoricalDistribution(parameter.choices)
-        if parameter.whole:
-            return kinds.IntDistribution(int(parameter.low), int(parameter.high))
-        return kinds.FloatDistribution(parameter.low, parameter.high)
+    @lazy
+    def _space(self) -> dict[str, Any]:
+        kinds, space = self._optuna.distributions, {}
+        for each in self.problem.parameters.free:
+            if each.choices:
+                space[each.name] = kinds.CategoricalDistribution(each.choices)
+            elif each.whole:
+                space[each.name] = kinds.IntDistribution(int(each.low), int(each.high))
+            else:
+                space[each.name] = kinds.FloatDistribution(each.low, each.high)
+        return space
 
     def _costs(self, candidate: Candidate) -> list[float]:
         """Values that the samplers minimize: objectives, or the excess over requirements first."""
@@ -232,7 +231,7 @@ def _storage(place: str) -> Any:
         raise InvalidInput("storage", place, allowed)
     is_new = not path.exists() or not path.stat().st_size
     is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
-    if not is_new and not (_is_own_database if is_database else _is_own_journal)(path):
+    if not is_new and not _is_own(path, is_database):
         raise InvalidInput("storage", place, "a new file, or that of a search: choose another name")
     if is_database:
         return f"sqlite:///{path}"
@@ -250,24 +249,22 @@ def _storage(place: str) -> Any:
     return JournalStorage(JournalFileBackend(str(path)))
 
 
-def _is_own_journal(path: Path) -> bool:
-    with path.open("rb") as file:
-        line = file.readline(4096)
+def _is_own(path: Path, is_database: bool) -> bool:
+    if is_database:
+        import sqlite3
+
+        place = f"{path.absolute().as_uri()}?mode=ro"
+        try:
+            with closing(sqlite3.connect(place, uri=True)) as database:
+                names = database.execute("SELECT study_name FROM studies").fetchall()
+            return set(names) <= {(_NAME,)}
+        except sqlite3.Error:
+            return False
     try:
-        first = json.loads(line)
+        with path.open("rb") as file:
+            first = json.loads(file.readline(4096))
         return first["op_code"] == 0 and first["study_name"] == _NAME
     except (ValueError, KeyError, TypeError):
-        return False
-
-
-def _is_own_database(path: Path) -> bool:
-    import sqlite3
-
-    try:
-        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
-            names = database.execute("SELECT study_name FROM studies").fetchall()
-        return set(names) <= {(_NAME,)}
-    except sqlite3.Error:
         return False
 
 
