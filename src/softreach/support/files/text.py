@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 import tomllib
 from collections.abc import Callable
@@ -80,6 +81,11 @@ def write_table(path: str | os.PathLike[str], table: pd.DataFrame, *, overwrite:
     write_text(path, text, overwrite=overwrite)
 
 
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{64}}")
+"""A key of so many parts with dots, which takes the parser as many steps as the square of them."""
+
+
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
     """The tables of TOML text.
 
@@ -90,6 +96,8 @@ def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]
     Raises:
         ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
     """
+    if _LONG_KEY.search(text):
+        raise ValueError("a key has more than 64 parts with dots")
     try:
         tables = tomllib.loads(text, parse_float=number)
         if not _fit_64_bits(tables):
