@@ -11,7 +11,7 @@ import numpy as np
 from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.changes import unknown_parameter
-from softreach.arm.parameters.shown import from_written, written_parameters
+from softreach.arm.parameters.shown import Written, from_written
 from softreach.atlas.arguments import column
 from softreach.atlas.space import DesignSpace
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -83,7 +83,7 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
     Raises:
         InvalidInput: An unknown key, or values that are no numbers.
     """
-    known = written_parameters(base)
+    known = Written.of(base).written
     if key not in known:
         raise unknown_parameter(key, known)
     numbers, parameter = _numbers(key, value), known[key]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,12 +103,12 @@ def constant_curvature(
     return arcs.places(best.x, test.inputs), len(best.x)
 
 
-class _Arcs:
-    def __init__(
-        self, ends: Array, acts: NDArray[np.bool_], scale: Array, markers: Array, offsets: Array
-    ) -> None:
-        self.ends, self.acts, self.scale = ends, acts, scale
-        self.markers, self.offsets = markers, offsets
+class _Arcs(NamedTuple):
+    ends: Array
+    acts: NDArray[np.bool_]
+    scale: Array
+    markers: Array
+    offsets: Array
 
     @classmethod
     def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:

@@ -184,7 +184,6 @@ def _said(found: list[_Order]) -> str:
 
 
 def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> None:
-    """Refuse columns that match far better in another order."""
     own = _miss(model.free, predicted, places)
     middle = np.nanmean(places, axis=(0, 1))
     if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):

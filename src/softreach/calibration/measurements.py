@@ -282,7 +282,6 @@ def _named(columns: list[str], given: str | None, usual: Sequence[str], what: st
 
 
 def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]]) -> None:
-    """Refuse places that are farther apart than any pose of the arm could put them."""
     offsets = [float(np.linalg.norm(marker.offset)) for marker in arm.markers]
     reach = _WIDEST * (arm.length + max(offsets, default=0.0))
     away = np.nan_to_num(np.abs(places - np.nanmedian(places, axis=0)))
@@ -299,7 +298,6 @@ def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]
 
 
 def _refuse_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
-    """Refuse tensions that push, and inputs far beyond the bounds."""
     bundles = [*[None] * len(arm.drives), *(arm.undriven if arm.drives else range(arm.bundles))]
     most = np.abs(arm.input_bounds).max(axis=1)
     for unit in dict.fromkeys(arm.input_units):
@@ -425,7 +423,6 @@ def _unit_text(unit: str) -> str:
 
 
 def _size(column: str, unit: str) -> float:
-    """Size of a unit of a column in that of an input."""
     _, own, size = _unit(column)
     if own and own != unit:
         raise InvalidInput(f"column {column}", f"in {own}", f"in {_unit_text(unit)}")

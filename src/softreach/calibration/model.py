@@ -205,7 +205,6 @@ class MarkerModel:
         grid: StepGrid,
         inputs: Array,
     ) -> _Explicit:
-        """Derivative of all that is explicit by one number."""
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
             if isinstance(other, Base):  # gravity alone is another one in its frame

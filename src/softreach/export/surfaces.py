@@ -202,7 +202,6 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
 
 
 def _said_unit(scene: Scene) -> str:
-    """The unit in words that `Mesh.load` reads."""
     return f"softreach, lengths in {scene.unit.name}"
 
 

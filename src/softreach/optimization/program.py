@@ -131,7 +131,6 @@ class Point:
         return np.nan_to_num(result / rod.length)
 
     def _by_payload(self) -> list[tuple[TipMap, Array]]:
-        """Tip map and poses under each payload."""
         if not len(self.poses):
             return []
         rods = self.design.rods
@@ -187,7 +186,6 @@ class Point:
         return slope
 
     def _shares(self) -> Iterator[Part]:
-        """Shares of regions that must be covered."""
         for target in self.design.problem.requirements.targets:
             if (region := target.region) is None:
                 continue
@@ -225,7 +223,6 @@ class Point:
         return Part(name, room, slope, scale=scale)
 
     def _other_goals(self) -> Iterator[Part]:
-        """Goals that must not become worse than given."""
         goals = self.design.problem.goals
         for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
             if k != self.goal:

@@ -137,8 +137,6 @@ def search(
 
 
 class _Run:
-    """One run of a search, with its budget."""
-
     def __init__(
         self,
         study: Study,

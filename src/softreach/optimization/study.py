@@ -35,7 +35,7 @@ _NEVER = 1e15
 """Cost of what cannot exist."""
 _WARM = 10
 """Designs that CMA-ES begins from at least: the best tenth of them must be one or more."""
-_JUDGED, _VALUES, _KEY, _PROBLEM = "judged", "values", "asked", "problem"
+_JUDGED, _KEY, _PROBLEM = "judged", "asked", "problem"
 
 
 class Study:
@@ -69,6 +69,7 @@ class Study:
         """All designs that were judged, in their order."""
         self._kept: dict[str, Candidate] = {}  # in the storage, by what was asked
         self._asked: set[str] = set()
+        self._seen = 0  # trials of the storage that were read
         self._lock = Lock()
         self._optuna = _library()
         with _quiet():
@@ -100,7 +101,7 @@ class Study:
         made = make()
         with self._lock, _quiet():
             if self._storage is not None:
-                kept = {_JUDGED: made.to_dict(), _VALUES: dict(made.values), _KEY: key}
+                kept = {_JUDGED: made.to_dict(), _KEY: key}
                 self._storage.add_trial(self._trial(made, kept))
         return made, True
 
@@ -125,11 +126,8 @@ class Study:
         with _quiet():
             trials = self._storage.get_trials(deepcopy=False)
         for record in (trial.user_attrs for trial in trials[self._seen :]):
-            candidate = Candidate.from_dict(record[_VALUES], record[_JUDGED])
-            self._kept.setdefault(record[_KEY], candidate)
+            self._kept.setdefault(record[_KEY], Candidate.from_dict(record[_JUDGED]))
         self._seen = len(trials)
-
-    _seen = 0
 
     def _trial(self, candidate: Candidate, attributes: dict[str, Any]) -> Any:
         params = dict(candidate.values)

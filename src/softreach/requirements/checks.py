@@ -280,7 +280,6 @@ def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Ite
 def _kept(
     keep: Keep, value: float, error: float, excess: float, where: str, unit: LengthUnit
 ) -> Finding:
-    """Distance by which a region is missed, or kept to."""
     of = "the tip" if keep.of == "tip" else "the arm"
     close = f" (to {unit.rounded(error, digits='.2g')})" if keep.of == "arm" else ""
     verdict = "missed" if excess > 0.0 else verdict_of(max(-value, 0.0), error)

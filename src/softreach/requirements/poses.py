@@ -127,7 +127,6 @@ class PoseRules:
         return value, error
 
     def _limited(self, name: str, gamma: Array) -> Array:
-        """Value of a limit in poses, shape (n,)."""
         if name == "bending":
             z = bending_stations(self.arm).ravel()
             u = self.rod.strains(gamma, z).curvature

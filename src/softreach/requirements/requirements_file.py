@@ -300,7 +300,6 @@ class _Reader:
         numbers: Mapping[str, str],
         others: tuple[str, ...] = (),
     ) -> None:
-        """Refuse keys that are neither numbers, with or without their units, nor others."""
         known = {*others, *(key for name, unit in numbers.items() for key in _keys(name, unit))}
         start = f"{path}." if path else ""
         for key in (key for key in raw if key not in known):

@@ -226,7 +226,6 @@ def _beside(place: Path) -> Path:
 
 
 def _siblings(place: Path) -> tuple[Path, Path]:
-    """Names of the whole new folder and of the whole old one."""
     return place.with_name(f"{place.name}{MARK}new"), place.with_name(f"{place.name}{MARK}old")
 
 
