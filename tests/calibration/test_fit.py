@@ -1,7 +1,5 @@
 """Fits find the arm that was measured, and say rightly how sure they are."""
 
-import warnings
-
 import numpy as np
 import pytest
 
@@ -135,36 +133,6 @@ def test_a_run_left_out_is_predicted_by_the_others():
     errors = leave_one_run_out(arm, measured(arm, 12, noise=1e-3, runs=3), free=[MODULUS])
     assert list(errors) == ["run 0", "run 1", "run 2"]
     assert all(0.5e-3 < each.rms < 4e-3 for each in errors.values())
-
-
-def _verdict(places_of, count=300):
-    """Verdict on poses whose residuals are a function of the inputs in order."""
-    arm = hanging_tentacle()
-    rng = np.random.default_rng(1)
-    inputs = np.repeat(random_inputs(arm, count // 2), 2, axis=0)[rng.permutation(count)]
-    places = marker_positions(arm, inputs)
-    left = places_of(inputs, rng)[:, None] * np.ones((1, 2, 1))
-    data = read_measurements(arm, columns(arm, inputs, places - left))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        none = np.zeros(count, bool)
-        return judged(data, left, repeatability(data, left), none, none)
-
-
-def test_verdicts_tell_noise_memory_and_missing_physics_apart():
-    def noise(inputs, rng):
-        return 1e-3 * rng.standard_normal((len(inputs), 3))
-
-    def memory(inputs, rng):
-        before = np.roll(inputs, 1, axis=0)
-        return 5e-3 * np.tanh(before - inputs) + noise(inputs, rng)
-
-    def physics(inputs, rng):
-        return 5e-3 * np.sin(2.0 * inputs) + noise(inputs, rng)
-
-    assert _verdict(noise).limit == "noise"
-    assert _verdict(memory).limit == "memory"
-    assert _verdict(physics).limit == "physics"
 
 
 def test_samples_far_off_are_slips_if_they_are_few_and_of_different_inputs():

@@ -286,6 +286,11 @@ class _Problem:
         self.width: float | None = None  # beyond which residuals count less, in m
         self.unit = 1.0  # of priors, which count as a coordinate of one width, in m
         self.kept: tuple[bytes, Prediction] | None = None
+        numbers = model.free.numbers
+        priors = [(k, *number.prior) for k, number in enumerate(numbers) if number.prior]
+        self.rows, self.means = np.zeros((len(priors), len(numbers))), np.zeros(len(priors))
+        for row, (k, mean, width) in enumerate(priors):
+            self.rows[row, k], self.means[row] = 1.0 / width, mean / width
 
     def at(self, values: Array) -> Prediction:
         key = values.tobytes()
@@ -304,26 +309,16 @@ class _Problem:
         try:
             miss = self.miss(values)
         except InvalidDesign:
-            return np.full(3 * int(self.seen.sum()) + self._priors(values)[0].size, _FAR)
+            return np.full(3 * int(self.seen.sum()) + len(self.rows), _FAR)
         miss = np.where(np.isfinite(miss), miss, _FAR * 0.1 * free.arm.length)
-        return np.concatenate([miss.ravel(), self._priors(values)[0]])
+        return np.concatenate([miss.ravel(), self.unit * (self.rows @ values - self.means)])
 
     def slopes(self, values: Array) -> Array:
         prediction = self.at(values)
         assert prediction.slopes is not None
         slopes = prediction.slopes[self.seen].reshape(-1, len(self.model.free))
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-        return np.concatenate([slopes, self._priors(values)[1]])
-
-    def _priors(self, values: Array) -> tuple[Array, Array]:
-        numbers = self.model.free.numbers
-        known = [k for k, number in enumerate(numbers) if number.prior is not None]
-        rows, slopes = np.zeros(len(known)), np.zeros((len(known), len(numbers)))
-        for row, k in enumerate(known):
-            mean, width = numbers[k].prior or (0.0, 1.0)
-            rows[row] = self.unit * (values[k] - mean) / width
-            slopes[row, k] = self.unit / width
-        return rows, slopes
+        return np.concatenate([slopes, self.unit * self.rows])
 
     def solved(self, values: Array, fine: float) -> Any:
         from scipy.optimize import least_squares

@@ -88,7 +88,9 @@ def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, s
     fit, widths = result.fit, result.uncertainty.sigma.tolist()
     pairs = zip(fit.free.numbers, fit.values.tolist(), widths, fit.at_bound, strict=True)
     # The pose starts from the data and not from the design.
-    pose = dict(zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True))
+    pose: dict[str, float] = dict(
+        zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True)
+    )
     for number, value, sigma, at_bound in pairs:
         name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma / size, digits=2)

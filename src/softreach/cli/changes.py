@@ -278,8 +278,10 @@ def _values(
     from softreach.arm.parameters.shown import Written
 
     values = dict(angles)
-    names = Written.of(arm) if texts else None
-    for key, text in texts.items() if names else ():
+    if not texts:
+        return values
+    names = Written.of(arm)
+    for key, text in texts.items():
         name = key if key in names.by_key else find_parameter(arm, key).name
         parameter = names.by_key[name]
         if parameter.name in values:

@@ -190,7 +190,7 @@ class _Reader:
                 self._refuse(path, table, "must be a table with at_least, at_most or both")
             else:
                 unit = metric.unit if metric.unit in _SUFFIXES else ""
-                ends = dict.fromkeys(("at_least", "at_most"), unit)
+                ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
                 self._check_keys(table, path, ends)
                 measures[name] = tuple(
                     self._value(table, path, end, unit, plain=True) for end in ends
