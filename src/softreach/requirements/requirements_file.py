@@ -270,15 +270,16 @@ class _Reader:
                 raise ValueError(value)
             if "," in value:
                 return [self._read(item, unit, symbol, plain) for item in value.split(",")]
-            if unit == "m":
-                return read_length(_with_unit(value), self.length)
-            return read_quantity(value, unit)
+            return self._quantity(value, unit)
         if not symbol and not plain and value != 0:
             raise ValueError(value)
         if symbol in ("", unit):
             return value
-        text = f"{value!r}{symbol}"
-        return read_length(text, self.length) if unit == "m" else read_quantity(text, unit)
+        return self._quantity(f"{value!r}{symbol}", unit)
+
+    def _quantity(self, text: str, unit: str) -> float:
+        is_relative = unit == "m" and text.strip().endswith("L")
+        return read_length(text, self.length) if is_relative else read_quantity(text, unit)
 
     def _allowed(self, unit: str, symbol: str, name: str) -> str:
         if symbol == "L" and self.length is None:
@@ -332,18 +333,6 @@ class _Reader:
 def _keys(name: str, unit: str) -> dict[str, str]:
     """Keys of a number, and the units that they say."""
     return {name: ""} | {f"{name}_{x}": symbol for x, symbol in _SUFFIXES.get(unit, {}).items()}
-
-
-def _with_unit(text: str) -> str:
-    """A length that has a unit, or is 0.
-
-    Raises:
-        ValueError: A number alone.
-    """
-    bare = text.strip().lstrip("+-").replace(".", "").replace("e", "").replace("E", "")
-    if bare.isdigit() and float(text) != 0.0:
-        raise ValueError(text)
-    return text
 
 
 def written(needs: Requirements) -> str:
