@@ -201,8 +201,17 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
     """Inputs in their units from their columns, 0 without one, shape (n, input)."""
     values = np.zeros((len(table), len(sources)))
     for k, (name, unit) in enumerate(zip(sources, units, strict=True)):
-        if name:
-            values[:, k] = _numbers(table, name) * _size(name, unit)
+        if not name:
+            continue
+        _, own, size = _unit(name)
+        if own and own != unit:
+            raise InvalidInput(f"column {name}", f"in {own}", f"in {_unit_text(unit)}")
+        if not own and unit in ("m", "N", "Pa"):
+            allowed = (
+                f"a name that ends in its unit, such as {name}_{'mm' if unit == 'm' else unit}"
+            )
+            raise InvalidInput("column", name, allowed)
+        values[:, k] = _numbers(table, name) * size
     if not np.isfinite(values).all():
         row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
         raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
@@ -420,16 +429,6 @@ def _fits(column: str, unit: str) -> bool:
 
 def _unit_text(unit: str) -> str:
     return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
-
-
-def _size(column: str, unit: str) -> float:
-    _, own, size = _unit(column)
-    if own and own != unit:
-        raise InvalidInput(f"column {column}", f"in {own}", f"in {_unit_text(unit)}")
-    if not own and unit in ("m", "N", "Pa"):
-        allowed = f"a name that ends in its unit, such as {column}_{'mm' if unit == 'm' else unit}"
-        raise InvalidInput("column", column, allowed)
-    return size
 
 
 def _numbers(table: pd.DataFrame, column: str) -> Array:
