@@ -139,6 +139,11 @@ def build_atlas(
     ended = np.isin(content.status[indices], (DONE, GAP, UNSTABLE))
     _run(atlas, indices[~ended], executor, progress)
     built = open_atlas(store)
+    _warn_of_metrics(built)
+    return built
+
+
+def _warn_of_metrics(built: xr.Dataset) -> None:
     if len(unstable := np.flatnonzero(built["status"].values == UNSTABLE)):
         first = built[["number", "message"]].stack(all=built["status"].dims, create_index=False)
         first = first.isel(all=unstable[0])
@@ -151,7 +156,6 @@ def build_atlas(
             f"alpha = {radius:.4g} L is below three mean spacings of the points of "
             f"{counted(sparse, 'design')} and {whose} too small; use more points or a larger alpha"
         )
-    return built
 
 
 def _run(

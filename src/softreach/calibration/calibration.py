@@ -122,10 +122,7 @@ def calibrate(
     rows = np.concatenate([table.inputs, table.places.reshape(len(table), -1)], axis=1)
     if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
         warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
-    held, count = np.zeros(len(table), bool), round(hold_out * len(table))
-    if count == len(table):
-        raise InvalidInput("hold_out", hold_out, f"such that some of {count} samples are left")
-    held[np.random.default_rng(as_integer("seed", seed)).permutation(len(table))[:count]] = True
+    held = _held_out(len(table), hold_out, as_integer("seed", seed))
     train = table.of(~held)
     numbers = free_numbers(arm, free, prior)
     model = MarkerModel.of(numbers, train)
@@ -138,9 +135,6 @@ def calibrate(
     fit = fit_to(model, train.places)
     if not fit.converged:
         warn(f"the fit did not converge in {fit.evaluations} evaluations: look at its residuals")
-    if fit.at_bound.any():
-        ends = [n for n, end in zip(numbers.names, fit.at_bound, strict=True) if end]
-        warn(f"numbers that end at a bound of their range: {', '.join(ends)}")
     result = Calibration(
         arm=fit.free.made(fit.values),
         start=arm,
@@ -157,15 +151,28 @@ def calibrate(
     spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
         result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
-    if rivals:
-        laws = {
-            "constant curvature": constant_curvature(arm, train, table, progress),
-            "quadratic ridge": quadratic(train, table),
-        }
-        left = {name: (places - table.places, count) for name, (places, count) in laws.items()}
-        each = (Rival(k, n, misses(x[~held]), misses(x[held])) for k, (x, n) in left.items())
-        result = replace(result, rivals=tuple(each))
-    return result
+    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+
+
+def _held_out(count: int, share: float, seed: int) -> NDArray[np.bool_]:
+    held, out = np.zeros(count, bool), round(share * count)
+    if out == count:
+        raise InvalidInput("hold_out", share, f"such that some of {count} samples are left")
+    held[np.random.default_rng(seed).permutation(count)[:out]] = True
+    return held
+
+
+def _rivals(
+    arm: Manipulator, table: Measurements, held: NDArray[np.bool_], progress: Progress
+) -> tuple[Rival, ...]:
+    train = table.of(~held)
+    laws = {
+        "constant curvature": constant_curvature(arm, train, table, progress),
+        "quadratic ridge": quadratic(train, table),
+    }
+    left = {name: (places - table.places, count) for name, (places, count) in laws.items()}
+    each = (Rival(k, n, misses(x[~held]), misses(x[held])) for k, (x, n) in left.items())
+    return tuple(each)
 
 
 def leave_one_run_out(
@@ -201,6 +208,8 @@ def _left(ratio: float) -> bool:
 
 
 def _warn_of_numbers(result: Calibration) -> None:
+    if ends := [n for n, end in zip(result.names, result.fit.at_bound, strict=True) if end]:
+        warn(f"numbers that end at a bound of their range: {', '.join(ends)}")
     own = [n.name for n in result.fit.free.numbers if n.prior is not None]
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:

@@ -156,10 +156,7 @@ def read_measurements(
     if len(table) > _MOST_ROWS:
         raise InvalidInput("data", f"{len(table):,} rows", f"at most {_MOST_ROWS:,}")
     columns = [str(name) for name in table.columns]
-    for name in columns:  # the second of which pandas calls NAME.1
-        first = re.sub(r"\.\d+$", "", name)
-        if columns.count(name) > 1 or (first != name and first in columns):
-            raise InvalidInput("column", first, "there once: the data has two of this name")
+    _refuse_repeated(columns)
     table = table.set_axis(columns, axis=1)
     run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
     triples = _triples(columns, {run, order})
@@ -195,6 +192,13 @@ def read_measurements(
         source=source,
         digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
     )
+
+
+def _refuse_repeated(columns: list[str]) -> None:
+    for name in columns:  # the second of which pandas calls NAME.1
+        first = re.sub(r"\.\d+$", "", name)
+        if columns.count(name) > 1 or (first != name and first in columns):
+            raise InvalidInput("column", first, "there once: the data has two of this name")
 
 
 def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:

@@ -32,14 +32,14 @@ _PICTURE = (
 
 def report_of(search: Search, unit: LengthUnit) -> Report:
     """All that a search came to, with lengths in a unit."""
-    best, goals, parameters = search.best, search.goals, search.problem.parameters
+    best, goals = search.best, search.goals
     rows = [
         (_goal_text(goal), value_text(goal, value, unit), "")
         for goal, value in zip(goals, best.objectives, strict=bool(best.objectives))
     ]
     ends = ", ".join(f"{name} at its {end} end" for name, end in search.at_ends.items())
-    found, front = search.findings, search.front if len(search.front) > 1 else ()
-    missed = sorted((each for each in found if not each.met), key=lambda each: -each.excess)
+    note = f"At an end of their range: {ends}. A wider one may be better." if ends else ""
+    missed = sorted((x for x in search.findings if not x.met), key=lambda each: -each.excess)
     try:
         design = search.arm.to_toml()
     except SoftreachError as error:
@@ -58,41 +58,38 @@ def report_of(search: Search, unit: LengthUnit) -> Report:
                 title="Best design",
                 head=("number", "best", "range"),
                 rows=[*rows, *_parameter_rows(search, unit)],
-                note=f"At an end of their range: {ends}. A wider range may allow a better design."
-                if ends
-                else "",
+                note=note,
             ),
             Section(
                 title="Requirements",
                 head=("requirement", "", "of the best design"),
-                rows=[(each.name, each.word, each.text) for each in found],
+                rows=[(each.name, each.word, each.text) for each in search.findings],
                 is_printed=False,
             ),
-            Section(
-                title="Front" if front else "",
-                head=("front", *map(_goal_text, goals), *parameters.names),
-                rows=[
-                    (
-                        str(number),
-                        *(
-                            value_text(goal, value, unit)
-                            for goal, value in zip(goals, each.objectives, strict=True)
-                        ),
-                        *(_number_text(p, each.values[p.name], unit) for p in parameters.free),
-                    )
-                    for number, each in enumerate(front, 1)
-                ],
-                note="Designs that no other one beats in every objective, each judged to full "
-                "accuracy."
-                if front
-                else "",
-            ),
+            *_front(search, unit),
             Section(title="Pictures", figures=lambda: _figures(search, unit)),
             Section(title="Provenance", rows=[*search.provenance.items()], is_printed=False),
             Section(title="The best design", text=design),
             Section(title="The requirements", text=search.problem.requirements.to_toml()),
         ],
     )
+
+
+def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
+    goals, free = search.goals, search.problem.parameters.free
+    rows = []
+    for number, each in enumerate(search.front, 1):
+        pairs = zip(goals, each.objectives or [Value(math.nan)] * len(goals), strict=True)
+        numbers = (_number_text(p, each.values[p.name], unit) for p in free)
+        rows.append((str(number), *(value_text(*pair, unit) for pair in pairs), *numbers))
+    if len(rows) > 1:
+        yield Section(
+            title="Front",
+            head=("front", *map(_goal_text, goals), *(p.name for p in free)),
+            rows=rows,
+            note="Designs that no other one beats in every objective, each judged to full "
+            "accuracy.",
+        )
 
 
 def _verdict(search: Search) -> str:
