@@ -105,7 +105,6 @@ class Requirements:
             InvalidInput: No file that can be read, or no text in UTF-8.
         """
         name = as_path("path", path)
-        length = None if length is None else as_number("length", length, POSITIVE)
         text = read_text("requirements", name, LONGEST)
         return cls.from_toml(text, folder=Path(name).parent, length=length, source=name)
 
