@@ -416,19 +416,14 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
     left = [name for name in arm.input_names if name not in chosen]
     for unit in dict.fromkeys(units[name] for name in left):
         wanting = [name for name in left if units[name] == unit]
-        free = [c for c in columns if c not in chosen.values() and _fits(c, unit)]
+        fitting = {unit} if unit in ("m", "N", "Pa") else {unit, ""}  # a plain number has none
+        free = [c for c in columns if c not in chosen.values() and _unit(c)[1] in fitting]
         if len(free) != len(wanting):
             have, several = ", ".join(free) or "none", counted(len(wanting), "column")
             allowed = f"{several} in {_unit_text(unit)} for {', '.join(wanting)}"
             raise InvalidInput("inputs of the data", have, allowed, "name them by `inputs`")
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]
-
-
-def _fits(column: str, unit: str) -> bool:
-    """True if a column may be an input in this unit; one without a unit is a plain number."""
-    own = _unit(column)[1]
-    return own == unit or (not own and unit not in ("m", "N", "Pa"))
 
 
 def _unit_text(unit: str) -> str:

@@ -253,7 +253,12 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     point = point_of(problem, candidate, problem.accuracy)
     slope, equations = point.cost_slope, _equations(point)
     size = float(np.linalg.norm(slope))
-    bounds = [*_rooms(point), *_ends(problem, point)]
+    bounds = [
+        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
+        for part in point.rooms
+        for k in np.flatnonzero(part.value <= _ACTIVE)
+    ]
+    bounds += _ends(problem, point)
     columns = [*equations, *-equations, *(each.slope for each in bounds)]
     if not size or not columns:
         return (), float(bool(size))
@@ -271,14 +276,6 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     result = [Multiplier(name, gain, unit) for (name, unit), gain in gains.items() if gain]
     result.sort(key=lambda each: -each.value)
     return tuple(result), float(rest) / size
-
-
-def _rooms(point: Point) -> list[_Condition]:
-    return [
-        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
-        for part in point.rooms
-        for k in np.flatnonzero(part.value <= _ACTIVE)
-    ]
 
 
 def _equations(point: Point) -> Array:
