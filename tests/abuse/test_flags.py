@@ -105,7 +105,7 @@ REFUSED = {
     "design lce_arm --set taper": "set = taper: must be PATH=VALUE",
     "design lce_arm --set =3": "set = =3: must be PATH=VALUE",
     "design lce_arm --set taper=": "must be PATH=VALUE",
-    "design lce_arm --set taper=3": "(deg, °, rad); or set taper_deg to a number",
+    "design lce_arm --set taper=3": "(deg, °, rad), or a number under taper_deg",
     "design lce_arm --set taper_deg=3deg": "without a unit, which the name holds",
     "design lce_arm --set bore_ratio=0.1m": "= 0.1m: must be a finite number without a unit",
     "design lce_arm --set taper=1deg --set taper_deg=2": "set = taper_deg: must be given once",

@@ -67,7 +67,7 @@ TABLES = {
     "mirrored": (lambda d: d.assign(half_x_mm=-d.half_x_mm, tool_x_mm=-d.tool_x_mm), "right-hand"),
     "exchanged": (
         lambda d: d.rename(columns={"t 2_N": "t 3_N", "t 3_N": "t 2_N"}),
-        "or exchange the inputs t 2 and t 3",
+        "the inputs t 2 and t 3",
     ),
     "pushes": (lambda d: with_cell(d, 4, "t 2_N", -3), "t 2_N in row 4 = -3 N: must be at least 0"),
     "huge": (lambda d: with_cell(d, 3, "t 1_N", 1e300), "t 1_N in row 3 = 1e+300 N: must be near"),
@@ -88,8 +88,8 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_line(damaged, said, good)
 FILES = {
     "empty": (b"", "No columns"),
     "a header": (b"t 1_N,t 2_N\n", "at least one row"),
-    "bytes": (bytes(range(128)), "places of markers"),
-    "a picture": (b"\x89PNG\r\n\x1a\n\xff\xfe", "a table in CSV or Parquet"),
+    "bytes": (bytes(range(128)), "character 0 is NUL"),
+    "a picture": (b"\x89PNG\r\n\x1a\n\xff\xfe", "text in UTF-8"),
     "ragged": (b"a,b\n1,2\n1,2,3\n", "a table in CSV or Parquet"),
 }
 
@@ -101,14 +101,12 @@ def test_a_file_that_is_no_table_is_refused_in_one_line(content, said, tmp_path)
     assert said in refusal(path)
 
 
-@pytest.mark.parametrize("kind", ["gz", "bz2", "xz", "zip", "zst"])
+@pytest.mark.parametrize("kind", ["gz", "bz2", "xz", "zip"])
 def test_a_compressed_table_that_was_cut_is_refused_in_one_line(kind, good, tmp_path):
     path = tmp_path / f"poses.csv.{kind}"
-    if kind == "zst":
-        path.write_bytes(b"\x28\xb5\x2f\xfd" + bytes(range(100)))
-    else:
-        good.to_csv(path, index=False)
-        path.write_bytes(path.read_bytes()[:-20])
+    good.to_csv(path, index=False)
+    sr.calibration.read_measurements(hanging_tentacle(), path)
+    path.write_bytes(path.read_bytes()[:-20])
     assert "a table in CSV or Parquet" in refusal(path)
 
 
@@ -185,7 +183,7 @@ def test_exchanged_markers_are_told_by_name(good):
     names = {c: c.replace("half", "tool") for c in good} | {
         c: c.replace("tool", "half") for c in good if c.startswith("tool")
     }
-    assert "they seem to be tool, half" in refusal(good.rename(columns=names))
+    assert "the markers half and tool seem to be exchanged" in refusal(good.rename(columns=names))
 
 
 def test_an_outlier_of_a_meter_is_named_and_hardly_moves_the_numbers(good):

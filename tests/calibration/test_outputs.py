@@ -10,6 +10,7 @@ import pytest
 import softreach as sr
 from softreach.cli.app import run
 from softreach.support.errors import InvalidInput
+from softreach.support.files.text import write_table
 from tests.calibration.arms import MODULUS, hanging_tentacle, measured, on_the_bench
 
 ARM = hanging_tentacle()
@@ -59,7 +60,7 @@ def test_errors_held_out_stand_beside_those_of_rivals(result):
 
 
 def test_the_table_holds_what_was_measured_and_missed(result, tmp_path):
-    result.save_table(tmp_path / "missed.csv", unit="mm")
+    write_table(tmp_path / "missed.csv", result.table("mm"), overwrite=False)
     table = pd.read_csv(tmp_path / "missed.csv")
     np.testing.assert_allclose(table["t 2_n"], result.data.inputs[:, 1])
     assert table.held_out.sum() == result.held.sum()
@@ -73,7 +74,7 @@ def test_the_report_is_one_page_that_asks_for_nothing(result, tmp_path):
     pytest.importorskip("jinja2")
     pytest.importorskip("matplotlib")
     path = tmp_path / "report.html"
-    result.save_report(path)
+    result.report().save(path)
     page = path.read_text()
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     assert "http:" not in page
@@ -82,7 +83,7 @@ def test_the_report_is_one_page_that_asks_for_nothing(result, tmp_path):
     for text in (result.verdict.sentence, result.data.digest, "330", "constant curvature"):
         assert text in page
     with pytest.raises(InvalidInput, match="overwrite"):
-        result.save_report(path)
+        result.report().save(path)
 
 
 def test_a_picture_shows_every_marker_and_every_input_that_moves(result):

@@ -97,7 +97,7 @@ def test_saved_designs_are_those_of_the_front(one, several, tmp_path):
     every = pd.read_csv(tmp_path / "front" / "candidates.csv")
     assert len(every) == len(several.candidates) + len(several.finalists)
     page = (tmp_path / "front" / "report.html").read_text()
-    assert "softreach search" in page
+    assert "softreach: Search of designs" in page
     assert page.count("data:image/png") == 1
     assert str(several.problem.digest) in page
 

@@ -106,11 +106,11 @@ def test_coverage_of_a_region_is_differentiated_by_what_the_boundary_sweeps(monk
     of = problem(needs, {"length": (0.8, 1.2), "lower": (-2.0, -1.0)}, maximize="coverage")
     values = {"length": 1.0, "lower": -5.0 / 3.0}
     design = DesignPoint(of, values, 0.003)
-    share, slopes = design.of_coverage(), design.coverage_slope()
+    share, slopes = design.value("coverage"), design.slope("coverage")
     assert 0.1 < share < 0.95
     for k, (name, step) in enumerate((("length", 0.02), ("lower", 0.1))):
         ends = [DesignPoint(of, values | {name: values[name] + s}, 0.003) for s in (step, -step)]
-        there, back = (end.of_coverage() for end in ends)
+        there, back = (end.value("coverage") for end in ends)
         wanted = (there - back) / (2 * step) * np.ptp(of.parameters.bounds[k])
         assert slopes[k] == pytest.approx(wanted, abs=0.05 * np.abs(slopes).max())
 

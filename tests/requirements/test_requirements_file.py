@@ -209,6 +209,7 @@ def test_requirements_that_contradict_each_other_are_named():
         (lambda: Target(np.empty((0, 3))), "places"),
         (lambda: Keep(Sphere((0, 0, 0), 1.0), True, of="hand"), "of"),
         (lambda: Limits(shortening=1.2), "shortening"),
+        (lambda: Limits(actuators=10**30), "actuators = 10*: must be a whole number, from 0 to"),
         (lambda: Requirements(measures={"exact_volume": (2.0, 1.0)}), "least <= largest"),
         (lambda: Requirements(measures={"beauty": (2.0, None)}), "exact_volume"),
         (lambda: Requirements(payloads=[-1.0]), "payloads"),

@@ -52,7 +52,7 @@ from softreach.support.arguments import (
 )
 from softreach.support.arrays import as_stations, read_only
 from softreach.support.errors import InvalidDesign, InvalidInput, warn
-from softreach.support.files.atomic import writing
+from softreach.support.files.text import write_text
 from softreach.support.lazy import lazy
 from softreach.support.units import LengthUnit, as_unit, handy_unit
 
@@ -291,9 +291,7 @@ class Manipulator:
             NotWritten: It cannot be written.
             InvalidDesign: The design has no text; see `to_toml`.
         """
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, overwrite=overwrite) as stream:
-            stream.write(self.file_text.encode())
+        write_text(path, self.file_text, overwrite=overwrite)
 
     @property
     def file_text(self) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -29,18 +28,13 @@ def a_store(name: str, value: object) -> Any:
     """
     if isinstance(value, str | os.PathLike):
         return as_path(name, value)
-    if any(isinstance(value, kind) for kind in _zarr_stores()):
-        return value
+    for module, kind in (("zarr.abc.store", "Store"), ("zarr.storage", "StorePath")):
+        # who has a store has imported it
+        if module in sys.modules and isinstance(value, getattr(sys.modules[module], kind)):
+            return value
     if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):
         return value  # a store in memory
     raise InvalidInput(name, as_given(value), _PLACE)
-
-
-def _zarr_stores() -> Iterator[Any]:
-    """Zarr's classes of stores, if it is imported: who has a store has imported it."""
-    for module, name in (("zarr.abc.store", "Store"), ("zarr.storage", "StorePath")):
-        if module in sys.modules:
-            yield getattr(sys.modules[module], name)
 
 
 def an_atlas(name: str, value: Any) -> Any:
@@ -95,15 +89,12 @@ def an_interval(name: str, value: object) -> tuple[float, float]:
         InvalidInput: Anything else.
     """
     if isinstance(value, tuple | list) and len(value) == 2:
-        ends = zip(value, (-math.inf, math.inf), strict=True)
-        low, high = (open_end if end is None else _limit(name, end) for end, open_end in ends)
-        return low, high
+        ends = [
+            open_end if end is None or plain(end) == open_end else as_number(name, end)
+            for end, open_end in zip(value, (-math.inf, math.inf), strict=True)
+        ]
+        return ends[0], ends[1]
     raise InvalidInput(name, as_given(value), "(lowest, highest), of which one may be None")
-
-
-def _limit(name: str, value: object) -> float:
-    number = plain(value)
-    return number if number in (math.inf, -math.inf) else as_number(name, number)
 
 
 def constraint(text: str) -> tuple[str, tuple[float, float]]:

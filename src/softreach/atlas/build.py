@@ -127,7 +127,11 @@ def build_atlas(
         keep_clouds=keep_clouds,
     )
     indices = np.array(numbers)
-    _warn_of_gaps(space)
+    if space.gaps and len(space.gaps) < space.size:
+        index, reason = next(iter(space.gaps.items()))
+        stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
+        lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
+        warn(f"{lost}, first {space.values(index)}: {reason}")
     atlas = AtlasStore.begin(store, command, durable=durable)
     content = contents(atlas, tips_of=indices.tolist())
     if content.damage:
@@ -135,9 +139,23 @@ def build_atlas(
     ended = np.isin(content.status[indices], (DONE, GAP, UNSTABLE))
     _run(atlas, indices[~ended], executor, progress)
     built = open_atlas(store)
-    _warn_of_unstable(built)
-    _warn_of_sparse(built)
+    _warn_of_metrics(built)
     return built
+
+
+def _warn_of_metrics(built: xr.Dataset) -> None:
+    if len(unstable := np.flatnonzero(built["status"].values == UNSTABLE)):
+        first = built[["number", "message"]].stack(all=built["status"].dims, create_index=False)
+        first = first.isel(all=unstable[0])
+        without = f"{counted(len(unstable), 'design')} without metrics"
+        warn(f"{without}, first number {first['number'].item()}: {first['message'].item()}")
+    radius = built.volume.attrs["alpha_over_length"] if "spacing" in built else 0.0
+    if radius and (sparse := int((radius < 3.0 * over_length(built, "spacing")).sum())):
+        whose = "its volume is" if sparse == 1 else "their volumes are"
+        warn(
+            f"alpha = {radius:.4g} L is below three mean spacings of the points of "
+            f"{counted(sparse, 'design')} and {whose} too small; use more points or a larger alpha"
+        )
 
 
 def _run(
@@ -162,37 +180,3 @@ def _run(
     if failures:
         index, message = next(iter(failures.items()))
         warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")
-
-
-def _warn_of_gaps(space: DesignSpace) -> None:
-    if space.gaps and len(space.gaps) < space.size:
-        index, reason = next(iter(space.gaps.items()))
-        stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
-        warn(
-            f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}, first "
-            f"{space.values(index)}: {reason}"
-        )
-
-
-def _warn_of_unstable(atlas: xr.Dataset) -> None:
-    unstable = np.flatnonzero(atlas["status"].values == UNSTABLE)
-    if len(unstable):
-        first, number = unstable[0], atlas["number"].values.ravel()
-        message = atlas["message"].values.ravel()[first]
-        warn(
-            f"{counted(len(unstable), 'design')} without metrics, first number {number[first]}: "
-            f"{message}"
-        )
-
-
-def _warn_of_sparse(atlas: xr.Dataset) -> None:
-    if "spacing" not in atlas:
-        return
-    radius = atlas.volume.attrs["alpha_over_length"]
-    sparse = int((radius < 3.0 * over_length(atlas, "spacing")).sum())
-    if sparse:
-        whose = "its volume is" if sparse == 1 else "their volumes are"
-        warn(
-            f"alpha = {radius:.4g} L is below three mean spacings of the points of "
-            f"{counted(sparse, 'design')} and {whose} too small; use more points or a larger alpha"
-        )

@@ -83,26 +83,22 @@ def run_designs(
         parallel.run(chain([lambda: None], tasks))
         return
     if isinstance(executor, ProcessPoolExecutor):
-        _check_travels(store)
+        for metric in store.command.metrics:
+            try:
+                pickle.dumps(metric.compute)
+            except Exception:
+                raise InvalidInput(
+                    f"compute of metric {metric.name}",
+                    metric.compute,
+                    "a function of a module where worker processes compute it",
+                    "lambdas and functions inside of functions cannot be sent to them",
+                ) from None
     pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
     _run_in_pool(pool, store, indices, on_outcome)
 
 
 def _reporting(task: Callable[[], Outcome], on_outcome: OnOutcome) -> Callable[[], None]:
     return lambda: on_outcome(task())
-
-
-def _check_travels(store: AtlasStore) -> None:
-    for metric in store.command.metrics:
-        try:
-            pickle.dumps(metric.compute)
-        except Exception:
-            raise InvalidInput(
-                f"compute of metric {metric.name}",
-                metric.compute,
-                "a function of a module where worker processes compute it",
-                "lambdas and functions inside of functions cannot be sent to them",
-            ) from None
 
 
 def _run_in_pool(

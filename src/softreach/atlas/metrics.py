@@ -58,12 +58,13 @@ def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
         return (choice,)
     if isinstance(choice, str) and choice in METRIC_GROUPS:
         return METRIC_GROUPS[choice]
-    own = _own_metric(choice) if isinstance(choice, str) else None
-    if own is None:
-        raise InvalidInput(
-            "metrics", as_given(choice), _ALLOWED, "the command line imports those by --import"
-        )
-    return (own,)
+    if isinstance(choice, str):
+        if choice in (known := _imported_metrics()):
+            return (known[choice],)
+        if choice in plugins.declared(plugins.METRICS):
+            return (_declared_metric(choice),)
+    hint = "the command line imports those by --import"
+    raise InvalidInput("metrics", as_given(choice), _ALLOWED, hint)
 
 
 def own_metrics() -> dict[str, Metric]:
@@ -75,12 +76,6 @@ def own_metrics() -> dict[str, Metric]:
         except InvalidInput as error:  # the others can be used
             warn(str(error))
     return own
-
-
-def _own_metric(name: str) -> Metric | None:
-    if name in (known := _imported_metrics()):
-        return known[name]
-    return _declared_metric(name) if name in plugins.declared(plugins.METRICS) else None
 
 
 def _imported_metrics() -> dict[str, Metric]:

@@ -75,9 +75,15 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     if isinstance(atlas, xr.Dataset):
         opened = opened_atlas(atlas)
         status = opened["status"].values.ravel()
-        return _counted(status, _messages(opened, np.isin(status, (*TOLD, DAMAGED))), False)
+        told = np.isin(status, (*TOLD, DAMAGED))
+        numbers = opened["number"].values.ravel()[told].tolist()
+        texts = opened["message"].values.ravel()[told].tolist() if told.any() else []
+        return _counted(status, dict(zip(numbers, map(str, texts), strict=True)), False)
     store = AtlasStore.open(an_atlas("atlas", atlas), "r")
-    return _verified(store, tips=_is_small(store))
+    command = store.command
+    at_hand = isinstance(store.location, str) and "://" not in store.location
+    is_small = at_hand and 12.0 * command.n * command.space.size <= _QUICK
+    return _verified(store, tips=is_small or not command.keep_clouds)
 
 
 def verify_atlas(store: StoreLike) -> AtlasStatus:
@@ -174,7 +180,8 @@ def best_designs(
     dims = opened["status"].dims
     numbers = [name for name in opened.data_vars if opened[name].dims == dims]
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
-    stacked = opened[[*numbers, *_parameters(opened)]].stack(rank=dims, create_index=False)
+    along = [x for x, c in opened.variables.items() if len(c.dims) == 1 and c.dims[0] in dims]
+    stacked = opened[[*numbers, *map(str, along)]].stack(rank=dims, create_index=False)
     allowed = np.isfinite(stacked[metric].values)
     for name, (low, high) in limits:
         _check_known(name, [str(known) for known in stacked.variables])
@@ -205,13 +212,6 @@ def _limits(
     return limits
 
 
-def _is_small(store: AtlasStore) -> bool:
-    command = store.command
-    at_hand = isinstance(store.location, str) and "://" not in store.location
-    size = 12.0 * command.n * command.space.size
-    return not command.keep_clouds or (at_hand and size <= _QUICK)
-
-
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
     for name in store.watch.digests.keys() - {*PER_DESIGN}:
         _ = store.array(name)[...]
@@ -235,12 +235,6 @@ def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) 
     )
 
 
-def _messages(atlas: xr.Dataset, told: np.ndarray) -> dict[int, str]:
-    numbers = atlas["number"].values.ravel()[told].tolist()
-    texts = atlas["message"].values.ravel()[told].tolist() if told.any() else []
-    return dict(zip(numbers, map(str, texts), strict=True))
-
-
 def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
     dims = [str(dim) for dim in atlas["number"].dims]
     if set(at) != set(dims):
@@ -250,11 +244,6 @@ def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
         return atlas.isel(design=as_integer("design", at["design"], 0, last))
     place = {name: as_number(name, value) for name, value in at.items()}
     return atlas.sel(place, method="nearest")
-
-
-def _parameters(atlas: xr.Dataset) -> list[str]:
-    dims = set(atlas["status"].dims)
-    return [str(n) for n, c in atlas.variables.items() if len(c.dims) == 1 and set(c.dims) <= dims]
 
 
 def _check_known(name: str, known: list[str]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.changes import unknown_parameter
-from softreach.arm.parameters.shown import from_written, written_parameters
+from softreach.arm.parameters.shown import Written, from_written
 from softreach.atlas.arguments import column
 from softreach.atlas.space import DesignSpace
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -48,7 +48,13 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     Raises:
         InvalidInput: A key or value that is wrong, with what is allowed.
     """
-    document = _document(text)
+    try:
+        document = document_of(text, "space", float)
+    except InvalidDesign as error:
+        raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
+    for key in document:
+        if key not in _KEYS:
+            raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
     base = design_from(str(document.get("design", "minimal_trunk")))
     table = document.get("parameters", {})
     if not isinstance(table, dict):
@@ -77,22 +83,11 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
     Raises:
         InvalidInput: An unknown key, or values that are no numbers.
     """
-    known = written_parameters(base)
+    known = Written.of(base).written
     if key not in known:
         raise unknown_parameter(key, known)
     numbers, parameter = _numbers(key, value), known[key]
     return parameter.name, [from_written(x, parameter.unit) for x in numbers]
-
-
-def _document(text: str) -> dict[str, Any]:
-    try:
-        document = document_of(text, "space", float)
-    except InvalidDesign as error:
-        raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
-    for key in document:
-        if key not in _KEYS:
-            raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
-    return document
 
 
 def _space(

@@ -232,7 +232,6 @@ def _is_shared(chunk: Chunk) -> bool:
 
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
-    """Write the root, whole: of several who begin at once, the first succeeds."""
     import zarr
     from zarr.storage import LocalStore, WrapperStore
 

@@ -7,6 +7,7 @@ from softreach.calibration.errors import Misses, Repeatability, Verdict
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.plan import PosePlan, plan_poses
 from softreach.calibration.uncertainty import Uncertainty
+from softreach.support.report import Report
 
 __all__ = [
     "Calibration",
@@ -14,6 +15,7 @@ __all__ = [
     "Misses",
     "PosePlan",
     "Repeatability",
+    "Report",
     "Rival",
     "Uncertainty",
     "Verdict",

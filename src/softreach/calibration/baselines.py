@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,16 +40,15 @@ def ridge(features: Array, target: Array) -> Callable[[Array], Array]:
     left, values, axes = np.linalg.svd(scaled, full_matrices=False)
     along, n = left.T @ (target - mean), len(features)
     total = ((target - mean) ** 2).sum() - (along**2).sum()
-    best = min(_PENALTIES, key=lambda penalty: _cross_validation(penalty, values, along, total, n))
+
+    def cross_validation(penalty: float) -> float:
+        keep = values**2 / (values**2 + n * penalty)
+        left = total + (((1.0 - keep)[:, None] * along) ** 2).sum()
+        return left / max(n - 1.0 - keep.sum(), 1e-3) ** 2
+
+    best = min(_PENALTIES, key=cross_validation)
     weights = axes.T @ ((values / (values**2 + n * best))[:, None] * along)
     return lambda rows: mean + ((rows - middle) / size) @ weights
-
-
-def _cross_validation(penalty: float, values: Array, along: Array, beyond: float, n: int) -> float:
-    keep = values**2 / (values**2 + n * penalty)
-    left = beyond + (((1.0 - keep)[:, None] * along) ** 2).sum()
-    freedom = max(n - 1.0 - keep.sum(), 1e-3)
-    return left / freedom**2
 
 
 def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
@@ -103,12 +103,12 @@ def constant_curvature(
     return arcs.places(best.x, test.inputs), len(best.x)
 
 
-class _Arcs:
-    def __init__(
-        self, ends: Array, acts: NDArray[np.bool_], scale: Array, markers: Array, offsets: Array
-    ) -> None:
-        self.ends, self.acts, self.scale = ends, acts, scale
-        self.markers, self.offsets = markers, offsets
+class _Arcs(NamedTuple):
+    ends: Array
+    acts: NDArray[np.bool_]
+    scale: Array
+    markers: Array
+    offsets: Array
 
     @classmethod
     def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:

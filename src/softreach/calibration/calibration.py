@@ -30,13 +30,16 @@ from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.calibration.uncertainty import Uncertainty, uncertainty
 from softreach.rod.summary import design_warnings
-from softreach.support.arguments import as_flag, as_integer, as_number, as_path
+from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.errors import InvalidInput, Range, warn
-from softreach.support.files.atomic import writing
+from softreach.support.files.text import write_text
 from softreach.support.progress import Progress, as_progress
+from softreach.support.report import Report
+from softreach.support.units import as_unit
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 __all__ = ["Calibration", "Rival", "calibrate", "leave_one_run_out"]
@@ -116,19 +119,22 @@ def calibrate(
     robust, rivals = as_flag("robust", robust), as_flag("rivals", rivals)
     noise = None if noise is None else as_number("noise", noise, Range(0.0, 1.0, "m", True))
     table = read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
-    _warn_of_copies(table)
-    held = _held_out(table, hold_out, as_integer("seed", seed))
+    rows = np.concatenate([table.inputs, table.places.reshape(len(table), -1)], axis=1)
+    if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
+        warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
+    held = _held_out(len(table), hold_out, as_integer("seed", seed))
     train = table.of(~held)
     numbers = free_numbers(arm, free, prior)
     model = MarkerModel.of(numbers, train)
-    model = replace(model, free=started(model, train.places))
     progress = as_progress(progress)
-    fit = fitted(model, train.places, robust=robust, noise=noise, progress=progress)
+
+    def fit_to(model: MarkerModel, places: Array) -> Fit:
+        model = replace(model, free=started(model, places))
+        return fitted(model, places, robust=robust, noise=noise, progress=progress)
+
+    fit = fit_to(model, train.places)
     if not fit.converged:
         warn(f"the fit did not converge in {fit.evaluations} evaluations: look at its residuals")
-    if fit.at_bound.any():
-        ends = [n for n, end in zip(numbers.names, fit.at_bound, strict=True) if end]
-        warn(f"numbers that end at a bound of their range: {', '.join(ends)}")
     result = Calibration(
         arm=fit.free.made(fit.values),
         start=arm,
@@ -144,11 +150,29 @@ def calibrate(
     _warn_of_numbers(result)
     spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
-        found = exchanged_columns(
-            fit, model, train.places, robust=robust, noise=noise, progress=progress
-        )
-        result = replace(result, exchange=found)
+        result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
     return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+
+
+def _held_out(count: int, share: float, seed: int) -> NDArray[np.bool_]:
+    held, out = np.zeros(count, bool), round(share * count)
+    if out == count:
+        raise InvalidInput("hold_out", share, f"such that some of {count} samples are left")
+    held[np.random.default_rng(seed).permutation(count)[:out]] = True
+    return held
+
+
+def _rivals(
+    arm: Manipulator, table: Measurements, held: NDArray[np.bool_], progress: Progress
+) -> tuple[Rival, ...]:
+    train = table.of(~held)
+    laws = {
+        "constant curvature": constant_curvature(arm, train, table, progress),
+        "quadratic ridge": quadratic(train, table),
+    }
+    left = {name: (places - table.places, count) for name, (places, count) in laws.items()}
+    each = (Rival(k, n, misses(x[~held]), misses(x[held])) for k, (x, n) in left.items())
+    return tuple(each)
 
 
 def leave_one_run_out(
@@ -184,6 +208,8 @@ def _left(ratio: float) -> bool:
 
 
 def _warn_of_numbers(result: Calibration) -> None:
+    if ends := [n for n, end in zip(result.names, result.fit.at_bound, strict=True) if end]:
+        warn(f"numbers that end at a bound of their range: {', '.join(ends)}")
     own = [n.name for n in result.fit.free.numbers if n.prior is not None]
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:
@@ -201,37 +227,6 @@ def _warn_of_numbers(result: Calibration) -> None:
     for text in design_warnings(result.arm):
         if re.sub(r"[\d.]+", "", text) not in before:
             warn(f"the calibrated arm: {text}")
-
-
-def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
-    held = np.zeros(len(data), bool)
-    count = round(share * len(data))
-    if count == len(data):
-        raise InvalidInput("hold_out", share, f"such that some of {len(data)} samples are left")
-    held[np.random.default_rng(seed).permutation(len(data))[:count]] = True
-    return held
-
-
-def _warn_of_copies(data: Measurements) -> None:
-    rows = np.concatenate([data.inputs, data.places.reshape(len(data), -1)], axis=1)
-    if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
-        warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
-
-
-def _rivals(
-    arm: Manipulator, data: Measurements, held: NDArray[np.bool_], progress: Progress
-) -> tuple[Rival, ...]:
-    train = data.of(~held)
-    laws = {
-        "constant curvature": lambda test: constant_curvature(arm, train, test, progress),
-        "quadratic ridge": lambda test: quadratic(train, test),
-    }
-    result = []
-    for name, law in laws.items():
-        places, count = law(data)
-        left = places - data.places
-        result.append(Rival(name, count, misses(left[~held]), misses(left[held])))
-    return tuple(result)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -312,19 +307,12 @@ class Calibration:
     @cached_property
     def verdict(self) -> Verdict:
         """Limitation of the fit; samples far off are left out if they are few."""
-        held = bool(self.held.any())
-        rows, name = (self.held, "held-out") if held else (~self.held, "fitted")
-        far = np.isin(self.data.rows, self.outliers)
-        said = ""
         if self.exchange is not None:
             columns, less = self.exchange
-            said = (
-                f"{columns} seem to be exchanged, or counted the other way round: "
-                f"the same numbers then fit to "
-                f"{1e3 * less:.3g} mm rms instead of {1e3 * self.train.rms:.3g} mm"
-            )
-        repeated = self.repeatability
-        return judged(self.data, self.residuals, repeated, f"{name} error", rows, far, said)
+            said = f"{columns}: the same numbers then fit to {1e3 * less:.3g} mm rms instead of "
+            return Verdict("columns", f"{said}{1e3 * self.train.rms:.3g} mm")
+        far = np.isin(self.data.rows, self.outliers)
+        return judged(self.data, self.residuals, self.repeatability, self.held, far)
 
     @property
     def outliers(self) -> NDArray[np.intp]:
@@ -343,12 +331,9 @@ class Calibration:
     @property
     def correlated(self) -> list[tuple[str, str, float]]:
         """Pairs of numbers that the data hardly tells apart, with their correlation."""
-        matrix = self.uncertainty.correlation
-        j, k = np.nonzero(np.triu(np.abs(matrix) > _CORRELATED, 1))
-        return [
-            (self.names[a], self.names[b], float(matrix[a, b]))
-            for a, b in zip(j.tolist(), k.tolist(), strict=True)
-        ]
+        matrix, names = self.uncertainty.correlation, self.names
+        pairs = np.argwhere(np.triu(np.abs(matrix) > _CORRELATED, 1)).tolist()
+        return [(names[a], names[b], float(matrix[a, b])) for a, b in pairs]
 
     def errors_on(self, data: Any, **columns: Any) -> Misses:
         """Errors of the calibrated arm on other measurements."""
@@ -463,48 +448,35 @@ class Calibration:
             InvalidInput: Something is there, and `overwrite` is not given.
             NotWritten: It cannot be written.
         """
-        lines = [f"# {key}: {value}" for key, value in self.provenance.items()]
         free, sigma = self.fit.free.numbers, self.sigma
         pairs = zip(free, self.fit.values.tolist(), strict=True)
-        numbers = [f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs]
-        head = "\n".join(["# Calibrated from measured poses.", *lines, *numbers])
-        text = f"{head}\n\n{self.arm.file_text}"
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, overwrite=overwrite) as stream:
-            stream.write(text.encode())
+        lines = [
+            "# Calibrated from measured poses.",
+            *(f"# {key}: {value}" for key, value in self.provenance.items()),
+            *(f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs),
+        ]
+        write_text(path, "\n".join(lines) + f"\n\n{self.arm.file_text}", overwrite=overwrite)
 
-    def save_table(
-        self, path: str | PathLike[str], *, unit: str = "m", overwrite: bool = False
-    ) -> None:
-        """Write inputs, measured and predicted places and their distances, a row for each sample.
+    def table(self, unit: str = "m") -> pd.DataFrame:
+        """Inputs, measured and predicted places and their distances, a row for each sample.
 
         Args:
-            path: A .csv file.
             unit: Of lengths: m, cm, mm or L.
-            overwrite: Whether it may replace any file, and not only such a table.
         """
-        from softreach.calibration.report import write_table
+        from softreach.calibration.report import table_of
 
-        write_table(self, path, unit, overwrite=overwrite)
+        return table_of(self, as_unit(unit, self.arm.length))
 
-    def save_report(
-        self, path: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
-    ) -> None:
-        """Write a report in one .html file: numbers, errors, verdict and pictures.
+    def report(self, unit: str | None = None) -> Report:
+        """Numbers, errors, verdict and pictures, to be printed, or saved as an .html file.
 
         Args:
-            path: The file.
             unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
-            overwrite: Whether it may replace any file, and not only an older report.
-
-        Raises:
-            MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        from softreach.calibration.report import write_report
+        from softreach.calibration.report import report_of
 
-        write_report(self, path, unit, overwrite=overwrite)
+        arm = self.arm
+        return report_of(self, arm.length_unit if unit is None else as_unit(unit, arm.length))
 
     def __repr__(self) -> str:
-        from softreach.calibration.report import summary_text
-
-        return summary_text(self)
+        return str(self.report())

@@ -118,10 +118,8 @@ def judged(
     data: Measurements,
     residuals: Array,
     repeated: Repeatability,
-    name: str,
-    rows: NDArray[np.bool_],
+    held: NDArray[np.bool_],
     far: NDArray[np.bool_],
-    exchanged: str = "",
 ) -> Verdict:
     """Limitation of a fit, from its residuals in the order in which samples were taken.
 
@@ -129,48 +127,42 @@ def judged(
         data: All samples.
         residuals: Predicted minus measured places, NaN where unknown, (n, marker, 3) [m].
         repeated: What the data repeats.
-        name: "held-out error" or "fitted error".
-        rows: Samples whose error is judged, shape (n,).
+        held: Samples that the fit did not see, whose error is judged if there are some, shape (n,).
         far: Samples far off, which are slips if they are few and of different inputs, shape (n,).
-        exchanged: What is said of columns that seem exchanged.
     """
+    rows = held if held.any() else ~held
     finding = _finding(data, far)
-    error = whole = misses(residuals[rows]).rms
-    text = f"{name} {1e3 * whole:.3g} mm rms"
+    error = misses(residuals[rows]).rms
+    text = f"{'held-out' if held.any() else 'fitted'} error {1e3 * error:.3g} mm rms"
     if not finding and (rows & far).any() and (rows & ~far).any():
         error = misses(residuals[rows & ~far]).rms
         text += f", {1e3 * error:.3g} mm without the rows far off"
         residuals = np.where(far[:, None, None], np.nan, residuals)
     known = bool(np.isfinite(repeated.rms))
-    if known:
-        text += f", repeated inputs differ by {1e3 * repeated.rms:.3g} mm"
-    text = f"({text}){finding and '; '}{finding}"
+    text += f", repeated inputs differ by {1e3 * repeated.rms:.3g} mm" if known else ""
     law, share = _explained(data, residuals)
-    if exchanged:
-        return Verdict("columns", f"{exchanged} {text}")
     if share > max(_MEMORY, law) and not finding:
-        said = (
-            f"limited by memory: the commands before explain {100 * share:.0f} % of what is left "
-            "(friction, creep or slack of the drives), which no law of the inputs alone does"
-        )
-        return Verdict("memory", f"{said} {text}")
-    if known and error <= _NOISE * repeated.rms and law < _LAW and not finding:
-        said = "limited by noise: the error is that of the data itself"
-        return Verdict("noise", f"{said} {text}")
-    if len(data) < _FEW:
-        return Verdict("data", f"too few samples to say what limits the fit {text}")
-    if law >= _LAW:
-        said = f"a law of the inputs explains {100 * law:.0f} % of what is left, such as another "
-        said += "geometry or inputs that saturate"
-        said += f", and the commands before {100 * share:.0f} % beyond" if share > _MEMORY else ""
-    elif known:
-        said = "the error is beyond what the data repeats"
-    elif not finding:
+        limit = "memory"
+        said = f"limited by memory: the commands before explain {100 * share:.0f} % of what is "
+        said += "left (friction, creep or slack of the drives), which no law of the inputs does"
+    elif known and error <= _NOISE * repeated.rms and law < _LAW and not finding:
+        limit, said = "noise", "limited by noise: the error is that of the data itself"
+    elif len(data) < _FEW:
+        limit, said = "data", "too few samples to say what limits the fit"
+    elif law < _LAW and not known and not finding:
         said = "limited by missing physics, or by noise: no inputs are repeated, so nothing tells"
-        return Verdict("data", f"{said} {text}")
+        limit = "data"
     else:
-        said = "samples far off are no slips"
-    return Verdict("physics", f"limited by missing physics: {said} {text}")
+        limit, said = "physics", "the error is beyond what the data repeats"
+        if law >= _LAW:
+            said = f"a law of the inputs explains {100 * law:.0f} % of what is left, such as "
+            said += "another geometry or inputs that saturate"
+            beyond = f", and the commands before {100 * share:.0f} % beyond"
+            said += beyond if share > _MEMORY else ""
+        elif not known:
+            said = "samples far off are no slips"
+        said = f"limited by missing physics: {said}"
+    return Verdict(limit, f"{said} ({text}){finding and '; '}{finding}")
 
 
 def _finding(data: Measurements, far: NDArray[np.bool_]) -> str:

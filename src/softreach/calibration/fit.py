@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations
-from typing import Any
+from itertools import combinations
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
-from softreach.calibration.model import MarkerModel, Prediction, exchanged_inputs
+from softreach.calibration.model import MarkerModel, Prediction
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.progress import Progress
 
@@ -37,14 +37,12 @@ _ROBUST = 3.0
 _FINE, _COARSE = 1e-7, 1e-3
 """Least share by which a step must improve: of the last round, of those before."""
 _MOST = 60
-_PERMUTED = 5
-"""Markers of which all orders are tried."""
 _SAMPLES = 100
 """Samples by which exchanges are compared."""
 _PROMISING, _BETTER = 0.8, 0.5
 """Error over that of the columns as they are: before a fit, and after it."""
-_ALIKE = 1.2
-"""Factor between errors that nothing tells apart."""
+_ALIKE, _FAR_BETTER = 1.2, 0.35
+"""Factor between errors that nothing tells apart, and that with which a fit is not begun."""
 _FAR = 1.0  # m, what a sample without equilibrium misses
 
 
@@ -87,78 +85,115 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
         shift = np.median(measured - predicted, axis=0)
         moved = zip(POSE[:3], start + shift, strict=True)
         return free.started_at({name: place for name, place in moved if name in moving})
+    _refuse_exchanged(model, each, places)
     rotation, shift = _kabsch(predicted, measured)
-    _refuse_mirror(model, places, predicted, measured)
-    _refuse_exchanged(each, places, model.names)
     from scipy.spatial.transform import Rotation
 
     place, vector = rotation @ start + shift, Rotation.from_matrix(rotation).as_rotvec()
     return free.started_at(dict(zip(POSE, [*place, *vector], strict=True)))
 
 
-def _kabsch(predicted: Array, measured: Array, mirror: bool = False) -> tuple[Array, Array]:
+def _kabsch(predicted: Array, measured: Array) -> tuple[Array, Array]:
     """Rotation and shift that carry predicted places to measured ones, least squares."""
     here, there = predicted.mean(axis=0), measured.mean(axis=0)
     left, _, right = np.linalg.svd((measured - there).T @ (predicted - here))
-    sign = np.sign(np.linalg.det(left @ right)) * (-1.0 if mirror else 1.0)
-    rotation = left @ np.diag([1.0, 1.0, sign]) @ right
+    rotation = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
     return rotation, there - rotation @ here
 
 
-def _miss(predicted: Array, measured: Array, mirror: bool = False) -> float:
-    """Distance in the middle of places that are brought together."""
-    rotation, shift = _kabsch(predicted, measured, mirror)
-    return float(np.median(np.linalg.norm(predicted @ rotation.T + shift - measured, axis=1)))
-
-
-def _moved_miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
+def _miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
     """Distance in the middle of places, moved together as far as the pose is free [m]."""
     predicted, measured = predicted.reshape(-1, 3), measured.reshape(-1, 3)
     known = np.isfinite(predicted + measured).all(axis=1)
     if known.sum() < 3:
         return np.inf
+    predicted, measured = predicted[known], measured[known]
     if set(POSE) <= set(free.names):
-        return _miss(predicted[known], measured[known])
-    off = predicted[known] - measured[known]
-    off -= [float(np.median(off[:, k])) if POSE[k] in free.names else 0.0 for k in range(3)]
+        rotation, shift = _kabsch(predicted, measured)
+        off = predicted @ rotation.T + shift - measured
+    else:
+        off = predicted - measured
+        off -= [np.median(off[:, k]) if POSE[k] in free.names else 0.0 for k in range(3)]
     return float(np.median(np.linalg.norm(off, axis=1)))
 
 
-def _refuse_exchanged(predicted: Array, measured: Array, names: tuple[str, ...]) -> None:
-    """Refuse markers that match far better under each other's names, shapes (n, marker, 3)."""
-    missed: dict[tuple[int, ...], float] = {}
-    for order in permutations(range(min(len(names), _PERMUTED))):
-        others = predicted[:, list(order)], measured[:, : len(order)]
-        known = np.isfinite(others[0] + others[1]).all(axis=2)
-        if known.sum() > 2:
-            missed[order] = _miss(others[0][known], others[1][known])
-    own = tuple(range(min(len(names), _PERMUTED)))
-    best = min(missed, key=missed.__getitem__, default=own)
-    if best != own and own in missed and missed[best] < 0.35 * missed[own]:
-        size = float(np.nanmedian(np.linalg.norm(np.diff(predicted, axis=1), axis=2)))
-        if missed[own] > 0.1 * size:
-            given = ", ".join(names[: len(own)])
-            seem = ", ".join(names[k] for k in best)
-            allowed = f"in their order along the arm; they seem to be {seem}"
-            raise InvalidInput("markers of the data", given, allowed)
+class _Order(NamedTuple):
+    """Columns of inputs and of coordinates in another order, and the error in the middle then."""
+
+    text: str
+    """What is exchanged."""
+    inputs: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    miss: float = np.inf
 
 
-def _refuse_mirror(model: MarkerModel, places: Array, predicted: Array, measured: Array) -> None:
-    missed = [_miss(predicted, measured, mirror) for mirror in (False, True)]
-    size = np.median(np.linalg.norm(measured - measured.mean(axis=0), axis=1))
-    if missed[1] < 0.35 * missed[0] and missed[0] > 0.1 * size:
-        free, alike = model.free, []
-        for text, order in exchanged_inputs(free.arm):
-            other = replace(model, inputs=model.inputs[:, order]).predict(free.start).places
-            if _moved_miss(free, other, places) < 0.35 * missed[0]:
-                alike.append(text)
-        cause = f"; or exchange {' or '.join(alike[:4])}, which looks the same" if alike else ""
-        raise InvalidInput(
-            "axes of the data",
-            f"a miss of {1e3 * missed[0]:.3g} mm in the middle, {1e3 * missed[1]:.3g} mm mirrored",
-            "right-handed, as those of the design: exchange two of x, y and z, or turn one over"
-            + cause,
-        )
+def _orders(model: MarkerModel, values: Array, own: Array, places: Array) -> list[_Order]:
+    """All exchanges, the one that leaves least first; `own` are the places as predicted."""
+    found, plain = [], np.arange(model.inputs.shape[1])
+    for order in _exchanges(model):
+        if (order.inputs != plain).any():
+            other = replace(model, inputs=model.inputs[:, order.inputs]).predict(values).places
+        else:
+            other = own
+        miss = _miss(model.free, other, _ordered(places, order.columns))
+        found.append(order._replace(miss=miss))
+    return sorted(found, key=lambda order: order.miss)
+
+
+def _exchanges(model: MarkerModel) -> Iterator[_Order]:
+    """Exchanges of two inputs of one unit, two axes, two markers, or two of their columns.
+
+    Of several actuators with three bundles or more also all counted the other way round.
+    """
+    arm, names = model.free.arm, model.names
+    inputs, columns = np.arange(arm.inputs), np.arange(3 * len(names))
+    each, words = columns.reshape(-1, 3), [f"{name} {axis}" for name in names for axis in "xyz"]
+    for j, k in combinations(range(arm.inputs), 2):
+        if arm.input_units[j] == arm.input_units[k]:
+            text = f"the inputs {arm.input_names[j]} and {arm.input_names[k]}"
+            yield _Order(text, _exchanged(inputs, j, k), columns)
+    counts = [] if arm.drives else [actuator.bundles for actuator in arm.actuators]
+    if sum(count > 2 for count in counts) > 1:
+        parts = np.split(inputs, np.cumsum(counts)[:-1])
+        turned = np.concatenate([[*part[:1], *part[:0:-1]] for part in parts])
+        yield _Order("the senses in which bundles are counted", turned, columns)
+    for j, k in combinations(range(3), 2):
+        text = f"the axes {'xyz'[j]} and {'xyz'[k]}"
+        yield _Order(text, inputs, _exchanged(columns, each[:, j], each[:, k]))
+    for j, k in combinations(range(len(names)), 2):
+        order = _exchanged(columns, each[j], each[k])
+        yield _Order(f"the markers {names[j]} and {names[k]}", inputs, order)
+    for j, k in combinations(range(len(columns)), 2) if len(names) > 1 else ():
+        yield _Order(f"the columns {words[j]} and {words[k]}", inputs, _exchanged(columns, j, k))
+
+
+def _exchanged(order: NDArray[np.intp], here: Any, there: Any) -> NDArray[np.intp]:
+    order = order.copy()
+    order[here], order[there] = there, here
+    return order
+
+
+def _ordered(places: Array, order: NDArray[np.intp]) -> Array:
+    return places.reshape(len(places), -1)[:, order].reshape(places.shape)
+
+
+def _said(found: list[_Order]) -> str:
+    """Exchanges that nothing tells apart from the first."""
+    alike = [order.text for order in found if order.miss <= _ALIKE * found[0].miss]
+    return f"{' or '.join(alike[:4])} seem to be exchanged, or counted the other way round"
+
+
+def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> None:
+    own = _miss(model.free, predicted, places)
+    middle = np.nanmean(places, axis=(0, 1))
+    if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):
+        found = _orders(model, model.free.start, predicted, places)
+        if found[0].miss < _FAR_BETTER * own:
+            given = f"a miss of {1e3 * own:.3g} mm in the middle"
+            allowed = f"those of right-handed axes in their order: {_said(found)}, which leaves "
+            raise InvalidInput(
+                "columns of the data", given, f"{allowed}{1e3 * found[0].miss:.3g} mm"
+            )
 
 
 def identifiable(free: FreeNumbers, slopes: Array) -> None:
@@ -251,6 +286,11 @@ class _Problem:
         self.width: float | None = None  # beyond which residuals count less, in m
         self.unit = 1.0  # of priors, which count as a coordinate of one width, in m
         self.kept: tuple[bytes, Prediction] | None = None
+        numbers = model.free.numbers
+        priors = [(k, *number.prior) for k, number in enumerate(numbers) if number.prior]
+        self.rows, self.means = np.zeros((len(priors), len(numbers))), np.zeros(len(priors))
+        for row, (k, mean, width) in enumerate(priors):
+            self.rows[row, k], self.means[row] = 1.0 / width, mean / width
 
     def at(self, values: Array) -> Prediction:
         key = values.tobytes()
@@ -269,26 +309,16 @@ class _Problem:
         try:
             miss = self.miss(values)
         except InvalidDesign:
-            return np.full(3 * int(self.seen.sum()) + self._priors(values)[0].size, _FAR)
+            return np.full(3 * int(self.seen.sum()) + len(self.rows), _FAR)
         miss = np.where(np.isfinite(miss), miss, _FAR * 0.1 * free.arm.length)
-        return np.concatenate([miss.ravel(), self._priors(values)[0]])
+        return np.concatenate([miss.ravel(), self.unit * (self.rows @ values - self.means)])
 
     def slopes(self, values: Array) -> Array:
         prediction = self.at(values)
         assert prediction.slopes is not None
         slopes = prediction.slopes[self.seen].reshape(-1, len(self.model.free))
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-        return np.concatenate([slopes, self._priors(values)[1]])
-
-    def _priors(self, values: Array) -> tuple[Array, Array]:
-        numbers = self.model.free.numbers
-        known = [k for k, number in enumerate(numbers) if number.prior is not None]
-        rows, slopes = np.zeros(len(known)), np.zeros((len(known), len(numbers)))
-        for row, k in enumerate(known):
-            mean, width = numbers[k].prior or (0.0, 1.0)
-            rows[row] = self.unit * (values[k] - mean) / width
-            slopes[row, k] = self.unit / width
-        return rows, slopes
+        return np.concatenate([slopes, self.unit * self.rows])
 
     def solved(self, values: Array, fine: float) -> Any:
         from scipy.optimize import least_squares
@@ -342,60 +372,29 @@ def robust_width(miss: Array) -> float:
 
 
 def exchanged_columns(
-    fit: Fit,
-    model: MarkerModel,
-    places: Array,
-    *,
-    robust: bool,
-    noise: float | None,
-    progress: Progress,
+    fit: Fit, model: MarkerModel, places: Array, refitted: Callable[[MarkerModel, Array], Fit]
 ) -> tuple[str, float] | None:
-    """The exchange of two columns that halves the error of a fit at least, and its error, rms [m].
+    """What seems exchanged, as the same numbers then fit twice as well, and their error, rms [m].
 
-    Arguments are those of `fitted` and the fit with the columns as they are.
+    Args:
+        fit: With the columns as they are.
+        model: Its model.
+        places: Its measured places [m].
+        refitted: Fit of another model to other places.
     """
     some = slice(None, None, -(-len(places) // _SAMPLES))
     few, seen = replace(model, inputs=model.inputs[some]), places[some]
     least, best = _BETTER * misses(fit.residuals).rms, None
     for values in (model.free.start, fit.values):
         own = few.predict(values).places
-        each = {text: (order, None) for text, order in exchanged_inputs(model.free.arm)}
-        each |= {text: (None, order) for text, order in _coordinates(model.names)}
-        found = {}
-        for text, (inputs, columns) in each.items():
-            other = few if inputs is None else replace(few, inputs=few.inputs[:, inputs])
-            predicted = own if inputs is None else other.predict(values).places
-            found[text] = _moved_miss(model.free, predicted, _ordered(seen, columns))
-        first = min(found, key=found.__getitem__)
-        if found[first] > _PROMISING * _moved_miss(model.free, own, seen):
+        found = _orders(few, values, own, seen)
+        if found[0].miss > _PROMISING * _miss(model.free, own, seen):
             continue
-        alike = [text for text, miss in found.items() if miss <= _ALIKE * found[first]]
-        inputs, columns = each[first]
-        other = model if inputs is None else replace(model, inputs=model.inputs[:, inputs])
-        moved = _ordered(places, columns)
+        other = replace(model, inputs=model.inputs[:, found[0].inputs])
         try:
-            other = replace(other, free=started(other, moved))
-            again = fitted(other, moved, robust=robust, noise=noise, progress=progress)
+            error = misses(refitted(other, _ordered(places, found[0].columns)).residuals).rms
         except InvalidInput:
             continue
-        if (error := misses(again.residuals).rms) < least:
-            least, best = error, (" or ".join(alike[:4]), error)
+        if error < least:
+            least, best = error, (_said(found), error)
     return best
-
-
-def _coordinates(names: tuple[str, ...]) -> Iterator[tuple[str, list[int]]]:
-    """Orders of the coordinates of all markers with two axes, or two columns, exchanged."""
-    columns = [f"{name} {axis}" for name in names for axis in "xyz"]
-    for a, b in combinations(range(3), 2):
-        turned = {a: b, b: a}
-        order = [k - k % 3 + turned.get(k % 3, k % 3) for k in range(len(columns))]
-        yield f"the axes {'xyz'[a]} and {'xyz'[b]}", order
-    for j, k in combinations(range(len(columns)) if len(names) > 1 else (), 2):
-        order = list(range(len(columns)))
-        order[j], order[k] = k, j
-        yield f"the columns {columns[j]} and {columns[k]}", order
-
-
-def _ordered(places: Array, order: list[int] | None) -> Array:
-    rows = places.reshape(len(places), -1)
-    return places if order is None else rows[:, order].reshape(places.shape)

@@ -114,41 +114,28 @@ class FreeNumbers:
         names = [number.name for number in self.numbers if number.name not in POSE]
         return find_parameters(self.arm, tuple(path for name in names for path in _tied(name)))
 
-    def neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator]]:
+    def neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator | Base]]:
         """Arms around these values along one number, with the factors of a derivative by it.
 
-        Differences of fourth order, inside the range of the number. Those of the pose differ in
-        their base alone.
+        Differences of fourth order, inside the range of the number; of a number of the pose the
+        bases alone.
         """
-        number, (low, high) = self.numbers[k], self.bounds
-        step = _STEP * max(number.scale, abs(float(values[k])))
-        value = float(values[k])
-        points, sign = _CENTRAL, 1.0
+        number, value, (low, high) = self.numbers[k], float(values[k]), self.bounds
+        step, points = _STEP * max(number.scale, abs(value)), _CENTRAL
         if value - 2 * step < low[k]:
             points = _FORWARD
         elif value + 2 * step > high[k]:
-            points, sign = _FORWARD, -1.0
-        result = []
+            points, step = _FORWARD, -step
+        result: list[tuple[float, Manipulator | Base]] = []
         for offset, factor in points:
             other = values.copy()
-            other[k] = value + sign * offset * step
-            result.append((sign * factor / step, self.made(other)))
-        return result
-
-    def moves_base(self, k: int) -> bool:
-        """True of a number of the pose."""
-        return self.numbers[k].name in POSE
-
-    def base_neighbors(self, values: Array, k: int) -> list[tuple[float, Base]]:
-        """As `neighbors`, for a number of the pose: the bases alone."""
-        step = _STEP * self.numbers[k].scale
-        result = []
-        for offset, factor in _CENTRAL:
-            other = values.copy()
-            other[k] += offset * step
-            pairs = zip(self.numbers, other.tolist(), strict=True)
-            pose = {number.name: value for number, value in pairs if number.name in POSE}
-            result.append((factor / step, _moved(self.arm.base, pose)))
+            other[k] = value + offset * step
+            if number.name in POSE:
+                pairs = zip(self.names, other.tolist(), strict=True)
+                made = _moved(self.arm.base, {name: x for name, x in pairs if name in POSE})
+            else:
+                made = self.made(other)
+            result.append((factor / step, made))
         return result
 
     def started_at(self, values: Mapping[str, float]) -> FreeNumbers:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import bz2
 import csv
+import gzip
 import hashlib
 import io
+import lzma
 import re
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -18,6 +22,8 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_text
 from softreach.support.errors import InvalidInput, counted, did_you_mean, in_short, warn
+from softreach.support.files.text import MEGABYTE, text_of
+from softreach.support.quantity import sizes_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,19 +33,10 @@ __all__ = ["Measurements", "read_measurements", "read_table"]
 Array = NDArray[np.float64]
 
 _SIZES = {
-    "m": ("m", 1.0),
-    "cm": ("m", 1e-2),
-    "mm": ("m", 1e-3),
-    "um": ("m", 1e-6),
+    name.lower(): (unit, size) for unit in ("m", "N", "Pa") for name, size in sizes_in(unit).items()
+} | {
     "in": ("m", 0.0254),
-    "n": ("N", 1.0),
-    "mn": ("N", 1e-3),
-    "kn": ("N", 1e3),
     "gf": ("N", 9.80665e-3),
-    "pa": ("Pa", 1.0),
-    "kpa": ("Pa", 1e3),
-    "mpa": ("Pa", 1e6),
-    "bar": ("Pa", 1e5),
     "mbar": ("Pa", 1e2),
     "psi": ("Pa", 6894.757293168361),
     "percent": ("1", 1e-2),
@@ -50,6 +47,7 @@ _RUNS = ("run", "pattern", "group", "trial", "cluster", "sequence")
 _ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")
 _PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNORECASE)
 _MOST_ROWS = 2_000_000
+_MOST_BYTES = 1000 * MEGABYTE
 _WIDEST = 4.0
 """Distance of a place from the middle of all, in lengths of the arm, that is no pose of it."""
 _HARD = 100.0
@@ -167,7 +165,8 @@ def read_measurements(
     plain = [name for name in columns if name not in taken]
     sources = _input_columns(arm, plain, columns_of)
     values = _inputs(table, sources, arm.input_units)
-    places = np.stack([_place(table, triples[start]) for start in chosen.values()], axis=1)
+    each = [[_numbers(table, x) * _unit(x)[2] for x in triples[at]] for at in chosen.values()]
+    places = np.moveaxis(np.array(each), 2, 0)
     seen = np.asarray(np.isfinite(places).all(axis=2))
     if not seen.any():
         raise InvalidInput("places of markers", "no number", "seen in at least one sample")
@@ -178,7 +177,8 @@ def read_measurements(
         chosen = {name: start for name, start in chosen.items() if name not in lost}
     _refuse_far(arm, places, [triples[start] for start in chosen.values()])
     _refuse_inputs(arm, values, sources)
-    runs, run_names = _runs(table, run)
+    labels = np.full(len(table), "all") if run is None else table[run].astype(str).to_numpy(str)
+    run_names, runs = np.unique(labels, return_inverse=True)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
         inputs=values,
@@ -186,7 +186,7 @@ def read_measurements(
         input_names=tuple(sources),
         marker_names=tuple(chosen),
         runs=runs,
-        run_names=run_names,
+        run_names=tuple(run_names.tolist()),
         order=_order(table, run, order),
         rows=np.arange(len(values)),
         source=source,
@@ -194,12 +194,28 @@ def read_measurements(
     )
 
 
+def _refuse_repeated(columns: list[str]) -> None:
+    for name in columns:  # the second of which pandas calls NAME.1
+        first = re.sub(r"\.\d+$", "", name)
+        if columns.count(name) > 1 or (first != name and first in columns):
+            raise InvalidInput("column", first, "there once: the data has two of this name")
+
+
 def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
     """Inputs in their units from their columns, 0 without one, shape (n, input)."""
     values = np.zeros((len(table), len(sources)))
     for k, (name, unit) in enumerate(zip(sources, units, strict=True)):
-        if name:
-            values[:, k] = _numbers(table, name) * _size(name, unit)
+        if not name:
+            continue
+        _, own, size = _unit(name)
+        if own and own != unit:
+            raise InvalidInput(f"column {name}", f"in {own}", f"in {_unit_text(unit)}")
+        if not own and unit in ("m", "N", "Pa"):
+            allowed = (
+                f"a name that ends in its unit, such as {name}_{'mm' if unit == 'm' else unit}"
+            )
+            raise InvalidInput("column", name, allowed)
+        values[:, k] = _numbers(table, name) * size
     if not np.isfinite(values).all():
         row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
         raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
@@ -227,19 +243,27 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
 
 
 def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
-    """The table of a file, which its name calls CSV or Parquet.
+    """The table of a file that its name calls Parquet, else a CSV, packed if it says .gz or .zip.
 
     Raises:
         InvalidInput: It is no table.
     """
     import pandas as pd
-    from pandas.io.common import get_handle
 
+    suffix = Path(name).suffix.lower()
     try:
-        if name.lower().endswith((".parquet", ".pq")):
+        if suffix in (".parquet", ".pq"):
             return pd.read_parquet(file)
-        with get_handle(file, "r", encoding="utf-8-sig", compression="infer") as opened:
-            text = str(opened.handle.read())
+        if suffix == ".zip":
+            archive = zipfile.ZipFile(file)
+            opened = archive.open(archive.namelist()[0])
+        else:
+            unpacked = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}.get(suffix)
+            opened = (
+                unpacked(file) if unpacked else file.open("rb") if isinstance(file, Path) else file
+            )
+        with opened:
+            text = text_of("data", name, opened.read(_MOST_BYTES + 1), _MOST_BYTES)
         _refuse_short(text)
         return pd.read_csv(io.StringIO(text), skipinitialspace=True, comment="#")
     except InvalidInput:
@@ -270,16 +294,7 @@ def _named(columns: list[str], given: str | None, usual: Sequence[str], what: st
     return next((by_name[name] for name in usual if name in by_name), None)
 
 
-def _refuse_repeated(columns: list[str]) -> None:
-    """Refuse columns of one name, the second of which pandas calls `NAME.1`."""
-    for name in columns:
-        first = re.sub(r"\.\d+$", "", name)
-        if columns.count(name) > 1 or (first != name and first in columns):
-            raise InvalidInput("column", first, "there once: the data has two of this name")
-
-
 def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]]) -> None:
-    """Refuse places that are farther apart than any pose of the arm could put them."""
     offsets = [float(np.linalg.norm(marker.offset)) for marker in arm.markers]
     reach = _WIDEST * (arm.length + max(offsets, default=0.0))
     away = np.nan_to_num(np.abs(places - np.nanmedian(places, axis=0)))
@@ -296,7 +311,6 @@ def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]
 
 
 def _refuse_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
-    """Refuse tensions that push, and inputs far beyond the bounds."""
     bundles = [*[None] * len(arm.drives), *(arm.undriven if arm.drives else range(arm.bundles))]
     most = np.abs(arm.input_bounds).max(axis=1)
     for unit in dict.fromkeys(arm.input_units):
@@ -402,7 +416,8 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
     left = [name for name in arm.input_names if name not in chosen]
     for unit in dict.fromkeys(units[name] for name in left):
         wanting = [name for name in left if units[name] == unit]
-        free = [c for c in columns if c not in chosen.values() and _fits(c, unit)]
+        fitting = {unit} if unit in ("m", "N", "Pa") else {unit, ""}  # a plain number has none
+        free = [c for c in columns if c not in chosen.values() and _unit(c)[1] in fitting]
         if len(free) != len(wanting):
             have, several = ", ".join(free) or "none", counted(len(wanting), "column")
             allowed = f"{several} in {_unit_text(unit)} for {', '.join(wanting)}"
@@ -411,25 +426,8 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
     return [chosen[name] for name in arm.input_names]
 
 
-def _fits(column: str, unit: str) -> bool:
-    """True if a column may be an input in this unit; one without a unit is a plain number."""
-    own = _unit(column)[1]
-    return own == unit or (not own and unit not in ("m", "N", "Pa"))
-
-
 def _unit_text(unit: str) -> str:
     return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
-
-
-def _size(column: str, unit: str) -> float:
-    """Size of a unit of a column in that of an input."""
-    _, own, size = _unit(column)
-    if own and own != unit:
-        raise InvalidInput(f"column {column}", f"in {own}", f"in {_unit_text(unit)}")
-    if not own and unit in ("m", "N", "Pa"):
-        allowed = f"a name that ends in its unit, such as {column}_{'mm' if unit == 'm' else unit}"
-        raise InvalidInput("column", column, allowed)
-    return size
 
 
 def _numbers(table: pd.DataFrame, column: str) -> Array:
@@ -440,17 +438,6 @@ def _numbers(table: pd.DataFrame, column: str) -> Array:
     if (rows := np.flatnonzero(np.isinf(values))).size:
         raise InvalidInput(f"{column} in row {rows[0]}", values[rows[0]], "a finite number")
     return values
-
-
-def _place(table: pd.DataFrame, columns: list[str]) -> Array:
-    return np.stack([_numbers(table, name) * _unit(name)[2] for name in columns], axis=1)
-
-
-def _runs(table: pd.DataFrame, column: str | None) -> tuple[NDArray[np.intp], tuple[str, ...]]:
-    if column is None:
-        return np.zeros(len(table), np.intp), ("all",)
-    names, numbers = np.unique(table[column].astype(str).to_numpy(str), return_inverse=True)
-    return numbers.astype(np.intp), tuple(names.tolist())
 
 
 def _order(table: pd.DataFrame, run: str | None, order: str | None) -> NDArray[np.intp]:

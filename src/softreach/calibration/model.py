@@ -6,9 +6,7 @@ equilibrium; all that follows from them, how the arm moves, is the linear respon
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +19,6 @@ from softreach.arm.tensions import LengthLaw
 from softreach.calibration.free_numbers import FreeNumbers
 from softreach.calibration.measurements import Measurements
 from softreach.kernels.rod.linear_response import WEIGHTS
-from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.pulled import LoadedLengths
 from softreach.rod.loaded.rod import LoadedRod
@@ -39,7 +36,7 @@ from softreach.rod.response import (
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
 
-__all__ = ["MarkerModel", "Prediction", "exchanged_inputs", "marker_stations"]
+__all__ = ["MarkerModel", "Prediction", "marker_stations"]
 
 Array = NDArray[np.float64]
 
@@ -92,24 +89,6 @@ def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
     return places, np.array([marker.offset for marker in arm.markers])
 
 
-def exchanged_inputs(arm: Manipulator) -> Iterator[tuple[str, list[int]]]:
-    """Orders of the inputs with two of one unit exchanged, and what is exchanged.
-
-    Of several actuators with three bundles or more also with all counted the other way round.
-    """
-    names, units = arm.input_names, arm.input_units
-    for j, k in combinations(range(arm.inputs), 2):
-        if units[j] == units[k]:
-            order = list(range(arm.inputs))
-            order[j], order[k] = k, j
-            yield f"the inputs {names[j]} and {names[k]}", order
-    counts = [] if arm.drives else [actuator.bundles for actuator in arm.actuators]
-    if sum(count > 2 for count in counts) > 1:
-        ends = np.cumsum([0, *counts]).tolist()
-        turned = ([a, *range(b - 1, a, -1)] for a, b in pairwise(ends))
-        yield "the senses in which bundles are counted", [k for part in turned for k in part]
-
-
 @dataclass(frozen=True, eq=False)
 class MarkerModel:
     """Markers of an arm as functions of its free numbers, at given inputs."""
@@ -147,10 +126,7 @@ class MarkerModel:
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors: list[list[tuple[float, Manipulator | Base]]] = []
         if values is not None:
-            neighbors = [
-                [*(free.base_neighbors if free.moves_base(k) else free.neighbors)(values, k)]
-                for k in range(len(free))
-            ]
+            neighbors = [free.neighbors(values, k) for k in range(len(free))]
         blocks = [
             self._block(arm, neighbors, grid, rows, values is not None)
             for rows in parallel.blocks(len(self.inputs), _BLOCK)
@@ -188,14 +164,6 @@ class MarkerModel:
             rest,
         )
 
-    def _beside(
-        self, arm: Manipulator, at: _Explicit, other: Manipulator, grid: StepGrid, inputs: Array
-    ) -> _Explicit:
-        """The same of another arm; tables are not made again where its body is the same."""
-        if any(getattr(arm, part) != getattr(other, part) for part in _BODY):
-            return self._explicit(other, grid, inputs)
-        return at._replace(bundles=Driving(other).bundles(inputs))
-
     def _block(
         self,
         arm: Manipulator,
@@ -206,13 +174,19 @@ class MarkerModel:
     ) -> tuple[Array, Array | None, NDArray[np.int8]]:
         inputs = self.inputs[rows]
         at = self._explicit(arm, grid, inputs)
-        rod = _rod(arm, grid)
-        gamma = _activations(arm, rod, at.bundles)
+        body = body_of(arm)
+        bounds = body.bounds * 0.0  # which decide nothing
+        bounds[arm.bundles :] = 1.0
+        rod = (FreeRod if arm.loads is None else LoadedRod)(body.with_bounds(bounds), _TOL)
+        rod, law, gamma = rod.in_steps(int(grid.counts.sum())), LengthLaw(body), at.bundles
+        if len(law.columns):  # tensions in place of displacements
+            lengths = law if arm.loads is None else LoadedLengths(law, rod)
+            gamma = law.inner(gamma, lengths.tensions(gamma).tension)
         lost = np.asarray(~np.isfinite(gamma).all(axis=1))
         gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
         state = rod_state(rod, gamma, at.table)
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
-        places = _places(at, state)
+        places = at.position + _beyond(at, state)[1] @ at.rotation.T
         places[lost] = np.nan
         if not slopes:
             return places, None, state.status
@@ -231,55 +205,23 @@ class MarkerModel:
         grid: StepGrid,
         inputs: Array,
     ) -> _Explicit:
-        """Derivative of all that is explicit by one number."""
-        factors = [factor for factor, _ in neighbors]
-        each = [
-            self._beside(arm, at, other, grid, inputs)
-            if isinstance(other, Manipulator)
-            else _on_base(arm, at, other)
-            for _, other in neighbors
-        ]
+        factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
+        for _, other in neighbors:
+            if isinstance(other, Base):  # gravity alone is another one in its frame
+                force = dead_force(arm, other, at.table.stations, at.table.length)
+                table = replace(at.table, force=force, weight=payload_weight(arm, other))
+                place = np.array(other.position)
+                each.append(at._replace(table=table, rotation=other.rotation, position=place))
+            elif any(getattr(arm, part) != getattr(other, part) for part in _BODY):
+                each.append(self._explicit(other, grid, inputs))
+            else:  # the same body, and so the same tables
+                each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([one.table for one in each], factors)
         others = (
             np.tensordot(factors, np.stack(columns), axes=1)
             for columns in zip(*(one[1:] for one in each), strict=True)
         )
         return _Explicit(table, *others)
-
-
-def _on_base(arm: Manipulator, at: _Explicit, base: Base) -> _Explicit:
-    """The same on another base: gravity alone is another one in its frame."""
-    table = at.table
-    force = dead_force(arm, base, table.stations, table.length)
-    return at._replace(
-        table=replace(table, force=force, weight=payload_weight(arm, base)),
-        rotation=base.rotation,
-        position=np.array(base.position),
-    )
-
-
-def _rod(arm: Manipulator, grid: StepGrid) -> ArmRod:
-    """The rod of an inner arm in as many steps as the grid has, whatever its bounds."""
-    body = body_of(arm)
-    bounds = body.bounds * 0.0
-    bounds[arm.bundles :] = 1.0
-    inner = body.with_bounds(bounds)
-    rod = (FreeRod if arm.loads is None else LoadedRod)(inner, _TOL)
-    return rod.in_steps(int(grid.counts.sum()))
-
-
-def _activations(arm: Manipulator, rod: ArmRod, bundles: Array) -> Array:
-    """Activations of the inner arm: tensions in place of displacements."""
-    law = LengthLaw(body_of(arm))
-    if not len(law.columns):
-        return bundles
-    lengths = law if arm.loads is None else LoadedLengths(law, rod)
-    return law.inner(bundles, lengths.tensions(bundles).tension)
-
-
-def _places(at: _Explicit, state: RodState) -> Array:
-    """p + R (r + offset in the directors)."""
-    return at.position + _beyond(at, state)[1] @ at.rotation.T
 
 
 def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:

@@ -17,9 +17,9 @@ from softreach.calibration.free_numbers import FreeNumbers, free_numbers
 from softreach.calibration.model import MarkerModel
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
-from softreach.support.arguments import as_flag, as_integer, as_names, as_number, as_path
+from softreach.support.arguments import as_integer, as_names, as_number
 from softreach.support.errors import InvalidInput, Range, did_you_mean
-from softreach.support.files.atomic import writing
+from softreach.support.files.text import write_text
 
 __all__ = ["PosePlan", "plan_poses"]
 
@@ -90,11 +90,6 @@ class PosePlan:
             InvalidInput: Something else is there.
             NotWritten: It cannot be written.
         """
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        with writing(path, overwrite=overwrite) as file:
-            file.write(self._csv().encode())
-
-    def _csv(self) -> str:
         arm = self.free.arm
         sizes = [_WRITTEN.get(unit, ("", 1.0)) for unit in arm.input_units]
         inputs = [
@@ -108,7 +103,7 @@ class PosePlan:
         table.writerow(["sample", *inputs, *places])
         for k, row in enumerate(values):
             table.writerow([k, *(f"{value:.6g}" for value in row), *("" for _ in places)])
-        return text.getvalue()
+        write_text(path, text.getvalue(), overwrite=overwrite)
 
     def __repr__(self) -> str:
         seen = ", ".join(self.markers)
@@ -165,7 +160,14 @@ def plan_poses(
     if not least <= n <= len(inputs):
         allowed = f"from {least} for these {len(numbers)} numbers to {len(inputs):,} candidates"
         raise InvalidInput("n", n, allowed)
-    chosen = _chosen(_trusted(slopes * numbers.scale), _in_box(arm, inputs), n)
+    low, high = arm.input_bounds.T
+    moving = low < high
+    at = (inputs[:, moving] - low[moving]) / (high - low)[moving]
+    # An arm about to snap reacts to everything, and that at activations which are not known yet.
+    trusted = slopes * numbers.scale
+    size = np.linalg.norm(trusted, axis=(1, 2))
+    trusted /= np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
+    chosen = _chosen(trusted, at, n)
     np.random.default_rng(seed).shuffle(chosen)
     own = slopes[chosen].reshape(-1, len(numbers))
     identifiable(numbers, own)
@@ -202,22 +204,6 @@ def _candidates(arm: Manipulator, count: int, seed: int) -> Array:
     inputs = np.tile(low, (len(cube), 1))
     inputs[:, free] = low[free] + cube * (high - low)[free]
     return inputs
-
-
-def _trusted(slopes: Array) -> Array:
-    """Slopes of poses, those of poses that react far more than most no larger than a limit.
-
-    An arm about to snap reacts to everything, and that at activations which nobody knows yet.
-    """
-    size = np.linalg.norm(slopes, axis=(1, 2))
-    return slopes / np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
-
-
-def _in_box(arm: Manipulator, inputs: Array) -> Array:
-    """Inputs between 0 and 1, (n, free input)."""
-    low, high = arm.input_bounds.T
-    free = low < high
-    return (inputs[:, free] - low[free]) / (high - low)[free]
 
 
 def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
@@ -261,12 +247,8 @@ def _within(at: Array, place: int, room: float) -> NDArray[np.bool_]:
 
 
 def _best(slopes: Array, total: Array, near: NDArray[np.int_]) -> int:
-    """The candidate that adds most to the determinant, of those that are near the fewest others."""
-    return int(np.argmax(np.where(near == near.min(), _gains(slopes, total), -np.inf)))
-
-
-def _gains(slopes: Array, total: Array) -> Array:
-    """By how much each candidate raises ln det of the information."""
+    """The candidate that adds most to ln det of the information, of those near the fewest."""
     half = np.linalg.cholesky(np.linalg.inv(0.5 * (total + total.T)))
     along = slopes @ half
-    return np.linalg.slogdet(np.eye(slopes.shape[1]) + along @ along.transpose(0, 2, 1))[1]
+    gains = np.linalg.slogdet(np.eye(slopes.shape[1]) + along @ along.transpose(0, 2, 1))[1]
+    return int(np.argmax(np.where(near == near.min(), gains, -np.inf)))

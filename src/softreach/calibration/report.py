@@ -1,47 +1,32 @@
-"""A calibration as text, report and table: numbers, errors of places beside those of rivals."""
+"""A calibration as report and table: numbers, errors of places beside those of rivals."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from os import PathLike
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from softreach.arm.number import unit_suffix
 from softreach.calibration.errors import Misses
-from softreach.calibration.free_numbers import POSE, FreeNumbers
-from softreach.support.arguments import as_flag, as_path
+from softreach.calibration.free_numbers import POSE
 from softreach.support.errors import counted
-from softreach.support.files.atomic import writing
-from softreach.support.files.formats import TABLES, format_of
-from softreach.support.quantity import columns, quantity
-from softreach.support.report import REPORT, Section, check_libraries, figure_source, write_page
-from softreach.support.units import LengthUnit, as_unit, readable_unit
+from softreach.support.quantity import quantity
+from softreach.support.report import Report, Section
+from softreach.support.units import LengthUnit, readable_unit
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from softreach.calibration.calibration import Calibration
 
-__all__ = [
-    "ErrorRow",
-    "error_cells",
-    "error_head",
-    "error_rows",
-    "number_rows",
-    "remarks",
-    "sigma_rows",
-    "summary_text",
-    "write_report",
-    "write_table",
-]
+__all__ = ["ErrorRow", "error_rows", "report_of", "table_of"]
 
 _MOST_ROWS = 10
 _PICTURE = (
-    "Measured and predicted places in space; errors by marker, in order of time and against each "
-    "input",
     "Measured places and the lines to the predicted ones; errors by marker, in the order in which "
-    "samples were taken, and against each input.",
+    "samples were taken, and against each input."
 )
 _WORDS = {"softreach_version": "softreach", "data_sha256": "SHA-256 of the data"}
 
@@ -55,49 +40,63 @@ class ErrorRow(NamedTuple):
     errors: Misses
 
 
-def summary_text(result: Calibration, unit: LengthUnit | None = None) -> str:
-    """All that a calibration found, in lines.
+def report_of(result: Calibration, unit: LengthUnit) -> Report:
+    """All that a calibration found, with lengths in a unit."""
+    from softreach.plot.calibration import plot_calibration
 
-    Args:
-        result: The calibration.
-        unit: Of lengths; None for that of the design, or one that is handy.
-    """
-    unit = unit or result.arm.length_unit
-    fitted = len(result.data) - int(result.held.sum())
-    markers = ", ".join(result.data.marker_names)
-    lines = [
-        f"{counted(len(result.names), 'number')} from {counted(fitted, 'sample')} of {markers}, "
-        f"{result.seconds:.1f} s",
-        *columns([("number", "calibrated", "design"), *number_rows(result, unit)]),
-        *columns([error_head(unit), *error_cells(result, unit)]),
-        *remarks(result, unit),
-    ]
-    return "\n  ".join(lines)
+    arm, data = result.arm, result.data
+    fitted, markers = len(data) - int(result.held.sum()), ", ".join(data.marker_names)
+    origin = [(_WORDS.get(key, key), text) for key, text in result.provenance.items()]
+    for name, column in zip(arm.input_names, data.input_names, strict=True):
+        origin.append((f"input {name}", f"column {column}" if column else "stays at 0"))
+    return Report(
+        title=f"Calibration from {data.source}",
+        verdict=result.verdict.sentence,
+        state=result.verdict.limit,
+        facts=[
+            f"{counted(len(result.names), 'number')} from {counted(fitted, 'sample')} of "
+            f"{markers}, {result.seconds:.1f} s"
+        ],
+        sections=[
+            Section(
+                title="Numbers",
+                head=("number", "calibrated", "design"),
+                rows=list(_number_rows(result, unit)),
+                note="Each ± its standard deviation.",
+            ),
+            Section(
+                title="Errors",
+                head=(
+                    *(unit.label("error of places"), "samples"),
+                    *("rms", "median", "95 % below", "rms / L"),
+                ),
+                rows=[_error_cells(row, unit, arm.length) for row in error_rows(result)],
+                note="Distances between measured and predicted places of the markers. Samples that "
+                "are held out were not seen by any fit.",
+                points=list(_remarks(result, unit)),
+            ),
+            Section(
+                title="Pictures", figures=lambda: [(plot_calibration(result, unit=unit), _PICTURE)]
+            ),
+            Section(title="Provenance", rows=origin, is_printed=False),
+            Section(title="The calibrated design", text=arm.to_toml()),
+        ],
+    )
 
 
-def number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
-    """Name, value ± standard deviation and value of the design of each free number."""
+def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     fit, widths = result.fit, result.uncertainty.sigma.tolist()
     pairs = zip(fit.free.numbers, fit.values.tolist(), widths, fit.at_bound, strict=True)
-    place = (*result.start.base.position, 0.0, 0.0, 0.0)
-    pose: dict[str, float] = {name: at for name, at in zip(POSE, place, strict=True)}
+    # The pose starts from the data and not from the design.
+    pose: dict[str, float] = dict(
+        zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True)
+    )
     for number, value, sigma, at_bound in pairs:
         name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma / size, digits=2)
         text += ", at its bound" if at_bound else ", with its prior" if number.prior else ""
         text += ", which the data does not tell" if sigma == math.inf else ""
-        # The pose starts from the data and not from the design.
         yield number.name, text, f"{pose.get(number.name, number.start) / size:.4g}"
-
-
-def sigma_rows(
-    free: FreeNumbers, sigma: Iterable[float], unit: LengthUnit
-) -> Iterator[tuple[str, str, str]]:
-    """Name, value of the design ± a standard deviation, and their ratio, of each number."""
-    for number, width in zip(free.numbers, sigma, strict=True):
-        name, size = readable_unit(number.unit, number.start, unit)
-        share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
-        yield number.name, quantity(number.start / size, name, width / size, digits=2), share
 
 
 def error_rows(result: Calibration) -> Iterator[ErrorRow]:
@@ -114,22 +113,16 @@ def error_rows(result: Calibration) -> Iterator[ErrorRow]:
         yield ErrorRow(law, on, rival.held_out if held else rival.train)
 
 
-def error_head(unit: LengthUnit) -> tuple[str, ...]:
-    """Heading of `error_cells`."""
-    return (unit.label("error of places"), "samples", "rms", "median", "95 % below", "rms / L")
+def _error_cells(row: ErrorRow, unit: LengthUnit, length: float) -> tuple[str, ...]:
+    law, samples, errors = row
+    values = (errors.rms, errors.median, errors.most)
+    texts = [f"{value / unit.size:.3g}" for value in values] + [
+        f"{100 * errors.rms / length:.2g} %"
+    ]
+    return law, samples, *(texts if errors.number else "----")
 
 
-def error_cells(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, ...]]:
-    """The same in words: law, samples, and errors in a unit and in L."""
-    for law, samples, errors in error_rows(result):
-        values = (errors.rms, errors.median, errors.most)
-        texts = (f"{value / unit.size:.3g}" if math.isfinite(value) else "-" for value in values)
-        share = f"{100.0 * errors.rms / result.arm.length:.2g} %"
-        yield law, samples, *texts, share if math.isfinite(errors.rms) else "-"
-
-
-def remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
-    """Remarks on a calibration: oddities and limitations."""
+def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
     if len(result.data.marker_names) > 1:
         each = ((name, errors.rms / unit.size) for name, errors in result.by_marker.items())
         listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)
@@ -137,67 +130,16 @@ def remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
     for one, other, share in result.correlated[:3]:
         yield f"hardly told apart: {one} and {other} (correlation {share:+.3f})"
     if len(far := result.outliers):
-        rows = ", ".join(map(str, far[:_MOST_ROWS])) + (", ..." if len(far) > _MOST_ROWS else "")
+        rows = ", ".join(map(str, far[:_MOST_ROWS])) + ", ..." * (len(far) > _MOST_ROWS)
         yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"
-    yield result.verdict.sentence
 
 
-def write_report(
-    result: Calibration, path: str | PathLike[str], unit: str | None, *, overwrite: bool
-) -> None:
-    """Write the numbers, errors, verdict and pictures of a calibration as one HTML file."""
-    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    format_of(path, REPORT)
-    check_libraries()
-    from softreach.plot.calibration import plot_calibration
-
-    arm, data = result.arm, result.data
-    shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
-    *notes, verdict = remarks(result, shown)
-    picture = figure_source(plot_calibration(result, unit=shown))
-    origin = [(_WORDS.get(key, key), text) for key, text in result.provenance.items()]
-    for name, column in zip(arm.input_names, data.input_names, strict=True):
-        origin.append((f"input {name}", f"column {column}" if column else "stays at 0"))
-    head = ("number", "calibrated ± standard deviation", "design")
-    sections = [
-        Section(title="Numbers", head=head, rows=[*number_rows(result, shown)]),
-        Section(
-            title="Errors",
-            head=error_head(shown),
-            rows=[*error_cells(result, shown)],
-            note="Distances between measured and predicted places of the markers. Samples that are "
-            "held out were not seen by any fit.",
-            points=notes,
-        ),
-        Section(title="Pictures", pictures=[(picture, *_PICTURE)]),
-        Section(title="Provenance", rows=origin),
-        Section(title="The calibrated design", text=arm.to_toml()),
-    ]
-    title, state = f"Calibration from {data.source}", result.verdict.limit
-    page = f"softreach calibration: {data.source}"
-    write_page(
-        path,
-        sections,
-        overwrite=overwrite,
-        page=page,
-        title=title,
-        facts="",
-        state=state,
-        verdict=verdict,
-    )
-
-
-def write_table(
-    result: Calibration, path: str | PathLike[str], unit: str, *, overwrite: bool
-) -> None:
-    """Write a row for each sample, in the order of the data, with units in names of columns."""
+def table_of(result: Calibration, shown: LengthUnit) -> pd.DataFrame:
+    """A row for each sample, in the order of the data, with units in names of columns."""
     import pandas as pd
 
-    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    format_of(path, TABLES)
     data, arm = result.data, result.arm
-    shown = as_unit(unit, arm.length)
-    table: dict[str, object] = {
+    table: dict[str, Any] = {
         "row": data.rows,
         "run": np.array(data.run_names)[data.runs],
         "held_out": result.held.astype(int),
@@ -212,6 +154,4 @@ def write_table(
                 values = shown.of(places[:, m, axis])
                 table[f"{marker}_{words}{'xyz'[axis]}_{shown.name}"] = values
         table[f"{marker}_error_{shown.name}"] = shown.of(distance[:, m])
-    text = pd.DataFrame(table).to_csv(index=False, float_format="%.9g", lineterminator="\n")
-    with writing(path, overwrite=overwrite) as file:
-        file.write(text.encode())
+    return pd.DataFrame(table)

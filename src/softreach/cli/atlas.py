@@ -238,14 +238,8 @@ def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter
 
-    return DesignSpace.grid(
-        base, **dict(parse_parameter(base, *_key_and_values(text)) for text in vary)
-    )
-
-
-def _key_and_values(text: str) -> tuple[str, str]:
-    key, sign, values = text.rpartition("=")
-    return (key, values) if sign else (text, "")
+    pairs = (text.rpartition("=") if "=" in text else (text, "", "") for text in vary)
+    return DesignSpace.grid(base, **dict(parse_parameter(base, key, x) for key, _, x in pairs))
 
 
 def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:

@@ -122,9 +122,9 @@ def calibrate(
     """
     from softreach import calibration
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.calibration.report import summary_text
     from softreach.support import progress
     from softreach.support.files.formats import TABLES
+    from softreach.support.files.text import write_table
     from softreach.support.report import REPORT
 
     arm = design_from(design, changes)
@@ -154,14 +154,14 @@ def calibrate(
     if json:
         console.json(_record(result))
     else:
-        console.line(f"calibration of {design}: {summary_text(result, lengths.unit)}")
+        console.line(f"calibration of {design}: {result.report(lengths.unit.name)}")
     if out is not None:
         result.save(out, overwrite=overwrite)
     if table is not None:
-        result.save_table(table, unit=lengths.written.name, overwrite=overwrite)
+        write_table(table, result.table(lengths.written.name), overwrite=overwrite)
         console.written(table, lengths)
     if report is not None:
-        result.save_report(report, unit=lengths.unit.name, overwrite=overwrite)
+        result.report(lengths.unit.name).save(report, overwrite=overwrite)
 
 
 def read_noise(text: str) -> float:
@@ -205,28 +205,22 @@ def _record(result: Calibration) -> dict[str, Any]:
 
 
 def _numbers(result: Calibration) -> list[Mapping[str, Any]]:
-    sigma, bound = result.uncertainty.sigma.tolist(), result.fit.at_bound.tolist()
-    records = []
-    for k, number in enumerate(result.fit.free.numbers):
-        value, unit = as_read(float(result.fit.values[k]), number.unit)
-        records.append(
-            {
-                "number": number.name,
-                "value": value,
-                "sigma": as_read(sigma[k], number.unit)[0],
-                "start": as_read(number.start, number.unit)[0],
-                "unit": unit,
-                "at_bound": bound[k],
-            }
+    sigma, bound = result.sigma, result.fit.at_bound.tolist()
+    return [
+        {
+            "number": number.name,
+            "value": as_read(value, number.unit)[0],
+            "sigma": as_read(sigma[number.name], number.unit)[0],
+            "start": as_read(number.start, number.unit)[0],
+            "unit": as_read(value, number.unit)[1],
+            "at_bound": at_bound,
+        }
+        for number, value, at_bound in zip(
+            result.fit.free.numbers, result.values.values(), bound, strict=True
         )
-    return records
+    ]
 
 
 def _errors(errors: Misses) -> dict[str, float]:
-    return {
-        "rms_m": errors.rms,
-        "median_m": errors.median,
-        "mean_m": errors.mean,
-        "below_95_percent_m": errors.most,
-        "places": errors.number,
-    }
+    keys = ("median_m", "mean_m", "rms_m", "below_95_percent_m", "places")
+    return dict(zip(keys, errors, strict=True))

@@ -16,7 +16,6 @@ from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, 
 if TYPE_CHECKING:
     from softreach.arm.loads import Loads
     from softreach.arm.manipulator import Manipulator
-    from softreach.arm.parameters.parameter import Parameter as DesignParameter
 
 
 _POSTURES = {"upright": "up", "hanging": "down"}
@@ -275,36 +274,20 @@ def _values(
     arm: Manipulator, texts: Mapping[str, str], angles: Mapping[str, float] = MappingProxyType({})
 ) -> dict[str, float]:
     """Name of a parameter -> value in its unit, from what was written, and from angles."""
-    from softreach.arm.parameters.changes import find_parameter, parameters_by_every_name
-    from softreach.arm.parameters.shown import written_parameters
+    from softreach.arm.parameters.changes import find_parameter
+    from softreach.arm.parameters.shown import Written
 
     values = dict(angles)
     if not texts:
         return values
-    plain, written = parameters_by_every_name(arm), written_parameters(arm)
-    for name, text in texts.items():
-        parameter = plain.get(name) or written.get(name) or find_parameter(arm, name)
+    names = Written.of(arm)
+    for key, text in texts.items():
+        name = key if key in names.by_key else find_parameter(arm, key).name
+        parameter = names.by_key[name]
         if parameter.name in values:
-            raise InvalidInput("set", name, "given once, under one of its names")
-        values[parameter.name] = _value(parameter, name, text, unit_in_name=name not in plain)
+            raise InvalidInput("set", key, "given once, under one of its names")
+        try:
+            values[parameter.name] = names.number(name, text)
+        except ValueError:
+            raise InvalidInput(key, text, names.allowed(name)) from None
     return values
-
-
-def _value(parameter: DesignParameter, name: str, text: str, *, unit_in_name: bool) -> float:
-    from softreach.arm.parameters.shown import from_written, written_name
-    from softreach.support.quantity import read_quantity, unit_names
-
-    try:
-        if unit_in_name:
-            return from_written(read_quantity(text, "1"), parameter.unit)
-        return read_quantity(text, parameter.unit)
-    except ValueError:
-        pass
-    if unit_in_name:
-        raise InvalidInput(name, text, "a finite number without a unit, which the name holds")
-    units = ", ".join(unit_names(parameter.unit))
-    if not units:
-        raise InvalidInput(name, text, "a finite number without a unit")
-    allowed = f"a finite number with its unit ({units})"
-    hint = f"or set {written_name(name, parameter.unit)} to a number"
-    raise InvalidInput(name, text, allowed, hint)

@@ -12,6 +12,7 @@ from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
+    from softreach.arm.parameters.shown import Written
 
 Free = Annotated[
     list[str],
@@ -26,9 +27,11 @@ _POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 
 def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
-    names = _Names(arm)
+    from softreach.arm.parameters.shown import Written
+
+    names = Written.of(arm)
     given = [name.strip() for text in texts for name in text.split(",")]
-    return [names.tied(name) for name in given if name]
+    return [_tied(names, name) for name in given if name]
 
 
 def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
@@ -37,48 +40,24 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
     Raises:
         InvalidInput: Text that is anything else, or no such number.
     """
-    names, result = _Names(arm), {}
+    from softreach.arm.parameters.shown import Written
+
+    names, result = Written.of(arm), {}
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
-    for name, value in (pairs_in("prior", texts, allowed) or {}).items():
-        result[names.tied(name)] = tuple(names.value(name, part) for part in value.split(":"))
+    for name, text in (pairs_in("prior", texts, allowed) or {}).items():
+        first = name.split("=")[0].strip()
+        unit = None if first not in _POSE else "m" if _POSE.index(first) < 3 else "rad"
+        if unit is None and first not in names.by_key:
+            raise InvalidInput("prior", name, "of a number that is free, by its full name")
+        try:
+            values = tuple(names.number(first, part, unit) for part in text.split(":"))
+        except ValueError:
+            allowed = names.allowed(first, unit)
+            raise InvalidInput(f"prior of {name}", text, allowed) from None
+        result[_tied(names, name)] = values
     return result
 
 
-class _Names:
-    def __init__(self, arm: Manipulator) -> None:
-        from softreach.arm.parameters.changes import parameters_by_every_name
-        from softreach.arm.parameters.shown import written_parameters
-
-        self.plain = parameters_by_every_name(arm)
-        self.written = written_parameters(arm)
-
-    def tied(self, name: str) -> str:
-        return " = ".join(self._one(part.strip()) for part in name.split("="))
-
-    def _one(self, name: str) -> str:
-        return self.written[name].name if self._has_unit(name) else name
-
-    def _has_unit(self, name: str) -> bool:
-        return name in self.written and name not in self.plain
-
-    def value(self, name: str, text: str) -> float:
-        from softreach.arm.parameters.shown import from_written
-        from softreach.support.quantity import read_quantity, unit_names
-
-        first = name.split("=")[0].strip()
-        if first in _POSE:
-            unit = "m" if _POSE.index(first) < 3 else "rad"
-        else:
-            known = self.written if self._has_unit(first) else self.plain
-            if first not in known:
-                allowed = "of a number that is free, by its full name"
-                raise InvalidInput("prior", name, allowed)
-            unit = known[first].unit
-        try:
-            if self._has_unit(first):
-                return from_written(read_quantity(text, "1"), unit)
-            return read_quantity(text, unit)
-        except ValueError:
-            units = "" if self._has_unit(first) else ", ".join(unit_names(unit))
-            allowed = f"a finite number with its unit ({units})" if units else "a finite number"
-            raise InvalidInput(f"prior of {name}", text, allowed) from None
+def _tied(names: Written, name: str) -> str:
+    parts = (part.strip() for part in name.split("="))
+    return " = ".join(names.by_key[x].name if x in names.by_key else x for x in parts)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -14,6 +15,9 @@ from softreach.cli.free_numbers import Free, free_names
 from softreach.cli.lengths import Lengths
 from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option
 from softreach.cli.values import WHOLE, as_read
+
+if TYPE_CHECKING:
+    from softreach.calibration.free_numbers import FreeNumber
 
 
 def plan_poses(
@@ -47,7 +51,6 @@ def plan_poses(
     Example: softreach plan-poses arm.toml --free pose --free "rings*modulus" -o poses.csv
     """
     from softreach import calibration
-    from softreach.calibration.report import sigma_rows
     from softreach.support.files.formats import TABLES
     from softreach.support.quantity import columns
 
@@ -80,8 +83,20 @@ def plan_poses(
     else:
         seen = ", ".join(plan.markers)
         console.line(f"{n} poses of {design} with {seen}, noise {lengths.text(width)}")
-        rows = sigma_rows(plan.free, sigma.values(), lengths.unit)
+        rows = _rows(plan.free.numbers, sigma.values(), lengths)
         for line in columns([("number", "to be known", "share"), *rows]):
             console.line(f"  {line}")
     if out is not None:
         plan.save(out, overwrite=overwrite)
+
+
+def _rows(
+    numbers: Iterable[FreeNumber], sigma: Iterable[float], lengths: Lengths
+) -> Iterator[tuple[str, str, str]]:
+    from softreach.support.quantity import quantity
+    from softreach.support.units import readable_unit
+
+    for number, width in zip(numbers, sigma, strict=True):
+        name, size = readable_unit(number.unit, number.start, lengths.unit)
+        share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
+        yield number.name, quantity(number.start / size, name, width / size, digits=2), share

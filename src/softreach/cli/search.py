@@ -86,7 +86,7 @@ def search(
         Path | None,
         Parameter(
             help="File in which every design is kept, a journal or SQLite (.db), by which a search "
-            "goes on and several processes share it: FOLDER/search.journal if left out."
+            "goes on; searches of other seeds may share it. FOLDER/search.journal if left out."
         ),
     ] = None,
     out: Annotated[Path, out_option("Folder for the designs, tables and report.")] = Path("best"),
@@ -144,9 +144,7 @@ def search(
     if json:
         console.json(_record(result, out))
     else:
-        from softreach.optimization.report import summary_text
-
-        console.line(summary_text(result, lengths.unit))
+        console.line(result.report(lengths.unit.name))
     result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
     return EXIT[result.verdict]
 

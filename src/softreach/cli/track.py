@@ -48,16 +48,15 @@ def track(
     """
     from softreach.export.clouds import path_csv
     from softreach.inverse.path import track_path
-    from softreach.support.files.atomic import writing
     from softreach.support.files.formats import FileFormat
+    from softreach.support.files.text import write_text
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     check_output(out, {".csv": FileFormat()}, overwrite)
     first = None if start is None else activation_of(start, arm)
     tracked = track_path(arm, points_in("path", path, arm), first)
-    with writing(out, overwrite=overwrite) as file:
-        file.write(path_csv(tracked).encode())
+    write_text(out, path_csv(tracked), overwrite=overwrite)
     followed = int((tracked.status == 0).sum())
     share = f"{followed} of {tracked.sizes['point']} points followed"
     console.line(f"{share}, up to {_end(tracked, lengths)}: {out}")

@@ -174,7 +174,7 @@ def redundancy_summary(
     Args:
         cloud: The cloud that D̄ was computed from.
         distance: D̄ from `activation_distance`.
-        threshold: The D̄ [-] above which a place counts as redundant.
+        threshold: The D̄ [its unit] above which a place counts as redundant.
         cell: Edge of the grid cells [m]; None for L/20.
 
     Raises:
@@ -188,6 +188,7 @@ def redundancy_summary(
     known = np.isfinite(mean)
     heights = np.quantile(values, _SHARES) if len(values) else np.full(len(_SHARES), np.nan)
     return RedundancySummary(
+        unit=distance.attrs.get("units", "1"),
         evaluated=int(stable.sum()),
         isolated=_share(np.isnan(distance.values[stable])),
         median=float(np.median(values)) if len(values) else np.nan,
@@ -210,18 +211,20 @@ class RedundancySummary:
     none: they depend on the size of the cells, and on how much of what is occupied is measured.
     """
 
+    unit: str
+    """Unit of D̄, which is that of the activations; "1" where they are numbers."""
     evaluated: int
     """Number of points evaluated, stable equilibria all of them."""
     isolated: float
     """Share of them without a neighbor [-]."""
     median: float
-    """Median of D̄ [-]."""
+    """Median of D̄ [unit]."""
     median_error: float
-    """Half the distance of the quantiles that a median of so many points scatters between [-]."""
+    """Half the distance of the quantiles between which such a median scatters [unit]."""
     quantiles: dict[float, float]
-    """Quantiles of D̄ [-] by probability."""
+    """Quantiles of D̄ [unit] by probability."""
     threshold: float
-    """The D̄ [-] above which a place counts as redundant."""
+    """The D̄ [unit] above which a place counts as redundant."""
     redundant_points: float
     """Share of the points whose D̄ exceeds the threshold [-]."""
     redundant_points_error: float
@@ -237,12 +240,13 @@ class RedundancySummary:
         """All numbers with their units, `quantiles` over `quantile`."""
         import xarray as xr
 
-        numbers = {name: value for name, value in vars(self).items() if name != "quantiles"}
-        units = {name: "m3" if name in _VOLUMES else "1" for name in numbers}
+        numbers = {k: x for k, x in vars(self).items() if k not in ("unit", "quantiles")}
+        of_distance = dict.fromkeys(("median", "median_error", "threshold"), self.unit)
+        units = dict.fromkeys(numbers, "1") | dict.fromkeys(_VOLUMES, "m3") | of_distance
         return xr.Dataset(
             {
                 **{name: ((), value, {"units": units[name]}) for name, value in numbers.items()},
-                "quantiles": ("quantile", list(self.quantiles.values()), {"units": "1"}),
+                "quantiles": ("quantile", list(self.quantiles.values()), {"units": self.unit}),
             },
             {"quantile": list(self.quantiles)},
         )
@@ -251,8 +255,9 @@ class RedundancySummary:
         shares = ", ".join(f"{100 * p:g} % below {d:.3g}" for p, d in self.quantiles.items())
         points = quantity(100 * self.redundant_points, "%", 100 * self.redundant_points_error)
         measured = self.measured_volume / self.occupied_volume
+        unit = "" if self.unit == "1" else self.unit
         return (
-            f"RedundancySummary: median D̄ {quantity(self.median, error=self.median_error)}, "
+            f"RedundancySummary: median D̄ {quantity(self.median, unit, self.median_error)}, "
             f"{shares}\n"
             f"  D̄ > {self.threshold:g} for {points} of the points, "
             f"{100 * self.redundant_volume:.3g} % of the volume\n"

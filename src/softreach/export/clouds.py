@@ -20,7 +20,7 @@ from softreach.export.formats import (
     write_vtk,
     write_vtu,
 )
-from softreach.schema import a_cloud
+from softreach.schema import a_cloud, activation_units
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -110,13 +110,19 @@ def arrays_of(cloud: xr.Dataset, unit: LengthUnit = METER) -> CloudTable:
         names = ", ".join(map(str, cloud.data_vars)) or "nothing"
         raise InvalidInput("cloud", names, "a dataset with tip and activation")
     tip, activation = cloud["tip"], cloud["activation"]
+    names = range(1, activation.sizes["bundle"] + 1)
+    units, length = activation_units(activation), _length(cloud)
+    each = ", ".join(units if len(set(units)) > 1 else units[:1])
+    known = cloud.attrs | {"tip_units": unit.name, "activation_units": each}
+    known |= {} if length is None else {"length_m": length}
+    plain = {key: x.item() if isinstance(x, np.generic) else x for key, x in known.items()}
     return CloudTable(
         unit.of(tip.transpose("sample", "axis").values),
         activation.transpose("sample", "bundle").values.astype(float, copy=False),
-        _bundle_names(activation),
-        _bundle_units(activation),
+        tuple(map(str, activation["bundle"].values if "bundle" in activation.coords else names)),
+        units,
         cloud["status"].values.astype(np.uint8) if "status" in cloud else None,
-        _metadata(cloud, unit),
+        {str(key): x if isinstance(x, str | int | float) else str(x) for key, x in plain.items()},
         unit,
     )
 
@@ -183,37 +189,9 @@ def path_csv(found: xr.Dataset) -> str:
     return "\n".join([*lines, ""])
 
 
-def _bundle_names(activation: xr.DataArray) -> tuple[str, ...]:
-    if "bundle" in activation.coords:
-        return tuple(map(str, activation["bundle"].values))
-    return tuple(str(k + 1) for k in range(activation.sizes["bundle"]))
-
-
-def _bundle_units(activation: xr.DataArray) -> tuple[str, ...]:
-    if "unit" in activation.coords:
-        return tuple(map(str, activation["unit"].values))
-    return (activation.attrs.get("units", "1"),) * activation.sizes["bundle"]
-
-
-def _metadata(cloud: xr.Dataset, unit: LengthUnit) -> dict[str, str | int | float]:
-    each = _bundle_units(cloud["activation"])
-    units = {
-        "tip_units": unit.name,
-        "activation_units": ", ".join(each if len(set(each)) > 1 else each[:1]),
-    }
-    length = _length(cloud)
-    known = cloud.attrs | units | ({} if length is None else {"length_m": length})
-    return {str(key): _plain(value) for key, value in known.items()}
-
-
 def _length(cloud: xr.Dataset) -> float | None:
     length = cloud["tip"].attrs.get("length") if "tip" in cloud else None
     return None if length is None else float(length)
-
-
-def _plain(value: Any) -> str | int | float:
-    value = value.item() if isinstance(value, np.generic) else value
-    return value if isinstance(value, str | int | float) else str(value)
 
 
 def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
@@ -287,12 +265,6 @@ def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
     )
 
 
-def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
-    # compressed it takes five times as long for a file two thirds as large
-    options = {"compression": None, "header_type": "UInt64"}
-    write_vtu(_point_mesh(table), file, **options)
-
-
 def _point_mesh(table: CloudTable) -> Any:
     meshio = load_library("meshio")
     columns = table.columns()
@@ -307,7 +279,13 @@ CLOUD_FILES: Formats = {
     ".parquet": format_file(_write_parquet, "pyarrow"),
     ".npz": format_file(_write_npz),
     ".mat": format_file(_write_mat),
-    ".vtu": format_file(_write_vtu, "meshio"),
+    # compressed it takes five times as long for a file two thirds as large
+    ".vtu": format_file(
+        lambda table, file: write_vtu(
+            _point_mesh(table), file, compression=None, header_type="UInt64"
+        ),
+        "meshio",
+    ),
     ".vtk": format_file(lambda table, file: write_vtk(_point_mesh(table), file), "meshio"),
 }
 """Formats of clouds."""

@@ -60,16 +60,6 @@ class Scene(NamedTuple):
     unit: LengthUnit
 
 
-def _a_mesh(name: str, value: Any) -> tuple[Array, Faces]:
-    allowed = "an object with vertices [m] and faces, or the pair of them"
-    pair = value if isinstance(value, tuple) else _parts_of(value)
-    if pair is None or len(pair) != 2:
-        raise InvalidInput(name, as_given(value), allowed)
-    vertices, faces = pair
-    points = as_points(f"{name}.vertices", vertices)
-    return points, as_faces(f"{name}.faces", faces, len(points))
-
-
 def export_mesh(
     mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike],
     path: str | PathLike[str],
@@ -95,7 +85,14 @@ def export_mesh(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    vertices, faces = _a_mesh("mesh_or_hull", mesh_or_hull)
+    pair: Any = mesh_or_hull
+    if not isinstance(pair, tuple | type) and hasattr(pair, "vertices") and hasattr(pair, "faces"):
+        pair = pair.vertices, pair.faces
+    if not isinstance(pair, tuple) or len(pair) != 2:
+        allowed = "an object with vertices [m] and faces, or the pair of them"
+        raise InvalidInput("mesh_or_hull", as_given(mesh_or_hull), allowed)
+    vertices = as_points("mesh_or_hull.vertices", pair[0])
+    faces = as_faces("mesh_or_hull.faces", pair[1], len(vertices))
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     written = as_unit(unit)
     if not len(faces):
@@ -163,15 +160,10 @@ def export_arm(
     opacity = _CLEAR if any(inside(arm)) else 1.0
     parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
     for index, skin in enumerate(bundle_surfaces(arm, configuration)):
-        name = _part_name(arm.bundle_names, index)
+        name, taken = arm.bundle_names[index], ("body", *arm.bundle_names[:index])
+        name = name if name not in taken else f"{name} ({index + 1})"
         parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
     write_parts(parts, path, written, overwrite=overwrite)
-
-
-def _parts_of(value: Any) -> tuple[Any, Any] | None:
-    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
-        return None
-    return value.vertices, value.faces
 
 
 def _write_ply(scene: Scene, file: BufferedWriter) -> None:
@@ -210,7 +202,6 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
 
 
 def _said_unit(scene: Scene) -> str:
-    """The unit in words that `Mesh.load` reads."""
     return f"softreach, lengths in {scene.unit.name}"
 
 
@@ -257,11 +248,6 @@ def _shiny(part: Part) -> Any:
     return trimesh.Trimesh(
         part.vertices, part.faces, visual=visual.TextureVisuals(material=material), process=False
     )
-
-
-def _part_name(names: tuple[str, ...], index: int) -> str:
-    taken = ("body", *names[:index])
-    return names[index] if names[index] not in taken else f"{names[index]} ({index + 1})"
 
 
 SURFACE_FILES: Formats = {

@@ -16,9 +16,7 @@ from softreach.support.arrays import (
     Index,
     as_floats,
     as_points,
-    as_rows,
     check_finite,
-    labeled,
 )
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import unit_names
@@ -64,8 +62,7 @@ def as_targets(name: str, targets: ArrayLike) -> Array:
     Raises:
         InvalidInput: Another shape, or values that are not finite.
     """
-    columns = labeled(name, targets, ("x", "y", "z"))
-    return as_points(name, as_rows(name, columns, 3, "of shape (t, 3), positions in m"))
+    return as_points(name, targets)
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:

@@ -7,12 +7,14 @@ from softreach.optimization.result import Search
 from softreach.optimization.searching import search
 from softreach.optimization.sensitivity import Multiplier, Sensitivity, VarianceShares, sensitivity
 from softreach.optimization.tolerance import TargetTolerance, Tolerance, tolerance
+from softreach.support.report import Report
 
 __all__ = [
     "OBJECTIVES",
     "Candidate",
     "Multiplier",
     "Objective",
+    "Report",
     "Search",
     "Sensitivity",
     "Spread",

@@ -183,7 +183,6 @@ def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[A
 
 
 def _share(arm: Manipulator, solid: ReachableSolid, first: FirstOrder, target: Target) -> float:
-    """Share of a region that an arm covers under every payload."""
     places, share = region_places(target), 1.0
     for payload in first.needs.payloads or (None,):
         loaded = with_payload(arm, payload)

@@ -83,21 +83,22 @@ class DesignPoint:
         """Derivatives of the reachable set."""
         return gradient_of(self.case.reached, self._paths[0], self.accuracy)
 
-    def of_set(self, name: str) -> float:
-        """A number of the reachable set."""
-        return float(getattr(self.case.reached, SETS[name]))
+    def value(self, name: str) -> float:
+        """A number of the reachable set, of what it covers, or of the design alone."""
+        if name == "coverage":
+            return float(np.mean([self.share(*pair) for pair in self._covered]))
+        if name in SETS:
+            return float(getattr(self.case.reached, SETS[name]))
+        return OF_ARM[name](self.case.arm)
 
-    def set_slope(self, name: str) -> Array:
-        """Its derivatives by the reals."""
-        return getattr(self.sets, SETS[name]) @ self.chain
-
-    def of_coverage(self) -> float:
-        """Mean share of the regions that the tip reaches."""
-        return float(np.mean([self.share(*pair) for pair in self._covered]))
-
-    def coverage_slope(self) -> Array:
-        """Its derivatives by the reals."""
-        return np.mean([self.share_slope(*pair) for pair in self._covered], axis=0)
+    def slope(self, name: str) -> Array:
+        """Its derivatives by the reals; those of the design alone by differences."""
+        if name == "coverage":
+            return np.mean([self.share_slope(*pair) for pair in self._covered], axis=0)
+        if name in SETS:
+            return getattr(self.sets, SETS[name]) @ self._paths[1]
+        of = OF_ARM[name]
+        return np.array([(of(up) - of(down)) / step for step, up, down in self.neighbors])
 
     @property
     def _covered(self) -> list[tuple[int, Region]]:
@@ -129,15 +130,6 @@ class DesignPoint:
             derivatives = TipDerivatives(rod, [known[name] for name in self._paths[0]])
         swept = nodes.derivative(derivatives.at(nodes.cube), inside)
         return swept @ self.chain / region.volume
-
-    def of_arm(self, name: str) -> float:
-        """A number that follows from the design alone."""
-        return OF_ARM[name](self.case.arm)
-
-    def arm_slope(self, name: str) -> Array:
-        """Its derivatives by differences."""
-        of = OF_ARM[name]
-        return np.array([(of(up) - of(down)) / step for step, up, down in self.neighbors])
 
     @lazy
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:

@@ -280,20 +280,14 @@ def _tie(known: Mapping[str, Parameter], free: list[str], name: str, text: str) 
         raise InvalidInput(f"free {name}", as_given(text), allowed)
     try:
         factor = float(match["factor"] or 1.0) * (-1.0 if match["sign"] == "-" else 1.0)
-        constant = _constant(match["constant"] or "0", unit)
+        text_of = match["constant"] or "0"
+        is_plain = not text_of.strip("0123456789.eE")
+        constant = float(text_of) if is_plain else read_quantity(text_of, unit)
     except ValueError:
         raise InvalidInput(f"free {name}", as_given(text), _TIES) from None
     if name in free:
         raise InvalidInput("free", name, "given once")
     return Tie(name, match["name"], factor, -constant if match["way"] == "-" else constant)
-
-
-def _constant(text: str, unit: str) -> float:
-    """A constant with its unit, or in the SI unit."""
-    try:
-        return float(text)
-    except ValueError:
-        return read_quantity(text, unit)
 
 
 def _with_bundles(arm: Manipulator, count: Any) -> Manipulator:

@@ -200,12 +200,11 @@ def known_objective(word: str, given: str | Metric) -> Objective:
     if metric.over:
         raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
     return Objective(
-        name=metric.name, unit=metric.unit, meaning=metric.meaning, compute=partial(_metric, metric)
+        name=metric.name,
+        unit=metric.unit,
+        meaning=metric.meaning,
+        compute=lambda case: Value(case.metric(metric)),
     )
-
-
-def _metric(metric: Metric, case: DesignCase) -> Value:
-    return Value(case.metric(metric))
 
 
 def _of_set(name: str, case: DesignCase) -> Value:
@@ -231,16 +230,10 @@ def _sampled(values: Any) -> Value:
     return Value(float(known.mean()), float(known.std() / math.sqrt(len(known))))
 
 
-def _manipulability(case: DesignCase) -> Value:
+def _dexterity(case: DesignCase) -> xr.Dataset:
     from softreach.cloud.dexterity import dexterity
 
-    return _sampled(dexterity(case.cloud).manipulability)
-
-
-def _inverse_condition(case: DesignCase) -> Value:
-    from softreach.cloud.dexterity import dexterity
-
-    return _sampled(1.0 / dexterity(case.cloud).condition)
+    return dexterity(case.cloud)
 
 
 def _activation_distance(case: DesignCase) -> Value:
@@ -265,55 +258,44 @@ def _payload(case: DesignCase) -> Value:
     return Value(most.payload, most.payload_error)
 
 
-def _mass(case: DesignCase) -> Value:
-    return Value(mass(case.arm), 0.0)
-
-
-def _actuators(case: DesignCase) -> Value:
-    return Value(float(case.arm.inputs), 0.0)
-
-
-_ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value], str, bool], ...] = (
-    ("exact_volume", "m3", "volume of the reachable set", partial(_of_set, "volume"), "", True),
+_ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value]], ...] = (
+    ("exact_volume", "m3", "volume of the reachable set", partial(_of_set, "volume")),
+    ("exact_convex_volume", "m3", "volume of its convex hull", partial(_of_set, "convex_volume")),
+    ("exact_unreachability", "1", "1 - volume / convex volume", partial(_of_set, "unreachability")),
+    ("coverage", "1", "mean share of the regions that is reached", _coverage),
+    ("mean_effort", "1", "mean effort at the targets", partial(_effort, np.mean)),
+    ("worst_effort", "1", "largest effort at the targets", partial(_effort, np.max)),
     (
-        "exact_convex_volume",
-        "m3",
-        "volume of its convex hull",
-        partial(_of_set, "convex_volume"),
-        "",
-        True,
+        "manipulability",
+        "m3/input3",
+        "mean √det(J Jᵀ) over the box",
+        lambda case: _sampled(_dexterity(case).manipulability),
     ),
     (
-        "exact_unreachability",
+        "dexterity",
         "1",
-        "1 - volume / convex volume",
-        partial(_of_set, "unreachability"),
-        "",
-        True,
+        "mean of 1 / condition of J over the box",
+        lambda case: _sampled(1.0 / _dexterity(case).condition),
     ),
-    ("coverage", "1", "mean share of the regions that is reached", _coverage, "regions", True),
-    ("mean_effort", "1", "mean effort at the targets", partial(_effort, np.mean), "targets", True),
-    (
-        "worst_effort",
-        "1",
-        "largest effort at the targets",
-        partial(_effort, np.max),
-        "targets",
-        True,
-    ),
-    ("manipulability", "m3", "mean √det(J Jᵀ) over the box", _manipulability, "", False),
-    ("dexterity", "1", "mean of 1 / condition of J over the box", _inverse_condition, "", False),
-    ("activation_distance", "1", "mean D̄ within L/10", _activation_distance, "", False),
-    ("payload", "kg", "payload under which 80 % of the volume is left", _payload, "", False),
-    ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance, "", False),
-    ("mass", "kg", "mass of the arm", _mass, "", True),
-    ("actuators", "1", "number of inputs", _actuators, "", True),
+    ("activation_distance", "input", "mean D̄ within L/10", _activation_distance),
+    ("payload", "kg", "payload under which 80 % of the volume is left", _payload),
+    ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance),
+    ("mass", "kg", "mass of the arm", lambda case: Value(mass(case.arm), 0.0)),
+    ("actuators", "1", "number of inputs", lambda case: Value(float(case.arm.inputs), 0.0)),
 )
+_ASKS = {"coverage": "regions", "mean_effort": "targets", "worst_effort": "targets"}
+_ROUGH = {"manipulability", "dexterity", "activation_distance", "payload", "compliance"}
+"""Objectives without derivatives."""
 
 OBJECTIVES = {
     name: Objective(
-        name=name, unit=unit, meaning=meaning, compute=compute, asks=asks, smooth=smooth
+        name=name,
+        unit=unit,
+        meaning=meaning,
+        compute=compute,
+        asks=_ASKS.get(name, ""),
+        smooth=name not in _ROUGH,
     )
-    for name, unit, meaning, compute, asks, smooth in _ROWS
+    for name, unit, meaning, compute in _ROWS
 }
 """Objectives by name, beside the metrics of the atlas."""

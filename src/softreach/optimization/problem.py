@@ -60,23 +60,15 @@ class Candidate:
         return replace(self, designs=designs)
 
     def to_dict(self) -> dict[str, Any]:
-        """All but the values in plain ones; `from_dict` makes an equal one."""
-        return {
-            "objectives": [[*value] for value in self.objectives],
-            "excess": self.excess,
-            "missed": dict(self.missed),
-            "undecided": [*self.undecided],
-            "fidelity": self.fidelity,
-            "fault": self.fault,
-            "designs": self.designs,
-        }
+        """All of it in plain values; `from_dict` makes an equal one."""
+        objectives = [[*value] for value in self.objectives]
+        return {**vars(self), "objectives": objectives, "undecided": [*self.undecided]}
 
     @classmethod
-    def from_dict(cls, values: Values, record: Mapping[str, Any]) -> Self:
+    def from_dict(cls, record: Mapping[str, Any]) -> Self:
         """The candidate that `to_dict` described."""
         objectives = tuple(Value(*pair) for pair in record["objectives"])
-        undecided = tuple(record.get("undecided", ()))
-        return cls(values=values, **{**record, "objectives": objectives, "undecided": undecided})
+        return cls(**{**record, "objectives": objectives, "undecided": (*record["undecided"],)})
 
 
 class Score(NamedTuple):

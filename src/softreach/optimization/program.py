@@ -21,7 +21,6 @@ from softreach.support.lazy import lazy
 
 __all__ = ["Point"]
 
-COVERAGE = "coverage"
 EFFORTS = ("mean_effort", "worst_effort")
 _FAR = 0.1  # over L or relative: room beyond which a rule is not differentiated
 _ROOM = 0.98  # of the distance within which a tip must come to a place
@@ -74,26 +73,17 @@ class Point:
         return len(self.reals) + self.poses.size
 
     def _cost(self, goal: Goal) -> float:
-        if goal.name in EFFORTS:
-            value = self._effort(goal.name)[0]
-        elif goal.name == COVERAGE:
-            value = self.design.of_coverage()
-        elif goal.name in SETS:
-            value = self.design.of_set(goal.name)
-        else:
-            value = self.design.of_arm(goal.name)
-        return -goal.sense * value
+        is_effort = goal.name in EFFORTS
+        return -goal.sense * (
+            self._effort(goal.name)[0] if is_effort else self.design.value(goal.name)
+        )
 
     def _cost_slope(self, goal: Goal) -> Array:
-        slope, reals = np.zeros(self._size), slice(0, len(self.reals))
+        slope = np.zeros(self._size)
         if goal.name in EFFORTS:
             slope = self._effort(goal.name)[1]
-        elif goal.name == COVERAGE:
-            slope[reals] = self.design.coverage_slope()
-        elif goal.name in SETS:
-            slope[reals] = self.design.set_slope(goal.name)
         else:
-            slope[reals] = self.design.arm_slope(goal.name)
+            slope[: len(self.reals)] = self.design.slope(goal.name)
         return -goal.sense * slope
 
     def _effort(self, name: str) -> tuple[float, Array]:
@@ -122,7 +112,7 @@ class Point:
             gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
             slopes = cache(partial(self._tip_slopes, number))
             for k, gap in enumerate(gaps):
-                slope = partial(_row, slopes, k)
+                slope = partial(lambda of, k: of()[k], slopes, k)
                 near = within[k] / rod.length
                 parts.append(Part(f"place {k + 1}", gap, slope, near, rod.length, "m"))
         return parts
@@ -141,7 +131,6 @@ class Point:
         return np.nan_to_num(result / rod.length)
 
     def _by_payload(self) -> list[tuple[TipMap, Array]]:
-        """Tip map and poses under each payload."""
         if not len(self.poses):
             return []
         rods = self.design.rods
@@ -170,11 +159,10 @@ class Point:
                 return
             value = _room(rules, cube)
             slopes = cache(partial(self._rule_slopes, rules_of, number, value))
-            scales = [(keep.name, rules.arm.length, "m") for keep in keeps]
-            scales += [(name, most or 1.0, "") for name, most in rules.limits.items()]
-            for column, (name, scale, unit) in enumerate(scales):
-                slope = partial(_column, slopes, column)
-                yield Part(name, value[:, column], slope, scale=scale, unit=unit)
+            names = [*((keep.name, "m") for keep in keeps), *((name, "") for name in rules.limits)]
+            for column, ((name, unit), scale) in enumerate(zip(names, rules.rooms[1], strict=True)):
+                slope = partial(lambda of, k: of()[:, k], slopes, column)
+                yield Part(name, value[:, column], slope, scale=float(scale), unit=unit)
 
     def _rule_slopes(
         self, rules_of: Callable[[Manipulator, int], PoseRules], number: int, value: Array
@@ -198,7 +186,6 @@ class Point:
         return slope
 
     def _shares(self) -> Iterator[Part]:
-        """Shares of regions that must be covered."""
         for target in self.design.problem.requirements.targets:
             if (region := target.region) is None:
                 continue
@@ -210,18 +197,16 @@ class Point:
     def _of_design(self) -> Iterator[Part]:
         """Limits and measures that follow from the design or its set."""
         needs = self.design.problem.requirements
-        for name, (low, high) in needs.measures.items():
-            if name in SETS:
-                value = self.design.of_set(name)
-                slope = partial(self.design.set_slope, name)
-                for sense, limit in ((1.0, high), (-1.0, low)):
-                    if limit is not None:
-                        yield self._limit(name, sense, value, limit, slope)
-        for name in OF_ARM:
-            most = needs.limits.given.get(name)
-            if most is not None:
-                value = self.design.of_arm(name)
-                yield self._limit(name, 1.0, value, most, partial(self.design.arm_slope, name))
+        asked = [
+            (name, sense, limit)
+            for name, ends in needs.measures.items()
+            for sense, limit in zip((-1.0, 1.0), ends, strict=True)
+            if name in SETS and limit is not None
+        ]
+        given = needs.limits.given
+        for name, sense, limit in asked + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
+            slope = partial(self.design.slope, name)
+            yield self._limit(name, sense, self.design.value(name), limit, slope)
 
     def _limit(
         self, name: str, sense: float, value: float, limit: float, derived: Callable[[], Array]
@@ -238,16 +223,13 @@ class Point:
         return Part(name, room, slope, scale=scale)
 
     def _other_goals(self) -> Iterator[Part]:
-        """Goals that must not become worse than given."""
         goals = self.design.problem.goals
         for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
             if k != self.goal:
                 scale = abs(floor) or 1.0
                 value = np.array([(floor - self._cost(goal)) / scale])
-                yield Part(goal.name, value, partial(self._floor_slope, goal, scale), scale=scale)
-
-    def _floor_slope(self, goal: Goal, scale: float) -> Array:
-        return -self._cost_slope(goal)[None] / scale
+                slope = partial(lambda g, s: -self._cost_slope(g)[None] / s, goal, scale)
+                yield Part(goal.name, value, slope, scale=scale)
 
 
 @dataclass(frozen=True)
@@ -292,23 +274,12 @@ def _near_place(part: Part) -> Part:
     )
 
 
-def _row(slopes: Callable[[], Array], k: int) -> Array:
-    return slopes()[k]
-
-
-def _column(slopes: Callable[[], Array], k: int) -> Array:
-    return slopes()[:, k]
-
-
 def _room(rules: PoseRules, cube: Array) -> Array:
     """Distances of poses from what the rules forbid, over L or the limit, shape (n, rule).
 
     With a little to spare, but for what touches at the base, which nothing moves.
     """
     value = rules.judged(rules.rod.box.from_free_cube(cube)).value
-    most = np.array([0.0] * len(rules.keeps) + [*rules.limits.values()])
-    scale = np.array(
-        [rules.arm.length] * len(rules.keeps) + [x or 1.0 for x in rules.limits.values()]
-    )
+    most, scale = rules.rooms
     room = np.nan_to_num((most - value) / scale, nan=-1.0, neginf=-1.0, posinf=1.0)
     return np.where(np.abs(room) < _TOUCHES, 0.0, room - _SPARE)

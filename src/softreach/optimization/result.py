@@ -17,10 +17,14 @@ from softreach.optimization.problem import NEAR, Candidate, Problem
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
+from softreach.support.arguments import as_flag
 from softreach.support.errors import SoftreachError
+from softreach.support.report import Report
+from softreach.support.units import LengthUnit, as_unit, handy_unit
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 __all__ = ["Search"]
@@ -154,7 +158,7 @@ class Search:
         """
         import xarray as xr
 
-        every = (*self.candidates, *self.finalists)
+        every = self.every
         free, goals = self.problem.parameters.free, self.goals
         names = self.problem.parameters.names
         places = {_key(each, names): k for k, each in enumerate(self.candidates)}
@@ -223,47 +227,42 @@ class Search:
 
         save(self, folder, unit, overwrite=overwrite)
 
-    def save_table(
-        self,
-        path: str | PathLike[str],
-        *,
-        every: bool = False,
-        unit: str = "m",
-        overwrite: bool = False,
-    ) -> None:
-        """Write parameters and objectives with their errors, a row for each design of the front.
+    def table(self, *, every: bool = False, unit: str = "m") -> pd.DataFrame:
+        """Parameters and objectives with their errors, a row for each design of the front.
 
         Args:
-            path: A .csv file.
             every: All candidates instead, in their order.
             unit: Of lengths: m, cm, mm or L.
-            overwrite: Whether it may replace any file, and not only such a table.
         """
-        from softreach.optimization.folder import write_table
+        from softreach.optimization.report import table_of
 
-        write_table(self, path, unit, every=every, overwrite=overwrite)
+        shown = as_unit(unit, float(str(self.attributes["length"])))
+        return table_of(self, shown, every=as_flag("every", every))
 
-    def save_report(
-        self, path: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
-    ) -> None:
-        """Write a report in one .html file: numbers, requirements, front and pictures.
+    def report(self, unit: str | None = None) -> Report:
+        """Numbers, requirements, front and pictures, to be printed, or saved as an .html file.
 
         Args:
-            path: The file.
             unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
-            overwrite: Whether it may replace any file, and not only an older report.
-
-        Raises:
-            MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        from softreach.optimization.folder import write_report
+        from softreach.optimization.report import report_of
 
-        write_report(self, path, unit, overwrite=overwrite)
+        length = float(str(self.attributes["length"]))
+        return report_of(self, self.unit if unit is None else as_unit(unit, length))
+
+    @property
+    def unit(self) -> LengthUnit:
+        """Unit of lengths that the design is shown in, or one that is handy."""
+        length = float(str(self.attributes["length"]))
+        return as_unit(str(self.attributes["display_unit"]) or handy_unit(length), length)
+
+    @property
+    def every(self) -> tuple[Candidate, ...]:
+        """All designs: those on the way in their order, then those at full accuracy."""
+        return (*self.candidates, *self.finalists)
 
     def __repr__(self) -> str:
-        from softreach.optimization.report import summary_text
-
-        return summary_text(self)
+        return str(self.report())
 
     def _repr_html_(self) -> str:
         """The best design beside the text, for notebooks."""

@@ -11,9 +11,8 @@ from typing import Any
 from softreach.arm.design_file.keys import key_text
 from softreach.arm.design_file.tables import unknown_key
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Parameter
 from softreach.arm.parameters.changes import unknown_parameter
-from softreach.arm.parameters.shown import from_written, written_name
+from softreach.arm.parameters.shown import Written
 from softreach.atlas.space_file import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.objectives import goals, known_objective
@@ -22,7 +21,6 @@ from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_flag, as_integer, as_number, as_one_of
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, did_you_mean
 from softreach.support.files.text import tables_of
-from softreach.support.quantity import read_quantity, unit_names
 from softreach.workspace.reach import ACCURACIES
 
 __all__ = ["SearchFile", "read_search"]
@@ -167,42 +165,33 @@ class _Reader:
         self, bases: Mapping[str, Manipulator]
     ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
         """Ranges and ties, and choices, by parameter."""
-        if not bases:
-            return {}, {}
         choices: dict[str, list[Any]] = {}
+        free: dict[str, Any] = {}
+        if not bases:
+            return free, choices
         for path, key, value in self._entries("choices"):
             if key in NAMED_CHOICES:
                 self._add(path, choices, key, self._named_choice(bases, path, key, value))
-        names = _Names(known_parameters(bases.values(), choices.get("bundles", ())))
+        names = Written(known_parameters(bases.values(), choices.get("bundles", ())))
         for path, key, value in self._entries("choices", names):
             if key not in NAMED_CHOICES and (name := self._name(names, path, key)):
                 listed = value.split(",") if isinstance(value, str) else value
                 self._add(path, choices, name, self._numbers(names, path, key, listed, None))
-        free: dict[str, Any] = {}
         for path, key, value in self._entries("free", names):
             if name := self._name(names, path, key):
                 self._add(path, free, name, self._range(names, path, key, value))
-        self._check(bases, names, free, choices)
-        return free, choices
-
-    def _check(
-        self,
-        bases: Mapping[str, Manipulator],
-        names: _Names,
-        free: dict[str, Any],
-        choices: dict[str, list[Any]],
-    ) -> None:
-        """Ties, and whether anything is free."""
         ranges = {name: ends for name, ends in free.items() if not isinstance(ends, str)}
         if not (ranges or choices or len(bases) > 1):
             if not self.faults:
                 allowed = "needs one parameter or more with a range, or choices: taper_deg = [0, 3]"
                 self._refuse("search.free", None, allowed)
-            return
+            return free, choices
         for path, key, value in self._entries("free", names):
-            if key in names.by_key and isinstance(free.get(names.by_key[key].name), str):
-                tied = {**ranges, names.by_key[key].name: value}
+            name = names.by_key[key].name if key in names.by_key else ""
+            if isinstance(free.get(name), str):
+                tied = {**ranges, name: value}
                 self._tried(path, value, partial(free_parameters, dict(bases), tied, choices))
+        return free, choices
 
     def options(self, needs: Requirements | None) -> dict[str, Any]:
         options: dict[str, Any] = {word: self._objectives(word) for word in _SENSES}
@@ -229,7 +218,6 @@ class _Reader:
         return list(names)
 
     def _tried(self, path: str, value: Any, make: Callable[[], Any]) -> Any:
-        """Value as read; `_WRONG` with a fault where it is refused."""
         try:
             return make()
         except InvalidInput as error:
@@ -241,7 +229,7 @@ class _Reader:
             return key, self._given[key]
         return f"search.{key}", self._raw.get(key)
 
-    def _entries(self, table: str, names: _Names | None = None) -> Iterator[tuple[str, str, Any]]:
+    def _entries(self, table: str, names: Written | None = None) -> Iterator[tuple[str, str, Any]]:
         """Path in errors, key and value of a table; what was given goes before the file."""
         given, known = self._given.get(table, {}), names.by_key if names else {}
         said = {known[key].name if key in known else key for key in given}
@@ -251,7 +239,7 @@ class _Reader:
         for key, value in given.items():
             yield f"{table} {key}", key, value
 
-    def _name(self, names: _Names, path: str, key: str) -> str:
+    def _name(self, names: Written, path: str, key: str) -> str:
         """Plain name of a parameter; empty with a fault if there is none."""
         if key in names.by_key:
             return names.by_key[key].name
@@ -270,7 +258,7 @@ class _Reader:
         made = self._tried(path, value, partial(free_parameters, dict(bases), {}, {key: values}))
         return _WRONG if made is _WRONG else list(values)
 
-    def _range(self, names: _Names, path: str, key: str, value: Any) -> Any:
+    def _range(self, names: Written, path: str, key: str, value: Any) -> Any:
         """(low, high), or the text of a tie."""
         if isinstance(value, str) and ":" not in value:
             return value
@@ -280,7 +268,7 @@ class _Reader:
             return _WRONG if numbers is _WRONG else tuple(numbers)
         return self._refuse(path, value, "must be a range with low < high")
 
-    def _numbers(self, names: _Names, path: str, key: str, values: Any, count: int | None) -> Any:
+    def _numbers(self, names: Written, path: str, key: str, values: Any, count: int | None) -> Any:
         """Numbers in SI units; `_WRONG` where some are none or beyond what they may be."""
         parameter = names.by_key[key]
         wanted = {None: "a list of different numbers", 2: "a range [low, high]"}
@@ -292,7 +280,7 @@ class _Reader:
                 numbers.append(names.number(key, value))
             except ValueError:
                 shown = values if isinstance(values[0], int | float) else value
-                return self._refuse(path, shown, names.allowed(key))
+                return self._refuse(path, shown, f"must be {names.allowed(key)}")
         allowed = parameter.range._replace(whole=False)
         if wrong := [value for value in numbers if not allowed.admits(value)]:
             shown = allowed.in_degrees() if parameter.unit == "rad" else allowed
@@ -311,34 +299,3 @@ class _Reader:
     def _refuse(self, path: str, value: Any, allowed: str) -> Any:
         self.faults.append(Fault(path, value, allowed))
         return _WRONG
-
-
-class _Names:
-    """Parameters by their names, with and without units."""
-
-    def __init__(self, plain: Mapping[str, Parameter]) -> None:
-        self.written = {written_name(name, p.unit): p for name, p in plain.items()}
-        self.by_key = {**plain, **self.written}
-
-    def number(self, key: str, value: Any) -> float:
-        """A value in its SI unit: a number under a key with the unit, or text with its unit.
-
-        Raises:
-            ValueError: Anything else.
-        """
-        unit = self.by_key[key].unit
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise ValueError(value)
-        if key in self.written:
-            return from_written(read_quantity(str(value), "1"), unit)
-        if not isinstance(value, str) and value != 0:
-            raise ValueError(value)
-        return read_quantity(str(value), unit)
-
-    def allowed(self, key: str) -> str:
-        """Kind of value allowed under a key, in words."""
-        if key in self.written:
-            return "must be finite numbers" + " without a unit" * (self.by_key[key].unit != "1")
-        unit = self.by_key[key].unit
-        units = ", ".join(unit_names(unit))
-        return f"must have their unit ({units}), or stand under {written_name(key, unit)}"

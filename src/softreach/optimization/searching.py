@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metric import Metric
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.objectives import goals
-from softreach.optimization.polish import MOST_DESIGNS, Polished, can_polish, polished
+from softreach.optimization.polish import MOST_DESIGNS, can_polish, polished
 from softreach.optimization.problem import Candidate, Problem
 from softreach.optimization.result import Search
 from softreach.optimization.study import SAMPLERS, Sampler, Study
@@ -95,8 +95,9 @@ def search(
         seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
             number of threads.
         storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
-            same call goes on where it was interrupted, and several processes work on one search.
-        follow: Called with each `Candidate` that was judged.
+            same call goes on where it was interrupted, and ends as if it had not been. Searches of
+            other seeds may share it, and each ends with the best of all.
+        follow: Called with each `Candidate` that was judged in this call.
         progress: Called with the number of designs since its last call.
 
     Returns:
@@ -119,71 +120,61 @@ def search(
         coarse=min(_COARSER * accuracy, max(accuracy, _COARSEST)),
     )
     seed = as_integer("seed", seed, 0, 2**31)
-    run = _Run(
-        problem,
-        as_integer("designs", designs, 1, 1_000_000),
-        polishes=as_flag("polish", polish) and can_polish(problem),
-        follow=(lambda _: None) if follow is None else as_function("follow", follow),
-        progress=as_progress(progress),
-    )
+    designs = as_integer("designs", designs, 1, 1_000_000)
+    first = max(min(designs, 4 * len(problem.parameters)), int(_FIRST_SHARE * designs))
+    follow = (lambda _: None) if follow is None else as_function("follow", follow)
     study = Study(
         problem,
         storage=None if storage is None else as_path("storage", storage),
         sampler=as_one_of("sampler", sampler, SAMPLERS),
         seed=seed,
-        first=run.first,
+        first=first,
     )
-    return run.result(study)
+    polishes = as_flag("polish", polish) and can_polish(problem)
+    progress = as_progress(progress)
+    run = _Run(study, designs, polishes=polishes, follow=follow, progress=progress)
+    return run.result(first)
 
 
 class _Run:
-    """One run of a search, with its budget."""
-
     def __init__(
         self,
-        problem: Problem,
+        study: Study,
         designs: int,
         *,
         polishes: bool,
         follow: Callable[[Candidate], object],
         progress: Progress,
     ) -> None:
-        self.problem, self._designs, self._polishes = problem, designs, polishes
+        self.problem, self._study = study.problem, study
+        self._designs, self._polishes = designs, polishes
         self._follow, self._progress = follow, progress
+        problem = study.problem
         last = polishes and (len(problem.goals) > 1 or problem.is_finer_on_finer_sets)
         self._kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
         self._spent = 0
         self._begun = time.perf_counter()
         self._starts: list[Array] = []
 
-    @property
-    def first(self) -> int:
-        """Designs that are spread evenly."""
-        least = min(self._designs, 4 * len(self.problem.parameters))
-        return max(least, int(_FIRST_SHARE * self._designs))
-
-    def result(self, study: Study) -> Search:
-        """Search until the designs are spent, then judge the best again."""
-        self._spent = sum(each.designs for each in study.candidates())
-        if self._spent:
-            self._progress(self._spent)
-        # Other processes may be at work on the same storage.
-        while (left := self.first - len(study.candidates())) > 0 and not self._is_over(study):
-            self._sample(study, min(left, _BATCH))
+    def result(self, first: int) -> Search:
+        """Search until the designs are spent, the first of them spread; judge the best again."""
+        study = self._study
+        while (left := first - len(study.candidates)) > 0 and not self._is_over:
+            self._sample(min(left, _BATCH))
         study.focus()
-        while not self._is_over(study):
-            self._polish(study)
-            if not self._is_over(study):
-                part = max(_BATCH, int(_ROUND_SHARE * self._designs))
-                self._sample(study, min(part, self._left))
-        every = study.candidates()
+        while not self._is_over:
+            self._polish()
+            if not self._is_over:
+                self._sample(min(max(_BATCH, int(_ROUND_SHARE * self._designs)), self._left))
+        others = study.others()
+        every = [*study.candidates, *others]
         finalists = self._at_full_accuracy(every)
         return Search(
             problem=self.problem,
             front=tuple(self.problem.front(finalists)),
             finalists=tuple(finalists),
             candidates=tuple(every),
-            designs=self._spent,
+            designs=self._spent + sum(each.designs for each in others),
             seconds=time.perf_counter() - self._begun,
             seed=study.seed,
             sampler=study.kind,
@@ -194,52 +185,65 @@ class _Run:
         """Designs that are left, but for the polish to full accuracy."""
         return self._designs - self._kept - self._spent
 
-    def _is_over(self, study: Study) -> bool:
-        known = study.candidates()
-        self._spent = max(self._spent, sum(each.designs for each in known))
-        if self._left <= 0:
-            return True
-        return not self.problem.goals and any(each.is_feasible for each in known)
+    @property
+    def _is_over(self) -> bool:
+        found = not self.problem.goals and any(each.is_feasible for each in self._study.candidates)
+        return found or self._left <= 0
 
-    def _sample(self, study: Study, count: int) -> None:
+    def _sample(self, count: int) -> None:
         while count > 0:
-            asked = study.ask(min(_BATCH, count))
+            asked = self._study.ask(min(_BATCH, count))
             count -= len(asked)
-            tasks = (partial(self._judged, values) for _, values in asked)
-            for (trial, _), candidate in zip(asked, parallel.in_order(tasks), strict=True):
-                study.tell(trial, candidate)
-                self._note(candidate)
+            tasks = (
+                partial(self._study.judged, ["design", values], partial(self._judged, values))
+                for _, values in asked
+            )
+            for (trial, _), judged in zip(asked, parallel.in_order(tasks), strict=True):
+                self._note(*judged, trial)
 
     def _judged(self, values: Any, *, bounds: bool = True) -> Candidate:
         with parallel.undivided():
             return self.problem.judge(values, bounds=bounds)
 
-    def _polish(self, study: Study) -> None:
+    def _polish(self) -> None:
         """Local optima next to the best designs that no polish has begun at."""
         if not self._polishes or self._left < _LEAST_OF_POLISH:
             return
         room = max(1, self._left // _DESIGNS_OF_POLISH)
-        starts = self._chosen(study.candidates(), min(_POLISHES, room))
+        starts = self._chosen(self._study.candidates, min(_POLISHES, room))
         most = min(MOST_DESIGNS, self._left // max(1, len(starts)))
-        tasks = (partial(self._polished, start, most) for start in starts)
-        for end in parallel.in_order(tasks):
-            if not end.designs:
-                continue
-            candidate = end.candidate.with_designs(end.designs)
-            study.add(candidate)
-            self._note(candidate)
-            self._starts.append(self._place(candidate))
+        turns = [(start, self._turn(start, k)) for k, start in enumerate(starts)]
+        tasks = (
+            partial(
+                self._study.judged,
+                ["polish", dict(start.values), most, *turn],
+                partial(self._polished, start, most, turn),
+            )
+            for start, turn in turns
+        )
+        for candidate, is_new in parallel.in_order(tasks):
+            if candidate.designs:
+                self._note(candidate, is_new)
+                self._starts.append(self._place(candidate))
 
-    def _polished(self, start: Candidate, designs: int, accuracy: float | None = None) -> Polished:
+    def _turn(self, start: Candidate, k: int = 0) -> tuple[int, tuple[float, ...]]:
+        """The goal of the next polish but k, in turn, and what all others must stay as good as."""
+        goals = self.problem.goals
+        if len(goals) < 2:
+            return 0, ()
+        moving = [k for k, goal in enumerate(goals) if goal.name != "actuators"]
+        goal = (moving or [0])[(len(self._starts) + k) % max(1, len(moving))]
+        return goal, self.problem.costs(start) if start.is_feasible else ()
+
+    def _polished(
+        self, start: Candidate, most: int, turn: tuple[int, Any], accuracy: float | None = None
+    ) -> Candidate:
+        goal, floors = turn
         with parallel.undivided():
-            if len(self.problem.goals) < 2:
-                return polished(self.problem, start, designs=designs, accuracy=accuracy)
-            # One goal at a time, in turn, while the others stay as good as they are.
-            moving = [k for k, goal in enumerate(self.problem.goals) if goal.name != "actuators"]
-            goal = (moving or [0])[len(self._starts) % max(1, len(moving))]
-            floors = self.problem.costs(start) if start.is_feasible else ()
-            more = {"goal": goal, "floors": floors, "designs": designs, "accuracy": accuracy}
-            return polished(self.problem, start, **more)
+            end = polished(
+                self.problem, start, goal=goal, floors=floors, designs=most, accuracy=accuracy
+            )
+        return end.candidate.with_designs(end.designs)
 
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best designs that lie apart from each other and from ends of polishes."""
@@ -271,10 +275,12 @@ class _Run:
                 place.append((float(value) - parameter.low) / (parameter.high - parameter.low))
         return np.array(place)
 
-    def _note(self, candidate: Candidate) -> None:
+    def _note(self, candidate: Candidate, is_new: bool, trial: Any = None) -> None:
+        self._study.tell(candidate, trial)
         self._spent += candidate.designs
-        self._follow(candidate)
         self._progress(candidate.designs)
+        if is_new:
+            self._follow(candidate)
 
     def _at_full_accuracy(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """The best, polished on finer sets and judged as they are reported: none by bounds."""
@@ -285,8 +291,8 @@ class _Run:
             best = sorted(finite, key=problem.score)[:_LAST] or list(candidates[:1])
         left = min(MOST_DESIGNS, self._designs - self._spent)
         if self._polishes and left >= _LEAST_OF_POLISH:
-            end = self._polished(best[0], left, problem.accuracy)
-            best.append(end.candidate)
+            end = self._polished(best[0], left, self._turn(best[0]), problem.accuracy)
+            best.append(end)
             self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]
 

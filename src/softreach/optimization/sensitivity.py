@@ -92,20 +92,15 @@ class Sensitivity:
         lacks = np.full(count, math.nan)
         empty = VarianceShares(lacks, lacks, lacks, lacks)
         shares = [each or empty for each in self.variance]
-        fields = ("first", "first_error", "total", "total_error")
+        columns = zip(*shares, strict=True) if shares else [()] * 4
+        pairs = zip(VarianceShares._fields, columns, strict=True)
+        variances = {name: np.array(values).reshape(-1, count) for name, values in pairs}
         at = ("goal", "parameter")
         return xr.Dataset(
             {
                 "gradient": (("goal", "real"), self.gradient),
                 "gradient_error": (("goal", "real"), self.gradient_error),
-                **{
-                    name: (
-                        at,
-                        np.array([getattr(s, name) for s in shares]).reshape(-1, count),
-                        {"units": "1"},
-                    )
-                    for name in fields
-                },
+                **{name: (at, values, {"units": "1"}) for name, values in variances.items()},
                 "multiplier": ("requirement", [each.value for each in self.multipliers]),
             },
             {
@@ -208,7 +203,6 @@ def sensitivity(
 
 
 def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
-    """Derivatives of the goals by the real parameters, and their errors, (goals, reals) each."""
     count = len(problem.parameters.real)
     values = np.full((len(problem.goals), count), math.nan)
     errors = np.full_like(values, math.nan)
@@ -259,7 +253,12 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     point = point_of(problem, candidate, problem.accuracy)
     slope, equations = point.cost_slope, _equations(point)
     size = float(np.linalg.norm(slope))
-    bounds = [*_rooms(point), *_ends(problem, point)]
+    bounds = [
+        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
+        for part in point.rooms
+        for k in np.flatnonzero(part.value <= _ACTIVE)
+    ]
+    bounds += _ends(problem, point)
     columns = [*equations, *-equations, *(each.slope for each in bounds)]
     if not size or not columns:
         return (), float(bool(size))
@@ -279,22 +278,12 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     return tuple(result), float(rest) / size
 
 
-def _rooms(point: Point) -> list[_Condition]:
-    return [
-        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
-        for part in point.rooms
-        for k in np.flatnonzero(part.value <= _ACTIVE)
-    ]
-
-
 def _equations(point: Point) -> Array:
-    """Derivatives of all equations, three for each place."""
     parts = point.equations
     return stacked_slopes(parts) if parts else np.empty((0, len(point.cost_slope)))
 
 
 def _ends(problem: Problem, point: Point) -> list[_Condition]:
-    """Unknowns at an end of their ranges."""
     unknowns = np.concatenate([point.reals, point.poses.ravel()])
     rows, result = np.eye(len(unknowns)), []
     for j, place in enumerate(unknowns):

@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from softreach.optimization.free_parameters import FreeParameter, Values
+from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
 from softreach.support.arguments import as_one_of, as_path
 from softreach.support.errors import InvalidInput, MissingExtra, in_short
+from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     import optuna
@@ -33,16 +35,20 @@ _NEVER = 1e15
 """Cost of what cannot exist."""
 _WARM = 10
 """Designs that CMA-ES begins from at least: the best tenth of them must be one or more."""
-_JUDGED, _PROBLEM = "judged", "problem"
+_JUDGED, _KEY, _PROBLEM = "judged", "asked", "problem"
 
 
 class Study:
-    """Designs of a search: where they come from, and where they are kept."""
+    """Designs of a search: where they come from, and the storage in which they are kept.
+
+    The sampler is fed in memory, in one order whatever happens; the storage says what was judged
+    before. A search that was killed so asks for the same designs again, and judges only the rest.
+    """
 
     def __init__(
         self, problem: Problem, *, storage: str | None, sampler: str, seed: int, first: int
     ) -> None:
-        """Open the storage, or begin it with the first designs.
+        """Open the storage, or begin it.
 
         Args:
             problem: The problem.
@@ -59,108 +65,120 @@ class Study:
         self.problem, self._first = problem, first
         self._sampler = as_one_of("sampler", sampler, SAMPLERS)
         self.seed = seed
-        self._judged: dict[int, Candidate] = {}  # by the number of its trial
+        self.candidates: list[Candidate] = []
+        """All designs that were judged, in their order."""
+        self._kept: dict[str, Candidate] = {}  # in the storage, by what was asked
+        self._asked: set[str] = set()
+        self._seen = 0  # trials of the storage that were read
+        self._lock = Lock()
         self._optuna = _library()
-        self._complete = (self._optuna.trial.TrialState.COMPLETE,)
         with _quiet():
-            self._study = self._opened(storage)
-            self._begin(storage)
+            self._study = self._created(None)
+            self._storage = None if storage is None else self._opened(storage)
+            for values in first_designs(problem, first, seed):
+                self._study.enqueue_trial(dict(values))
 
     def ask(self, count: int) -> list[tuple[Any, dict[str, float | str]]]:
         """Trials to be told, and their designs."""
-        space = {each.name: self._distribution(each) for each in self.problem.parameters.free}
         with _quiet():
-            trials = [self._study.ask(space) for _ in range(count)]
+            trials = [self._study.ask(self._space) for _ in range(count)]
         return [(trial, dict(trial.params)) for trial in trials]
 
-    def tell(self, trial: Any, candidate: Candidate) -> None:
-        """Keep a design that was asked."""
-        with _quiet():
-            trial.set_user_attr(_JUDGED, candidate.to_dict())
-            self._study.tell(trial, self._costs(candidate))
+    def judged(self, what: Sequence[Any], make: Callable[[], Candidate]) -> tuple[Candidate, bool]:
+        """What the storage knows, or what is made and kept there, and whether it was made.
 
-    def add(self, candidate: Candidate) -> None:
-        """Keep a design that came from elsewhere, such as a polish."""
-        space = {each.name: self._distribution(each) for each in self.problem.parameters.free}
-        params = {
-            each.name: float(np.clip(float(candidate.values[each.name]), each.low, each.high))
-            if each.is_real
-            else candidate.values[each.name]
-            for each in self.problem.parameters.free
-        }
-        with _quiet():
-            self._study.add_trial(
-                self._optuna.trial.create_trial(
-                    params=params,
-                    distributions=space,
-                    values=self._costs(candidate),
-                    user_attrs={_JUDGED: candidate.to_dict()},
-                )
-            )
+        Args:
+            what: All that it depends on, beside the problem: numbers and texts.
+            make: Makes it.
+        """
+        key = json.dumps([self.problem.coarse, *what], sort_keys=True)
+        with self._lock:
+            self._asked.add(key)
+            self._read()
+            known = self._kept.get(key)
+        if known is not None:
+            return known, False
+        made = make()
+        with self._lock, _quiet():
+            if self._storage is not None:
+                kept = {_JUDGED: made.to_dict(), _KEY: key}
+                self._storage.add_trial(self._trial(made, kept))
+        return made, True
 
-    def candidates(self) -> list[Candidate]:
-        """All designs that were judged, by this process or another, in their order."""
+    def tell(self, candidate: Candidate, trial: Any = None) -> None:
+        """Let the sampler know a design that was asked, or comes from elsewhere, as a polish."""
+        self.candidates.append(candidate)
         with _quiet():
-            trials = self._study.get_trials(deepcopy=False, states=self._complete)
-        for trial in trials:
-            if trial.number not in self._judged and _JUDGED in trial.user_attrs:
-                candidate = Candidate.from_dict(trial.params, trial.user_attrs[_JUDGED])
-                self._judged[trial.number] = candidate
-        return [self._judged[number] for number in sorted(self._judged)]
+            if trial is None:
+                self._study.add_trial(self._trial(candidate, {}))
+            else:
+                self._study.tell(trial, self._costs(candidate))
+
+    def others(self) -> list[Candidate]:
+        """Designs in the storage that searches of other seeds, or of more designs, have judged."""
+        with self._lock:
+            self._read()
+            return [each for key, each in self._kept.items() if key not in self._asked]
+
+    def _read(self) -> None:
+        if self._storage is None:
+            return
+        with _quiet():
+            trials = self._storage.get_trials(deepcopy=False)
+        for record in (trial.user_attrs for trial in trials[self._seen :]):
+            self._kept.setdefault(record[_KEY], Candidate.from_dict(record[_JUDGED]))
+        self._seen = len(trials)
+
+    def _trial(self, candidate: Candidate, attributes: dict[str, Any]) -> Any:
+        params = dict(candidate.values)
+        for each in self.problem.parameters.real:
+            params[each.name] = float(np.clip(float(params[each.name]), each.low, each.high))
+        return self._optuna.trial.create_trial(
+            params=params,
+            distributions=self._space,
+            values=self._costs(candidate),
+            user_attrs=attributes,
+        )
 
     def focus(self) -> None:
         """Let a sampler that begins at one place begin where the best of the known designs are."""
-        if self.kind != "cma":
+        if self.kind != "cma" or len(self.candidates) < _WARM:
             return
         with _quiet():
-            known = self._study.get_trials(states=self._complete)
-            if len(known) < _WARM:
-                return
             self._study.sampler = self._optuna.samplers.CmaEsSampler(
-                source_trials=known,
+                source_trials=self._study.get_trials(
+                    states=(self._optuna.trial.TrialState.COMPLETE,)
+                ),
                 n_startup_trials=0,
                 seed=self.seed + 1,
                 warn_independent_sampling=False,
             )
 
-    def _opened(self, storage: str | None) -> optuna.Study:
-        optuna, place = self._optuna, None if storage is None else as_path("storage", storage)
+    def _created(self, storage: Any) -> optuna.Study:
+        return self._optuna.create_study(
+            study_name=_NAME,
+            storage=storage,
+            directions=["minimize"] * max(1, len(self.problem.goals)),
+            sampler=self._made_sampler(self.seed),
+            load_if_exists=True,
+        )
+
+    def _opened(self, place: str) -> optuna.Study:
         try:
-            return optuna.create_study(
-                study_name=_NAME,
-                storage=None if place is None else _storage(place),
-                directions=["minimize"] * max(1, len(self.problem.goals)),
-                sampler=self._made_sampler(self.seed),
-                load_if_exists=True,
-            )
+            study = self._created(_storage(as_path("storage", place)))
+            noted = study.user_attrs.get(_PROBLEM)
+            if noted is None:
+                study.set_user_attr(_PROBLEM, self.problem.digest)
         except InvalidInput:
             raise
         except Exception as error:
             allowed = "a file that can be written, of this kind of search"
-            raise InvalidInput("storage", storage, allowed, in_short(error)) from error
-
-    def _begin(self, place: str | None) -> None:
-        """Note the problem and ask for the first designs; refuse the storage of another one.
-
-        What was killed in between goes on, and a second process asks for none again.
-        """
-        digest = self.problem.digest
-        noted = self._study.user_attrs.get(_PROBLEM, digest)
-        if noted != digest:
+            raise InvalidInput("storage", place, allowed, in_short(error)) from error
+        if noted not in (None, self.problem.digest):
             allowed = "that of the same designs, requirements and objectives"
             hint = "it is of another search: remove it, or choose another file"
             raise InvalidInput("storage", place, allowed, hint)
-        self._study.set_user_attr(_PROBLEM, digest)
-        known = self._study.get_trials(deepcopy=False)
-        if known:  # else another process would draw the same designs
-            self._study.sampler = self._made_sampler(self.seed + len(known))
-        names = self.problem.parameters.names
-        planned = [trial.system_attrs.get("fixed_params", {}) for trial in known]
-        each = [trial.params or plan for trial, plan in zip(known, planned, strict=True)]
-        asked = {tuple(values.get(name) for name in names) for values in each}
-        for values in first_designs(self.problem, self._first, self.seed):
-            if tuple(values[name] for name in names) not in asked:
-                self._study.enqueue_trial(dict(values))
+        return study
 
     @property
     def kind(self) -> str:
@@ -188,13 +206,17 @@ class Study:
             "random": lambda: samplers.RandomSampler(seed=seed),
         }[self.kind]()
 
-    def _distribution(self, parameter: FreeParameter) -> Any:
-        kinds = self._optuna.distributions
-        if parameter.choices:
-            return kinds.CategoricalDistribution(parameter.choices)
-        if parameter.whole:
-            return kinds.IntDistribution(int(parameter.low), int(parameter.high))
-        return kinds.FloatDistribution(parameter.low, parameter.high)
+    @lazy
+    def _space(self) -> dict[str, Any]:
+        kinds, space = self._optuna.distributions, {}
+        for each in self.problem.parameters.free:
+            if each.choices:
+                space[each.name] = kinds.CategoricalDistribution(each.choices)
+            elif each.whole:
+                space[each.name] = kinds.IntDistribution(int(each.low), int(each.high))
+            else:
+                space[each.name] = kinds.FloatDistribution(each.low, each.high)
+        return space
 
     def _costs(self, candidate: Candidate) -> list[float]:
         """Values that the samplers minimize: objectives, or the excess over requirements first."""
@@ -232,7 +254,7 @@ def _storage(place: str) -> Any:
         raise InvalidInput("storage", place, allowed)
     is_new = not path.exists() or not path.stat().st_size
     is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
-    if not is_new and not (_is_own_database if is_database else _is_own_journal)(path):
+    if not is_new and not _is_own(path, is_database):
         raise InvalidInput("storage", place, "a new file, or that of a search: choose another name")
     if is_database:
         return f"sqlite:///{path}"
@@ -250,24 +272,22 @@ def _storage(place: str) -> Any:
     return JournalStorage(JournalFileBackend(str(path)))
 
 
-def _is_own_journal(path: Path) -> bool:
-    with path.open("rb") as file:
-        line = file.readline(4096)
+def _is_own(path: Path, is_database: bool) -> bool:
+    if is_database:
+        import sqlite3
+
+        place = f"{path.absolute().as_uri()}?mode=ro"
+        try:
+            with closing(sqlite3.connect(place, uri=True)) as database:
+                names = database.execute("SELECT study_name FROM studies").fetchall()
+            return set(names) <= {(_NAME,)}
+        except sqlite3.Error:
+            return False
     try:
-        first = json.loads(line)
+        with path.open("rb") as file:
+            first = json.loads(file.readline(4096))
         return first["op_code"] == 0 and first["study_name"] == _NAME
     except (ValueError, KeyError, TypeError):
-        return False
-
-
-def _is_own_database(path: Path) -> bool:
-    import sqlite3
-
-    try:
-        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
-            names = database.execute("SELECT study_name FROM studies").fetchall()
-        return set(names) <= {(_NAME,)}
-    except sqlite3.Error:
         return False
 
 

@@ -132,8 +132,7 @@ class Check:
         space = 9 if "undecided" in own else 6
         width = max((len(finding.name) for finding in self.findings), default=0)
         for finding in self.findings:
-            word = finding.verdict if finding.met else finding.verdict.upper()
-            lines.append(f"  {word:<{space}}  {finding.name:<{width}}  {finding.text}")
+            lines.append(f"  {finding.word:<{space}}  {finding.name:<{width}}  {finding.text}")
         return "\n".join(lines)
 
     def to_dataset(self) -> xr.Dataset:

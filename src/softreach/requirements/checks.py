@@ -26,7 +26,6 @@ from softreach.requirements.requirements import Requirements
 from softreach.rod.bending import bending_over_bounds
 from softreach.rod.rods import in_steps, tip_map
 from softreach.support.arguments import as_instance, as_number
-from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, no_warnings
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.units import LengthUnit
@@ -151,8 +150,15 @@ def checked(
         effort=joined.effort,
         nearest=joined.nearest,
     )
-    measures = measure_findings(arm, needs, accuracy, partial(sets, arm))
-    return replace(made, findings=(*_verdicts(made, joined, every), *measures))
+    findings = (
+        *_reach_findings(made, every),
+        *_cover_findings(made),
+        *_keep_findings(made, joined, every),
+        *design_limits(arm, needs),
+        *_limit_findings(made, joined, every),
+        *measure_findings(arm, needs, accuracy, partial(sets, arm)),
+    )
+    return replace(made, findings=findings)
 
 
 def _coverage(
@@ -171,40 +177,25 @@ def _coverage(
         posed = solved(rules, places, np.full(count, target.within), step, chosen)
         inside = (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
     else:
-        inside = _reachable(partial(sets, rules.arm), places, target.within)
+        inside = np.zeros(count, bool)
+        try:
+            reached = sets(rules.arm)
+            if not isinstance(reached, ReachableSolid):  # without a volume
+                inside = reached.distance(places) <= max(
+                    target.within, reached.tip_map.tol * reached.tip_map.length
+                )
+            elif target.within > 0.0:
+                inside = reached.distance(places) <= target.within
+            else:
+                inside = reached.contains(places)
+        except InvalidInput as error:
+            if error.name != "loads":
+                raise
         step(count)
     share = float(inside.mean())
     # of a share of 0 or 1, what one place more or less makes of it
     error = float(np.sqrt(max(share * (1.0 - share), 1.0 / count) / count))
     return Coverage(target.name, payload, share, error, count)
-
-
-def _reachable(known: Callable[[], ReachableSet], places: Array, within: float) -> Mask:
-    """Mask of the places that the tip reaches, whatever the pose."""
-    try:
-        reached = known()
-    except InvalidInput as error:
-        if error.name != "loads":
-            raise
-        return np.zeros(len(places), bool)
-    if not isinstance(reached, ReachableSolid):  # without a volume
-        rod = reached.tip_map
-        return reached.distance(places) <= max(within, rod.tol * rod.length)
-    return reached.distance(places) <= within if within > 0.0 else reached.contains(places)
-
-
-def _verdicts(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
-    """Targets, regions and limits, each met or missed.
-
-    Args:
-        made: The check, whose findings these become.
-        posed: Poses under all payloads, stacked along a first axis.
-        rules: Rules of poses under each payload.
-    """
-    yield from _reach_findings(made, rules)
-    yield from _cover_findings(made)
-    yield from _keep_findings(made, posed, rules)
-    yield from _limit_findings(made, posed, rules)
 
 
 def _under(payload: float | None) -> str:
@@ -235,7 +226,7 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
         if gap > length + away - 1e-9:
             text += f" is not held{laden}: no stable equilibrium"
         else:
-            text += f" is missed by {_length(gap - target.within, unit)}{laden}"
+            text += f" is missed by {unit.rounded(gap - target.within)}{laden}"
             pose = made.poses[load, number]
             more = advice(rules[int(load)].arm, target.places[place], pose, unit)
         pairs = zip(made.payloads, reached, strict=True)
@@ -243,10 +234,6 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
         if held:
             more += f"; all reached with {max(held):.4g} kg"
         yield Finding(target.name, "reach", "missed", excess, text + more)
-
-
-def _length(value: float, unit: LengthUnit, digits: int = 4) -> str:
-    return f"{value / unit.size + 0.0:.{digits}g} {unit.name}"  # + 0.0: no minus before 0
 
 
 def _cover_findings(made: Check) -> Iterator[Finding]:
@@ -266,69 +253,54 @@ def _cover_findings(made: Check) -> Iterator[Finding]:
 
 
 def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
-    at_targets = bool(made.requirements.targets)
     column = 0
     for keep in made.requirements.keeps:
-        if keep.when == "targets" and at_targets:
-            values = posed.value[..., column], posed.error[..., column]
-            excess = posed.excess[..., column]
-            column += 1
-            yield _kept_at_targets(made, keep, *values, excess)
-        else:
-            yield _kept_always(made, keep, rules)
-
-
-def _kept_at_targets(made: Check, keep: Keep, value: Array, error: Array, excess: Array) -> Finding:
-    unit = made.arm.length_unit
-    if not value.size:
-        return Finding(keep.name, keep.kind, "met", 0.0, "counted in what is covered")
-    decides = value if value.max() > 0.0 or (value + error).max() <= 0.0 else value + error
-    load, place = np.unravel_index(int(decides.argmax()), value.shape)
-    where = f"at place {place + 1}{_under(made.payloads[load])}"
-    most, off = float(value[load, place]), float(error[load, place])
-    return _kept(keep, most, off, float(excess.max()), where, unit)
-
-
-def _kept_always(made: Check, keep: Keep, rules: Sequence[PoseRules]) -> Finding:
-    """A region that every pose must keep to, by a search for the worst."""
-    worst: list[tuple[float, float, float, str]] = []
-    for payload, own in zip(made.payloads, rules, strict=True):
-        gamma, judged = worst_pose(replace(own, keeps=(keep,), limits={}))
-        inputs = ", ".join(f"{x:.4g}" for x in gamma)
-        where = f"in the worst pose found, ({inputs}){_under(payload)}"
-        value, excess, error = (float(column[0, 0]) for column in judged)
-        worst.append((value, error, excess, where))
-    value, error, excess, where = max(worst)
-    return _kept(keep, value, error, excess, where, made.arm.length_unit)
+        if keep.when == "always" or not made.requirements.targets:
+            worst: list[tuple[float, float, float, str]] = []
+            for payload, own in zip(made.payloads, rules, strict=True):
+                gamma, judged = worst_pose(replace(own, keeps=(keep,), limits={}))
+                inputs = ", ".join(f"{x:.4g}" for x in gamma)
+                where = f"in the worst pose found, ({inputs}){_under(payload)}"
+                value, excess, error = (float(column[0, 0]) for column in judged)
+                worst.append((value, error, excess, where))
+            yield _kept(keep, *max(worst), made.arm.length_unit)
+            continue
+        value, error, excess = (x[..., column] for x in (posed.value, posed.error, posed.excess))
+        column += 1
+        if not value.size:
+            yield Finding(keep.name, keep.kind, "met", 0.0, "counted in what is covered")
+            continue
+        decides = value if value.max() > 0.0 or (value + error).max() <= 0.0 else value + error
+        load, place = np.unravel_index(int(decides.argmax()), value.shape)
+        most, off = float(value[load, place]), float(error[load, place])
+        where = f"at place {place + 1}{_under(made.payloads[load])}"
+        yield _kept(keep, most, off, float(excess.max()), where, made.arm.length_unit)
 
 
 def _kept(
     keep: Keep, value: float, error: float, excess: float, where: str, unit: LengthUnit
 ) -> Finding:
-    """Distance by which a region is missed, or kept to."""
     of = "the tip" if keep.of == "tip" else "the arm"
-    close = f" (to {_length(error, unit, 2)})" if keep.of == "arm" else ""
+    close = f" (to {unit.rounded(error, digits='.2g')})" if keep.of == "arm" else ""
     verdict = "missed" if excess > 0.0 else verdict_of(max(-value, 0.0), error)
     if excess > 0.0:
         beyond = "outside" if keep.inside else "inside or too near"
-        text = f"{of} is {_length(value, unit)}{close} {beyond} {where}"
+        text = f"{of} is {unit.rounded(value)}{close} {beyond} {where}"
     elif not np.isfinite(value):
         text = "no pose to judge"
     else:
-        text = f"{of} keeps {_length(-value, unit)}{close} to spare {where}"
+        text = f"{of} keeps {unit.rounded(0.0 - value)}{close} to spare {where}"
     return Finding(keep.name, keep.kind, verdict, excess, text)
 
 
 def _limit_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Iterator[Finding]:
-    needs = made.requirements
-    yield from design_limits(made.arm, needs)
     for column, (name, most) in enumerate(rules[0].limits.items(), len(rules[0].keeps)):
         values = posed.value[..., column]
         if values.size:
             load, place = np.unravel_index(int(values.argmax()), values.shape)
             value = float(values[load, place])
             where = f", at place {place + 1}{_under(made.payloads[load])}"
-        elif needs.targets:
+        elif made.requirements.targets:
             value, where = 0.0, ", counted in what is covered"
         elif name == "bending":
             bending = [bending_over_bounds(each.arm) for each in rules]

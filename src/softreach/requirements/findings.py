@@ -65,8 +65,13 @@ class Finding:
         """True where it is met by more than the error."""
         return self.verdict == "met"
 
+    @property
+    def word(self) -> str:
+        """The verdict, large where it is not "met"."""
+        return self.verdict if self.met else self.verdict.upper()
+
     def __str__(self) -> str:
-        return f"{self.verdict}  {self.name}: {self.text}"
+        return f"{self.word}  {self.name}: {self.text}"
 
 
 def verdict_of(margin: float, error: float = 0.0) -> Verdict:

@@ -164,14 +164,10 @@ class Limits:
 
 POSE_LIMITS = ("shortening", "force", "pressure", "stroke", "bending")
 """Limits of poses."""
-LIMIT_UNITS = {
-    "actuators": "",
-    "shortening": "",
+LIMIT_UNITS = dict.fromkeys((field.name for field in dataclasses.fields(Limits)), "") | {
     "force": "N",
     "pressure": "Pa",
     "stroke": "m",
     "mass": "kg",
-    "load_number": "",
-    "bending": "",
 }
 """Limit -> its SI unit."""

@@ -21,7 +21,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 
-__all__ = ["PoseRules", "Worst", "worst_pose"]
+__all__ = ["PoseRules", "worst_pose"]
 
 _LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""
@@ -66,6 +66,13 @@ class PoseRules:
         poses = {name: x for name, x in limits.given.items() if name in POSE_LIMITS}
         return cls(arm, tuple(keeps), poses, tolerance, rod)
 
+    @property
+    def rooms(self) -> tuple[Array, Array]:
+        """Largest value that each rule allows, and its scale: L, or the limit; (rule,) each."""
+        none, limits = [0.0] * len(self.keeps), [*self.limits.values()]
+        scales = [self.arm.length] * len(self.keeps) + [limit or 1.0 for limit in limits]
+        return np.array(none + limits), np.array(scales)
+
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
 
@@ -92,8 +99,7 @@ class PoseRules:
             for column, name in enumerate(self.limits, k):
                 value[block, column] = self._limited(name, gamma[block])
         value = np.nan_to_num(value, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
-        scale = [self.arm.length] * len(self.keeps) + [x or 1.0 for x in self.limits.values()]
-        most = [0.0] * len(self.keeps) + list(self.limits.values())
+        most, scale = self.rooms
         excess = np.maximum((value - most) / scale, 0.0)
         # What rounding alone makes of a bound that is met to the last bit is no excess.
         error = np.where(error > 1e-9 * self.arm.length, error, 0.0)
@@ -121,7 +127,6 @@ class PoseRules:
         return value, error
 
     def _limited(self, name: str, gamma: Array) -> Array:
-        """Value of a limit in poses, shape (n,)."""
         if name == "bending":
             z = bending_stations(self.arm).ravel()
             u = self.rod.strains(gamma, z).curvature
@@ -226,29 +231,18 @@ def _tips_missed(keep: Keep, tips: Array) -> Array:
     return missed
 
 
-class Worst(NamedTuple):
-    """The pose that misses a region by most, as far as a search found it."""
-
-    gamma: Array
-    """Its inputs, shape (inputs,)."""
-    judged: Judged
-    """Of it alone."""
-
-
-def worst_pose(rules: PoseRules) -> Worst:
+def worst_pose(rules: PoseRules) -> tuple[Array, Judged]:
     """The pose within the bounds that misses the one region of some rules by most, by search."""
-    worst, _ = worst_inputs(rules.rod, lambda gamma: _coarse(rules, gamma)[:, None])
-    return Worst(worst[0], rules.judged(worst))
-
-
-def _coarse(rules: PoseRules, gamma: Array) -> Array:
-    """Distances by which poses miss the one region, at few stations [m], shape (n,)."""
     (keep,) = rules.keeps
-    if keep.of == "tip":
-        values = _tips_missed(keep, rules.rod.tips(gamma))
-    else:
-        blocks = parallel.blocks(len(gamma), _BLOCK)
-        bodies = (Body.of(rules.rod, gamma[block], _LEVELS[0]) for block in blocks)
-        values = [body.missed(keep, np.arange(len(body.lost)))[0] for body in bodies]
-        values = np.concatenate(values)
-    return np.nan_to_num(values, nan=-np.inf)
+
+    def missed(gamma: Array) -> Array:  # at few stations
+        if keep.of == "tip":
+            values = [_tips_missed(keep, rules.rod.tips(gamma))]
+        else:
+            blocks = parallel.blocks(len(gamma), _BLOCK)
+            bodies = (Body.of(rules.rod, gamma[block], _LEVELS[0]) for block in blocks)
+            values = [body.missed(keep, np.arange(len(body.lost)))[0] for body in bodies]
+        return np.nan_to_num(np.concatenate(values), nan=-np.inf)[:, None]
+
+    worst, _ = worst_inputs(rules.rod, missed)
+    return worst[0], rules.judged(worst)

@@ -118,7 +118,6 @@ class Region(ABC):
         return distance - radius, distance + radius
 
     def _distances(self, points: Array) -> Array:
-        """Distances of points of any shape (..., 3)."""
         return self.distance(points.reshape(-1, 3)).reshape(points.shape[:-1])
 
 
@@ -150,11 +149,9 @@ class Box(Region):
 
     @property
     def bounds(self) -> Array:
-        """Its corners [m], shape (2, 3)."""
         return np.array([self.low, self.high])
 
     def distance(self, points: ArrayLike) -> Array:
-        """Distance of points (n, 3) to its faces [m], negative inside, shape (n,)."""
         x = as_points("points", points)
         beyond = np.maximum(self.low - x, x - self.high)
         return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
@@ -169,7 +166,6 @@ class Box(Region):
         return np.maximum(ball, (beyond - reach).max(axis=-1)), (beyond + reach).max(axis=-1)
 
     def wireframe(self, around: Array) -> list[Array]:
-        """Its edges [m]."""
         del around
         corners = np.array(list(np.ndindex(2, 2, 2)))
         ends = [(a, b) for a in corners for b in corners if (b - a).sum() == 1 and (b >= a).all()]
@@ -204,7 +200,6 @@ class Sphere(Region):
         return np.array(self.center) + self.radius * np.array([[-1.0], [1.0]])
 
     def distance(self, points: ArrayLike) -> Array:
-        """Distance of points (n, 3) to its surface [m], negative inside, shape (n,)."""
         return np.linalg.norm(as_points("points", points) - self.center, axis=1) - self.radius
 
     def section_distances(
@@ -217,7 +212,6 @@ class Sphere(Region):
         return np.hypot(height, least) - self.radius, np.hypot(height, most) - self.radius
 
     def wireframe(self, around: Array) -> list[Array]:
-        """Three great circles [m]."""
         del around
         flat = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE), 0.0 * _CIRCLE], axis=1)
         return [self.center + self.radius * np.roll(flat, k, axis=1) for k in range(3)]
@@ -247,11 +241,9 @@ class HalfSpace(Region):
 
     @property
     def bounds(self) -> Array:
-        """No end anywhere, shape (2, 3)."""
         return np.array([[-np.inf] * 3, [np.inf] * 3])
 
     def distance(self, points: ArrayLike) -> Array:
-        """Distance of points (n, 3) to the plane [m], negative behind it, shape (n,)."""
         return (as_points("points", points) - self.point) @ np.array(self.normal)
 
     def section_distances(
@@ -349,13 +341,8 @@ class Mesh(Region):
         name = f" of {self.source}" if self.source else ""
         return f"Mesh{name}: {counted(len(self.faces), 'triangle')}, {self.volume:.4g} m³"
 
-    @property
-    def volume(self) -> float:
-        """Volume inside [m³]."""
-        return self._volume
-
     @lazy
-    def _volume(self) -> float:
+    def volume(self) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
         return enclosed_volume(self.vertices, self.faces)
 
     @property
@@ -381,7 +368,6 @@ class Mesh(Region):
         return out
 
     def wireframe(self, around: Array) -> list[Array]:
-        """Edges at which it is creased [m]."""
         del around
         edges, beside = self._edges[:2]
         first, second = self._face_normals[beside].swapaxes(0, 1)

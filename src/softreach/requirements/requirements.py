@@ -19,7 +19,6 @@ from softreach.requirements.parts import LONGEST, MOST_PLACES, Keep, Limits, Tar
 from softreach.requirements.requirements_file import read, written
 from softreach.support.arguments import (
     POSITIVE,
-    as_flag,
     as_given,
     as_instance,
     as_number,
@@ -28,8 +27,7 @@ from softreach.support.arguments import (
 )
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
-from softreach.support.files.atomic import writing
-from softreach.support.files.text import read_text
+from softreach.support.files.text import read_text, write_text
 
 __all__ = ["Requirements"]
 
@@ -107,7 +105,6 @@ class Requirements:
             InvalidInput: No file that can be read, or no text in UTF-8.
         """
         name = as_path("path", path)
-        length = None if length is None else as_number("length", length, POSITIVE)
         text = read_text("requirements", name, LONGEST)
         return cls.from_toml(text, folder=Path(name).parent, length=length, source=name)
 
@@ -158,10 +155,7 @@ class Requirements:
             InvalidInput: Something else is there.
             NotWritten: It cannot be written.
         """
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        text = self.to_toml()
-        with writing(path, overwrite=overwrite) as stream:
-            stream.write(text.encode())
+        write_text(path, self.to_toml(), overwrite=overwrite)
 
     def __repr__(self) -> str:
         parts = [
@@ -196,12 +190,8 @@ def _named(parts: Sequence[Any]) -> Iterator[Any]:
         if names.count(name) > 1:
             raise InvalidInput("name", repr(name), "of one target, or of one region, only")
     for number, part in enumerate(parts, 1):
-        if not part.name:
-            kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
-            given, part = vars(part), object.__new__(type(part))
-            for key, value in {**given, "name": f"{kind} {number}"}.items():
-                object.__setattr__(part, key, value)
-        yield part
+        kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
+        yield part if part.name else dataclasses.replace(part, name=f"{kind} {number}")
 
 
 def _limits_of(name: str, ends: Any) -> tuple[float | None, float | None]:

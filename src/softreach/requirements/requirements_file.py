@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "written"]
 
-_KEYS = ("version", "payloads", "reach", "stay_inside", "avoid", "limits", "measures")
+_KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
+"""At the top, beside payloads; `search` is read by the search of designs."""
 _SUFFIXES = {
     "m": {"m": "m", "cm": "cm", "mm": "mm", "over_length": "L"},
     "kg": {"kg": "kg", "g": "g"},
@@ -41,8 +42,6 @@ _SHAPES: Mapping[str, Mapping[str, str]] = {
 }
 """Region -> its numbers and their units."""
 _KINDS = {"box": Box, "sphere": Sphere, "half_space": HalfSpace}
-_NUMBERS = {"reach": {"within": "m", "share": ""}, "keep": {"clearance": "m"}}
-_WORDS = {"reach": ("name", "file"), "keep": ("name", "of", "when")}
 _WRONG: Any = object()
 """In place of a value that has faults."""
 _EXAMPLE = {kind: {"region": Sphere((0.0, 0.0, 0.0), 1.0)} for kind in (Target, Keep)} | {
@@ -82,62 +81,62 @@ class _Reader:
 
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""
-        keys = (*_KEYS, "search")  # which the search of designs reads
-        self._check_keys(document, {key: key for key in keys}, "", ("payloads",))
+        self._check_keys(document, "", {"payloads": "kg"}, _KEYS)
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
         payloads = self._value(document, "", "payloads", "kg", several=True)
-        targets = [self._target(*each) for each in self._tables(document, "reach")]
-        inside = [self._keep(*each, True) for each in self._tables(document, "stay_inside")]
-        outside = [self._keep(*each, False) for each in self._tables(document, "avoid")]
         return {
-            "targets": targets,
-            "keeps": inside + outside,
-            "limits": self._limits(self._table(document, "limits")),
             "payloads": () if payloads is None else payloads,
+            "targets": [self._target(*each) for each in self._tables(document, "reach")],
+            "keeps": [
+                self._keep(*each, kind == "stay_inside")
+                for kind in ("stay_inside", "avoid")
+                for each in self._tables(document, kind)
+            ],
+            "limits": self._limits(self._table(document, "limits")),
             "measures": self._measures(self._table(document, "measures")),
         }
 
     def _target(self, raw: dict[str, Any], path: str) -> Any:
-        numbers = {**_NUMBERS["reach"], "places": "m"}
-        values = self._part(raw, path, numbers, _WORDS["reach"], ("places",))
-        region = values.pop("region", None)
-        file = values.pop("file", None)
+        values = self._part(
+            raw, path, {"within": "m", "share": "", "places": "m"}, ("name", "file")
+        )
+        region, file = values.pop("region", None), values.pop("file", None)
         sources = [x for x in (values.get("places"), file, region) if x is not None]
         if len(sources) != 1:
             allowed = f"needs one of places, file, {', '.join(_SHAPES)}, and has {len(sources)}"
             return self._refuse(path, None, allowed)
         if isinstance(file, str):
-            values["places"] = self._places_of(file, f"{path}.file")
+            try:
+                text = read_text("file", self.folder / file, LONGEST)
+                values["places"] = np.array(positions_in(text, file, self.length))
+            except InvalidInput as error:
+                allowed = f"must be {error.allowed} ({error.name} = {error.value})"
+                values["places"] = self._refuse(f"{path}.file", file, allowed)
         return self._made(Target, raw, path, values | ({"region": region} if region else {}))
 
     def _keep(self, raw: dict[str, Any], path: str, inside: bool) -> Any:
-        values = self._part(raw, path, _NUMBERS["keep"], _WORDS["keep"], ())
+        values = self._part(raw, path, {"clearance": "m"}, ("name", "of", "when"))
         if values.get("region") is None:
             return self._refuse(path, None, f"needs one of {', '.join(_SHAPES)}")
         return self._made(Keep, raw, path, {**values, "inside": inside})
 
     def _part(
-        self,
-        raw: dict[str, Any],
-        path: str,
-        numbers: Mapping[str, str],
-        words: tuple[str, ...],
-        several: tuple[str, ...],
+        self, raw: dict[str, Any], path: str, numbers: Mapping[str, str], words: tuple[str, ...]
     ) -> dict[str, Any]:
         """Values of a table by field: numbers, words, and the region that it has."""
-        known = {**numbers, **dict.fromkeys((*words, *_SHAPES, "mesh_unit"), "")}
-        self._check_keys(raw, known, f"{path}.", tuple(numbers))
+        self._check_keys(raw, path, numbers, (*words, *_SHAPES, "mesh_unit"))
         values = {
             name: value
             for name, unit in numbers.items()
-            if (value := self._value(raw, path, name, unit, several=name in several)) is not None
+            if (value := self._value(raw, path, name, unit, several=name == "places")) is not None
         }
-        for name in words:
-            if isinstance(value := raw.get(name, ""), str):
-                values |= {name: value} if name in raw else {}
-            else:
-                values[name] = self._refuse(f"{path}.{name}", value, "must be text")
+        for name in (name for name in words if name in raw):
+            is_text = isinstance(raw[name], str)
+            text = (
+                raw[name] if is_text else self._refuse(f"{path}.{name}", raw[name], "must be text")
+            )
+            values[name] = text
         shapes = [name for name in _SHAPES if name in raw]
         if len(shapes) > 1:
             values["region"] = self._refuse(path, None, f"has {' and '.join(shapes)}: give one")
@@ -161,12 +160,12 @@ class _Reader:
         if not isinstance(table, dict):
             return self._refuse(path, table, "must be a table" + " or a file" * (shape == "mesh"))
         if shape == "mesh":
-            self._check_keys(table, {"vertices": "m", "faces": ""}, f"{path}.", ("vertices",))
+            self._check_keys(table, path, {"vertices": "m"}, ("faces",))
             vertices = self._value(table, path, "vertices", "m", several=True)
             values = {"vertices": vertices, "faces": table.get("faces")}
             return self._made(Mesh, table, path, values)
         numbers = _SHAPES[shape]
-        self._check_keys(table, numbers, f"{path}.", tuple(numbers))
+        self._check_keys(table, path, numbers)
         values = {
             name: self._value(table, path, name, unit, several=name != "radius", needed=True)
             for name, unit in numbers.items()
@@ -174,7 +173,7 @@ class _Reader:
         return self._made(_KINDS[shape], table, path, values)
 
     def _limits(self, raw: dict[str, Any]) -> Any:
-        self._check_keys(raw, LIMIT_UNITS, "limits.", tuple(LIMIT_UNITS))
+        self._check_keys(raw, "limits", LIMIT_UNITS)
         values = {
             name: self._value(raw, "limits", name, unit) for name, unit in LIMIT_UNITS.items()
         }
@@ -190,22 +189,13 @@ class _Reader:
             elif not isinstance(table, dict):
                 self._refuse(path, table, "must be a table with at_least, at_most or both")
             else:
-                ends = ("at_least", "at_most")
-                self._check_keys(table, dict.fromkeys(ends, metric.unit), f"{path}.", ends)
                 unit = metric.unit if metric.unit in _SUFFIXES else ""
+                ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
+                self._check_keys(table, path, ends)
                 measures[name] = tuple(
                     self._value(table, path, end, unit, plain=True) for end in ends
                 )
         return measures
-
-    def _places_of(self, file: str, path: str) -> Any:
-        name = self.folder / file
-        try:
-            text = read_text("file", name, LONGEST)
-            return np.array(positions_in(text, str(file), self.length))
-        except InvalidInput as error:
-            allowed = f"must be {error.allowed} ({error.name} = {error.value})"
-            return self._refuse(path, file, allowed)
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `_WRONG` and a fault where it refuses them."""
@@ -248,19 +238,16 @@ class _Reader:
             needed: Its absence is a fault.
             plain: Numbers may go without their unit, which is known.
         """
-        suffixes = {
-            f"{name}_{suffix}": symbol for suffix, symbol in _SUFFIXES.get(unit, {}).items()
-        }
-        keys = [key for key in (name, *suffixes) if key in raw]
+        known = _keys(name, unit)
+        keys = [key for key in known if key in raw]
         start = f"{path}." if path else ""
         if len(keys) != 1:
-            if keys or needed:
-                said = f"has {' and '.join(keys)}: give one" if keys else "required key is missing"
-                key = name if keys else next(iter(suffixes), name)
-                return self._refuse(start + key, None, said)
-            return None
+            if keys:
+                return self._refuse(start + name, None, f"has {' and '.join(keys)}: give one")
+            usual = [*known][unit != ""]
+            return self._refuse(start + usual, None, "required key is missing") if needed else None
         (key,) = keys
-        symbol = suffixes.get(key, "")
+        symbol = known[key]
         if several and not isinstance(raw[key], list | str):
             return self._refuse(start + key, raw[key], "must be a list")
         try:
@@ -283,15 +270,16 @@ class _Reader:
                 raise ValueError(value)
             if "," in value:
                 return [self._read(item, unit, symbol, plain) for item in value.split(",")]
-            if unit == "m":
-                return read_length(_with_unit(value), self.length)
-            return read_quantity(value, unit)
+            return self._quantity(value, unit)
         if not symbol and not plain and value != 0:
             raise ValueError(value)
         if symbol in ("", unit):
             return value
-        text = f"{value!r}{symbol}"
-        return read_length(text, self.length) if unit == "m" else read_quantity(text, unit)
+        return self._quantity(f"{value!r}{symbol}", unit)
+
+    def _quantity(self, text: str, unit: str) -> float:
+        is_relative = unit == "m" and text.strip().endswith("L")
+        return read_length(text, self.length) if is_relative else read_quantity(text, unit)
 
     def _allowed(self, unit: str, symbol: str, name: str) -> str:
         if symbol == "L" and self.length is None:
@@ -307,18 +295,17 @@ class _Reader:
         )
 
     def _check_keys(
-        self, raw: dict[str, Any], known: Mapping[str, str], start: str, numbers: tuple[str, ...]
+        self,
+        raw: dict[str, Any],
+        path: str,
+        numbers: Mapping[str, str],
+        others: tuple[str, ...] = (),
     ) -> None:
-        every = {}
-        for name, unit in known.items():
-            every[name] = name
-            if name in numbers:
-                unit = "kg" if name == "payloads" else unit
-                every |= {f"{name}_{x}": f"{name}_{x}" for x in _SUFFIXES.get(unit, {})}
-        for key in raw:
-            if key not in every:
-                shown = {name: name for name in known}
-                self._refuse(start + key_text(key), raw[key], unknown_key(key, shown))
+        known = {*others, *(key for name, unit in numbers.items() for key in _keys(name, unit))}
+        start = f"{path}." if path else ""
+        for key in (key for key in raw if key not in known):
+            shown = {name: name for name in (*numbers, *others)}
+            self._refuse(start + key_text(key), raw[key], unknown_key(key, shown))
 
     def _table(self, document: dict[str, Any], key: str) -> dict[str, Any]:
         raw = document.get(key, {})
@@ -343,72 +330,53 @@ class _Reader:
         return _WRONG
 
 
-def _with_unit(text: str) -> str:
-    """A length that has a unit, or is 0.
-
-    Raises:
-        ValueError: A number alone.
-    """
-    bare = text.strip().lstrip("+-").replace(".", "").replace("e", "").replace("E", "")
-    if bare.isdigit() and float(text) != 0.0:
-        raise ValueError(text)
-    return text
+def _keys(name: str, unit: str) -> dict[str, str]:
+    """Keys of a number, and the units that they say."""
+    return {name: ""} | {f"{name}_{x}": symbol for x, symbol in _SUFFIXES.get(unit, {}).items()}
 
 
 def written(needs: Requirements) -> str:
     """The text of a file; lengths in m, masses in kg."""
-    blocks = [["# softreach requirements", "version = 1"]]
-    if needs.payloads:
-        blocks[0].append(f"payloads_kg = {value_text(needs.payloads)}")
-    blocks += map(_target_lines, needs.targets)
-    blocks += map(_keep_lines, sorted(needs.keeps, key=lambda keep: not keep.inside))
+    head = {"version": 1} | ({"payloads_kg": needs.payloads} if needs.payloads else {})
+    blocks = [["# softreach requirements", *_lines(head)]]
+    for target in needs.targets:
+        lines = ["[[reach]]", *_lines({"name": target.name})]
+        if target.places is not None:
+            rows = (f"  {value_text(row)}," for row in target.places.tolist())
+            lines += ["places_m = [", *rows, "]"]
+        elif target.region is not None:
+            lines += [_region_line(target.region), *_lines({"share": target.share})]
+        blocks.append(lines + _lines({"within_m": target.within} if target.within else {}))
+    for keep in sorted(needs.keeps, key=lambda keep: not keep.inside):
+        words = {"of": keep.of, "when": keep.when}
+        words |= {"clearance_m": keep.clearance} if keep.clearance else {}
+        start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
+        blocks.append([*start, _region_line(keep.region), *_lines(words)])
     if limits := needs.limits.given:
-        blocks.append(["[limits]", *(_limit_line(name, x) for name, x in limits.items())])
+        keys = (f"{name}_{LIMIT_UNITS[name].lower()}".rstrip("_") for name in limits)
+        blocks.append(["[limits]", *_lines(dict(zip(keys, limits.values(), strict=True)))])
     if needs.measures:
-        blocks.append(["[measures]", *(_measure_line(*each) for each in needs.measures.items())])
+        blocks.append(["[measures]"])
+    for name, ends in needs.measures.items():
+        pairs = zip(("at_least", "at_most"), ends, strict=True)
+        table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
+        blocks[-1].append(f"{key_text(name)} = {table}")
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
-def _target_lines(target: Target) -> list[str]:
-    lines = ["[[reach]]", f"name = {value_text(target.name)}"]
-    if target.places is not None:
-        rows = (f"  {value_text(row)}," for row in target.places.tolist())
-        lines += ["places_m = [", *rows, "]"]
-    elif target.region is not None:
-        lines += [*_region_lines(target.region), f"share = {value_text(target.share)}"]
-    return lines + [f"within_m = {value_text(target.within)}"] * bool(target.within)
+def _lines(values: Mapping[str, Any]) -> list[str]:
+    return [f"{key} = {value_text(value)}" for key, value in values.items()]
 
 
-def _keep_lines(keep: Keep) -> list[str]:
-    lines = [f"[[{keep.kind}]]", f"name = {value_text(keep.name)}", *_region_lines(keep.region)]
-    lines += [f"of = {value_text(keep.of)}", f"when = {value_text(keep.when)}"]
-    return lines + [f"clearance_m = {value_text(keep.clearance)}"] * bool(keep.clearance)
-
-
-def _region_lines(region: Region) -> Iterator[str]:
+def _region_line(region: Region) -> str:
+    if isinstance(region, Mesh) and region.source:
+        place = str(Path(region.source).resolve())
+        return "\n".join(_lines({"mesh": place, "mesh_unit": region.unit}))
     if isinstance(region, Mesh):
-        if region.source:
-            yield f"mesh = {value_text(str(Path(region.source).resolve()))}"
-            yield f"mesh_unit = {value_text(region.unit)}"
-            return
-        arrays = {"vertices_m": region.vertices, "faces": region.faces}
-        pairs = [(key, value_text(array.tolist())) for key, array in arrays.items()]
-        yield f"mesh = {inline_table(pairs)}"
-        return
-    shape = next(name for name, kind in _KINDS.items() if isinstance(region, kind))
-    pairs = [
-        (f"{name}_{unit}" if unit else name, value_text(getattr(region, name)))
-        for name, unit in _SHAPES[shape].items()
-    ]
-    yield f"{shape} = {inline_table(pairs)}"
-
-
-def _limit_line(name: str, value: float) -> str:
-    unit = LIMIT_UNITS[name].lower()
-    return f"{name}_{unit} = {value_text(value)}" if unit else f"{name} = {value_text(value)}"
-
-
-def _measure_line(name: str, ends: tuple[float | None, float | None]) -> str:
-    pairs = zip(("at_least", "at_most"), ends, strict=True)
-    table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
-    return f"{key_text(name)} = {table}"
+        shape = "mesh"
+        values = {"vertices_m": region.vertices.tolist(), "faces": region.faces.tolist()}
+    else:
+        shape = next(name for name, kind in _KINDS.items() if isinstance(region, kind))
+        keys = (f"{name}_{unit}".rstrip("_") for name, unit in _SHAPES[shape].items())
+        values = dict(zip(keys, (getattr(region, x) for x in _SHAPES[shape]), strict=True))
+    return f"{shape} = {inline_table((key, value_text(x)) for key, x in values.items())}"

@@ -1,33 +1,29 @@
-"""Reports: HTML pages in one file with their pictures inside, to be read offline."""
+"""Reports: what was found, printed in lines or written as one page with its pictures inside."""
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from os import PathLike
 from typing import Any
 
-from softreach.support.errors import MissingExtra
+from softreach.support.arguments import as_flag, as_path
+from softreach.support.errors import MissingExtra, counted
 from softreach.support.files.atomic import writing
-from softreach.support.files.formats import FileFormat, Formats, check_installed
+from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
+from softreach.support.quantity import columns
 
-__all__ = [
-    "REPORT",
-    "Section",
-    "check_libraries",
-    "figure_source",
-    "page_template",
-    "png_source",
-    "write_page",
-]
+__all__ = ["REPORT", "Report", "Section", "check_libraries", "page_template", "png_source"]
 
 REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
 
 _DPI = 160
+_MOST_ROWS = 30
+"""Rows of a table that are printed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +36,56 @@ class Section:
     rows: Sequence[Sequence[str]] = ()
     note: str = ""
     points: Sequence[str] = ()
-    pictures: Sequence[tuple[str, str, str]] = ()
-    """Source, text in its place, and caption of each."""
+    figures: Callable[[], Iterable[tuple[Any, str]]] = tuple
+    """Draws figures of matplotlib, each with its caption."""
     text: str = ""
     """Shown as it is, such as a design file."""
+    is_printed: bool = True
+    """Rows and points are among the lines; the rest is on the page alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What was found: `str` gives its lines, `save` writes its page."""
+
+    title: str
+    verdict: str
+    state: str
+    """Kind of verdict, by which the page is colored: met, missed, undecided, noise and so on."""
+    facts: Sequence[str]
+    """Remarks on the whole."""
+    sections: Sequence[Section]
+
+    def __str__(self) -> str:
+        lines = [self.verdict, *self.facts]
+        for section in self.sections:
+            if section.is_printed:
+                rows = [section.head] * bool(section.head) + list(section.rows[:_MOST_ROWS])
+                lines += columns(rows) if section.rows else ()
+                if (more := len(section.rows) - _MOST_ROWS) > 0:
+                    lines.append(f"... and {counted(more, 'more row')}")
+                lines += section.points
+        return "\n  ".join(lines)
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write one HTML file, to be read offline.
+
+        Args:
+            path: The .html file.
+            overwrite: Whether it may replace a file.
+
+        Raises:
+            InvalidInput: Something is there, or another suffix.
+            MissingExtra: matplotlib or Jinja2 is not installed.
+        """
+        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+        format_of(path, REPORT)
+        check_libraries()
+        template = page_template("softreach.support", "report.html.jinja")
+        pictures = [[(_source(f), c) for f, c in part.figures()] for part in self.sections]
+        page = template.render(report=self, parts=list(zip(self.sections, pictures, strict=True)))
+        with writing(path, overwrite=overwrite) as file:
+            file.write(page.encode())
 
 
 def check_libraries() -> None:
@@ -55,31 +97,8 @@ def check_libraries() -> None:
     check_installed(("matplotlib", "plot"), ("jinja2", "paper"))
 
 
-def write_page(
-    path: str | PathLike[str], sections: Sequence[Section], *, overwrite: bool, **head: str
-) -> None:
-    """Write a report.
-
-    Args:
-        path: The .html file.
-        sections: Its parts.
-        overwrite: Whether it may replace a file.
-        **head: `page`, `title`, `verdict`, its `state`, by which it is colored, and `facts`.
-
-    Raises:
-        MissingExtra: Jinja2 is not installed.
-    """
-    template = page_template("softreach.support", "report.html.jinja")
-    with writing(path, overwrite=overwrite) as file:
-        file.write(template.render(head, sections=sections).encode())
-
-
 def page_template(package: str, name: str) -> Any:
-    """A page to be filled, everything in it escaped.
-
-    Args:
-        package: Package that it lies in.
-        name: Name of the file.
+    """A page of a package to be filled, everything in it escaped.
 
     Raises:
         MissingExtra: Jinja2 is not installed.
@@ -97,8 +116,7 @@ def png_source(image: bytes) -> str:
     return f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
 
 
-def figure_source(figure: Any) -> str:
-    """Source of a figure of matplotlib inside a page; the figure is closed."""
+def _source(figure: Any) -> str:
     from matplotlib import pyplot as plt
 
     image = io.BytesIO()

@@ -73,7 +73,14 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
         raise InvalidInput(fspath(activations), rows, f"{len(tip)}, as {fspath(path)} has")
     activation = filament.from_columns(columns)
     difference = float(np.linalg.norm(tip - tip_positions(arm, activation, tol), axis=1).max())
-    _warn(arm, activation, difference)
+    low, high = arm.bounds.T
+    if (activation < low).any() or (activation > high).any():
+        warn("activations leave the bounds of the design: widen them before asking for its set")
+    if difference > _SAME * arm.length:
+        warn(
+            f"tips differ by up to {difference / arm.length:.2g} L from those of this design: "
+            "compare its numbers, and the order and scale of its sectors, with the filament",
+        )
     cloud = schema.cloud_dataset(
         arm, activation, tip, seed=0, sampler="ActiveFilaments.jl", tol=tol
     )
@@ -117,18 +124,6 @@ CLOUD_PAIR: Formats = {".csv": FileFormat()}
 """Format of `write_cloud`."""
 
 
-def _warn(arm: Manipulator, activation: Array, difference: float) -> None:
-    low, high = arm.bounds.T
-    if (activation < low).any() or (activation > high).any():
-        text = "activations leave the bounds of the design: widen them before asking for its set"
-        warn(text)
-    if difference > _SAME * arm.length:
-        warn(
-            f"tips differ by up to {difference / arm.length:.2g} L from those of this design: "
-            "compare its numbers, and the order and scale of its sectors, with the filament",
-        )
-
-
 def _table(path: Path, columns: int, meaning: str) -> Array:
     name = fspath(path)
     if not path.is_file():
@@ -143,7 +138,11 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
     except InvalidInput:
         raise
     except (ValueError, OverflowError, MemoryError) as error:
-        raise InvalidInput(name, _reason(error), "rows of comma-separated numbers") from None
+        text = str(error).partition(";")[0] or type(error).__name__
+        if match := _NO_NUMBER.search(text):
+            text = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
+        text = "no text" if isinstance(error, UnicodeDecodeError) else text
+        raise InvalidInput(name, text, "rows of comma-separated numbers") from None
     if table.shape[1] != columns:
         size = counted(table.shape[1], "column")
         raise InvalidInput(name, size, f"{columns}: {meaning}")
@@ -151,12 +150,3 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
         row = int(np.argmin(good)) + 1
         raise InvalidInput(f"{name}, row {row}", table[row - 1].tolist(), "finite numbers")
     return table
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, UnicodeDecodeError):
-        return "no text"
-    text = str(error).partition(";")[0] or type(error).__name__
-    if match := _NO_NUMBER.search(text):
-        text = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
-    return text

@@ -147,7 +147,6 @@ def _angle(angle: _Value, length: float) -> Angle:
 
 
 def _bounds(definition: _Value, activation: list[_Value]) -> list[tuple[tuple[float, float], ...]]:
-    """(lower, upper) of each sector of each ring."""
     gammas = [sectors.of("γ").numbers(sectors.of("N").number()) for sectors in activation]
     if "γBounds" not in definition.value:
         low, high = _BOUNDS

@@ -196,8 +196,13 @@ def is_from_inside_out(rings: Sequence[FilamentRing]) -> bool:
 
 def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
     base, section = float(arm.profile.radius(0.0)), arm.section
-    families = list(_families(arm))
-    shared = Counter(ring for ring, _, _ in families)
+    names = [ring.name for ring in section.rings]
+    firsts = np.cumsum([0, *(fiber.bundles for fiber in arm.fibers)]).tolist()
+    places = [
+        fiber.ring % len(names) if isinstance(fiber.ring, int) else names.index(fiber.ring)
+        for fiber in arm.fibers
+    ]
+    shared = Counter(places)
     for k, ring in enumerate(section.rings):
         share = max(shared[k], 1)
         body = FilamentRing(
@@ -210,38 +215,19 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
         )
         if not shared[k]:
             yield body
-        for place, first, fiber in families:
+        for place, first, fiber in zip(places, firsts, arm.fibers, strict=False):
             if place == k:
-                yield _with_sectors(body, arm, fiber, first)
-
-
-def _families(arm: Manipulator) -> Iterator[tuple[int, int, FiberArchitecture]]:
-    first = 0
-    for fiber in arm.fibers:
-        yield _place(arm.section, fiber.ring), first, fiber
-        first += fiber.bundles
-
-
-def _place(section: Section, which: int | str) -> int:
-    if isinstance(which, int):
-        return which % len(section.rings)
-    return [ring.name for ring in section.rings].index(which)
-
-
-def _with_sectors(
-    body: FilamentRing, arm: Manipulator, fiber: FiberArchitecture, first: int
-) -> FilamentRing:
-    angle = fiber.helical_angle_on(arm.profile, arm.section)
-    pairs = (fiber.bounds * body.scale).tolist()
-    return replace(
-        body,
-        angle=angle if isinstance(angle, Pieces) else float(angle),  # pyright: ignore[reportArgumentType]
-        extent=fiber.extent,
-        offset=fiber.offset,
-        bounds=tuple((low, high) for low, high in pairs),
-        bundles=tuple(range(first, first + fiber.bundles)),
-        name=fiber.name,
-    )
+                angle = fiber.helical_angle_on(arm.profile, arm.section)
+                pairs = (fiber.bounds * body.scale).tolist()
+                yield replace(
+                    body,
+                    angle=angle if isinstance(angle, Pieces) else float(angle),  # pyright: ignore[reportArgumentType]
+                    extent=fiber.extent,
+                    offset=fiber.offset,
+                    bounds=tuple((low, high) for low, high in pairs),
+                    bundles=tuple(range(first, first + fiber.bundles)),
+                    name=fiber.name,
+                )
 
 
 def _modulus(material: Material) -> float:
@@ -253,13 +239,6 @@ def _density(arm: Manipulator) -> float | None:
     if any(layer.material.density is None for layer in arm.section.layers):
         return None
     return float(arm.section.mass_per_length(1.0)) / math.pi
-
-
-def _check_section(section: Section, there: str) -> None:
-    if section.measured is not None:
-        raise InvalidInput("section.measured", section.measured, f"None {there}")
-    if section.bore_ratio > 0:
-        raise InvalidInput("bore_ratio", section.bore_ratio, f"0 {there}")
 
 
 def _check_expressible(arm: Manipulator) -> None:
@@ -274,7 +253,10 @@ def _check_expressible(arm: Manipulator) -> None:
     taper = arm.profile.taper
     if 0 < abs(taper) < _SMALLEST_TAPER:
         raise InvalidInput("taper", f"{taper:g} rad", f"0 or at least {_SMALLEST_TAPER:g} {there}")
-    _check_section(arm.section, there)
+    if arm.section.measured is not None:
+        raise InvalidInput("section.measured", arm.section.measured, f"None {there}")
+    if arm.section.bore_ratio > 0:
+        raise InvalidInput("bore_ratio", arm.section.bore_ratio, f"0 {there}")
     for actuator in arm.actuators:
         if not isinstance(actuator, FiberArchitecture):
             kind = type(actuator).__name__

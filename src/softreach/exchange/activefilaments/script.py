@@ -9,9 +9,8 @@ from os import PathLike
 from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.exchange.activefilaments.filament import Angle, Filament, FilamentRing, filament_of
-from softreach.support.arguments import as_flag, as_path
-from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.text import write_text
 
 __all__ = ["FILAMENT_SCRIPT", "design_script", "write_design"]
 
@@ -39,10 +38,7 @@ def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool
             a bore, or other actuators than fibers along all of it; or something else is there.
         NotWritten: It cannot be written.
     """
-    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    script = design_script(arm)
-    with writing(path, overwrite=overwrite) as file:
-        file.write(script.encode())
+    write_text(path, design_script(arm), overwrite=overwrite)
 
 
 def design_script(arm: Manipulator) -> str:
@@ -58,7 +54,10 @@ def design_script(arm: Manipulator) -> str:
 def _body(filament: Filament) -> Iterator[str]:
     yield "rings = ["
     for ring in filament.rings:
-        yield f"    {_ring(ring, filament.length)},{_comment(ring)}"
+        mechanics = _mechanics(ring.young_modulus, ring.poisson_ratio)
+        geometry = f"Geometry({ring.inner_radius!r}, {ring.outer_radius!r})"
+        fibers = f"FiberArchitecture({_angle(ring.angle, filament.length)})"
+        yield f"    Ring({mechanics}, {geometry}, {fibers}),{_comment(ring)}"
     yield "]"
     inside = _mechanics(filament.core_modulus, filament.core_poisson_ratio)
     inner = filament.rings[0].inner_radius
@@ -83,12 +82,6 @@ def _activation(rings: Sequence[FilamentRing]) -> Iterator[str]:
         lows, highs = (_vector(pair[side] for pair in ring.bounds) for side in (0, 1))
         yield f"    ({lows}, {highs}),"
     yield "]"
-
-
-def _ring(ring: FilamentRing, length: float) -> str:
-    mechanics = _mechanics(ring.young_modulus, ring.poisson_ratio)
-    geometry = f"Geometry({ring.inner_radius!r}, {ring.outer_radius!r})"
-    return f"Ring({mechanics}, {geometry}, FiberArchitecture({_angle(ring.angle, length)}))"
 
 
 def _comment(ring: FilamentRing) -> str:

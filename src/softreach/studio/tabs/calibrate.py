@@ -10,7 +10,6 @@ import numpy as np
 
 from softreach.calibration.calibration import Calibration
 from softreach.calibration.measurements import read_measurements, read_table
-from softreach.calibration.report import error_cells, error_head, number_rows, remarks
 from softreach.studio import markup
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.jobs.calibration import Bench, DrawSample, FitArm
@@ -124,13 +123,13 @@ def _residuals_text(bench: Bench, session: Session) -> str:
 
 
 def _summary(result: Calibration) -> str:
-    unit = result.arm.length_unit
-    tables = (
-        (("number", "calibrated", "design"), number_rows(result, unit)),
-        (error_head(unit), error_cells(result, unit)),
-    )
-    parts = [markup.table(h, [[(cell,) for cell in row] for row in rows]) for h, rows in tables]
-    lines = [*remarks(result, unit)]
+    report = result.report()
+    parts, lines = [], []
+    for part in report.sections:
+        if part.rows and part.is_printed:
+            parts.append(markup.table(part.head, [[(cell,) for cell in row] for row in part.rows]))
+        lines += part.points
+    lines.append(report.verdict)
     if not result.fit.converged:
         lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
     return "".join([*parts, *map(markup.paragraph, lines)])

@@ -19,6 +19,7 @@ import os
 import secrets
 import shutil
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -41,6 +42,9 @@ __all__ = [
 
 MARK = ".softreach-"
 """Beginning of the names of what is being written, and of its two names at the end."""
+
+_PATIENCE = 5.0
+"""Seconds in which threads of libraries end that still write into a folder after Ctrl-C."""
 
 StrPath = str | os.PathLike[str]
 Foreign = Callable[[Path], str]
@@ -167,7 +171,8 @@ def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False
             sync(place.parent)  # before the old one goes
             _discard(old)
         finally:
-            for _ in range(3):  # threads of libraries may still write into it after Ctrl-C
+            deadline = time.monotonic() + _PATIENCE
+            while building.exists() and time.monotonic() < deadline:
                 shutil.rmtree(building, ignore_errors=True)
             _rename_what_is_whole(place)  # after Ctrl-C between two renames
 
@@ -221,7 +226,6 @@ def _beside(place: Path) -> Path:
 
 
 def _siblings(place: Path) -> tuple[Path, Path]:
-    """Names of the whole new folder and of the whole old one."""
     return place.with_name(f"{place.name}{MARK}new"), place.with_name(f"{place.name}{MARK}old")
 
 

@@ -1,17 +1,24 @@
-"""Text that others wrote, read up to a limit."""
+"""Text that others wrote, read up to a limit, and text of ours, written whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import re
 import stat
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import InvalidInput
+from softreach.support.files.atomic import writing
+from softreach.support.files.formats import TABLES, format_of
 
-__all__ = ["MEGABYTE", "read_text", "tables_of", "text_of"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["MEGABYTE", "read_text", "tables_of", "text_of", "write_table", "write_text"]
 
 MEGABYTE = 1_000_000
 
@@ -55,6 +62,30 @@ def text_of(name: str, shown: str, content: bytes, most: int) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> None:
+    """Write text in UTF-8.
+
+    Raises:
+        InvalidInput: Something is there, and `overwrite` is not given.
+        NotWritten: It cannot be written.
+    """
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    with writing(path, overwrite=overwrite) as file:
+        file.write(text.encode())
+
+
+def write_table(path: str | os.PathLike[str], table: pd.DataFrame, *, overwrite: bool) -> None:
+    """Write a CSV, as `write_text`."""
+    format_of(as_path("path", path), TABLES)
+    text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
+    write_text(path, text, overwrite=overwrite)
+
+
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{64}}")
+"""A key of so many parts with dots, which takes the parser as many steps as the square of them."""
+
+
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
     """The tables of TOML text.
 
@@ -65,6 +96,8 @@ def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]
     Raises:
         ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
     """
+    if _LONG_KEY.search(text):
+        raise ValueError("a key has more than 64 parts with dots")
     try:
         tables = tomllib.loads(text, parse_float=number)
         if not _fit_64_bits(tables):
