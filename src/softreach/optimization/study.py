@@ -126,7 +126,8 @@ class Study:
         with _quiet():
             trials = self._storage.get_trials(deepcopy=False)
         for record in (trial.user_attrs for trial in trials[self._seen :]):
-            self._kept.setdefault(record[_KEY], Candidate.from_dict(record[_JUDGED]))
+            if _KEY in record:  # what others added by Optuna itself has none
+                self._kept.setdefault(record[_KEY], Candidate.from_dict(record[_JUDGED]))
         self._seen = len(trials)
 
     def _trial(self, candidate: Candidate, attributes: dict[str, Any]) -> Any:
