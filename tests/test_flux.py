@@ -16,6 +16,7 @@ from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
 from softreach.workspace.flux import grid_faces, signed_volume
+from softreach.workspace.image import DIAGONAL
 from softreach.workspace.measure import extrapolated_hull
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
@@ -254,6 +255,14 @@ def test_corners_of_the_box_are_corners_of_the_mesh(arm, accuracy):
     assert found.volume_error < 3e-7 * found.volume
     slope = volume_gradient(arm(), "length", accuracy=accuracy)
     assert slope.volume_error < 1e-3 * abs(slope.volume)
+
+
+@pytest.mark.parametrize("arm", [designs.filament, designs.minimal_trunk, designs.lce_arm])
+def test_a_surface_found_in_a_raster_leaves_no_spike_out(arm):
+    found = solid(arm(), accuracy=0.05)
+    corners = found.tip_map.tips(found.tip_map.box.corners())
+    outer = corners[~found.image.are_deep(corners)]
+    assert found.surface().distance(outer).max() < DIAGONAL * found.image.lattice.cell
 
 
 def test_the_route_is_told_in_the_dataset():

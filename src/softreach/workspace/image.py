@@ -18,6 +18,8 @@ from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
 
+DIAGONAL = math.sqrt(3.0)
+"""Of a cell, in edges."""
 _STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
 _BYTES = 16  # of a cell: two counts, and what questions make of them
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
@@ -155,7 +157,7 @@ class Image:
         from scipy.ndimage import map_coordinates
 
         at = self.lattice.coordinates(points).T
-        return map_coordinates(self.signed_field, at, order=1, cval=np.inf) < -np.sqrt(3.0)
+        return map_coordinates(self.signed_field, at, order=1, cval=np.inf) < -DIAGONAL
 
     @lazy
     def signed_field(self) -> Array:

@@ -19,7 +19,7 @@ from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
 from softreach.workspace.boundary import boundary_surface
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
-from softreach.workspace.image import Image
+from softreach.workspace.image import DIAGONAL, Image
 from softreach.workspace.measure import Estimate
 from softreach.workspace.redundant import cells_of
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
@@ -145,8 +145,8 @@ class ReachableSolid(ReachableSet):
         For the route "flux" it is the image of the faces of the activation box, on which its
         vertices lie exactly; for more than three free bundles a surface of tips, which is wrapped
         around parts of any thinness and leaves corners out by up to half a cell, and so it is for
-        three where the set is thinner than two cells. Otherwise it is found in the raster, which
-        leaves corners out by up to a cell. Parts that add up to less than the error of the volume
+        three where the set is thinner than two cells. Otherwise it is found in the raster, and
+        wrapped where that leaves a corner out by more than the diagonal of a cell. Parts that add up to less than the error of the volume
         are left out.
 
         Raises:
@@ -238,7 +238,14 @@ class ReachableSolid(ReachableSet):
     def _boundary(self) -> Surface:
         if isinstance(self._covering, ReachedCells):
             return self._covering.wrap
-        return boundary_surface(self._covering, self.volume)
+        surface, cell = boundary_surface(self._covering, self.volume), self.image.lattice.cell
+        if self.lost_share or self.tip_map.supports_unstable:
+            return surface
+        corners = self.tip_map.tips(self.tip_map.box.corners())
+        outer = corners[~self._covering.are_deep(corners)]
+        if (surface.distance(outer) > DIAGONAL * cell).any():  # a spike that no center is in
+            return cells_of(self.tip_map, cell).wrap
+        return surface
 
     @lazy
     def _covering(self) -> Image | ReachedCells:
