@@ -146,8 +146,8 @@ class ReachableSolid(ReachableSet):
         vertices lie exactly; for more than three free bundles a surface of tips, which is wrapped
         around parts of any thinness and leaves corners out by up to half a cell, and so it is for
         three where the set is thinner than two cells. Otherwise it is found in the raster, and
-        wrapped where that leaves a corner out by more than the diagonal of a cell. Parts that add up to less than the error of the volume
-        are left out.
+        wrapped where that leaves a corner out by more than the diagonal of a cell. Parts that add
+        up to less than the error of the volume are left out.
 
         Raises:
             MissingExtra: scikit-image is not installed.
