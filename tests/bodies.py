@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev
 
 from softreach.arm import Loads, Manipulator
 from softreach.arm.tables import tables
-from softreach.rod.loaded.shooting import Equilibria, Rung
+from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import Body
 from tests.oracles import rod
@@ -29,9 +29,9 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
 
 
 def loaded_slowly(solver: Solver, gamma: np.ndarray) -> Equilibria:
-    """Equilibria found by the most patient continuation alone."""
+    """Equilibria found by continuation in the load alone."""
     equilibria = solver.empty(len(gamma))
-    solver.again(gamma, np.arange(len(gamma)), Rung.PATIENT, equilibria)
+    solver.slowly(gamma, np.arange(len(gamma)), equilibria)
     return equilibria
 
 

@@ -16,7 +16,6 @@ from softreach.rod.free import FreeRod
 from softreach.rod.loaded import rod as loaded_module
 from softreach.rod.loaded import solver as equilibrium
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.shooting import Rung
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
@@ -332,7 +331,6 @@ def test_what_is_stable_at_once_is_stable_and_the_same_when_loaded_slowly():
     found = solver.find(gamma)
     slowly = loaded_slowly(solver, gamma)
     both = found.status != TipStatus.NO_EQUILIBRIUM
-    assert (found.rung == Rung.DIRECT).mean() > 0.5
     np.testing.assert_allclose(found.tips[both], slowly.tips[both], atol=1e-7)
     np.testing.assert_array_equal(found.status, slowly.status)
 

@@ -190,9 +190,10 @@ def equilibria(
         crossing = ", ".join(_crossing(loaded.loads, loaded.tables.axes[0]))
         allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
         raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
-    solver = _resolving(Solver(loaded.tables, loaded.unloaded_steps, rod.tol), at)
-    branch = solver.find(at)
-    known = branch.frame[has_tip(branch.status)]
+    branch = loaded.equilibria(at)
+    known = branch.frame[has_tip(branch.status), :3]  # as the tip sees it
+    whole = replace(loaded.tables, longest=np.inf)
+    solver = _resolving(Solver(whole, loaded.unloaded_steps, rod.tol), at)
     solver, roots = _accurate(solver, at, _search(solver, at, known))
     result = _judged(rod, solver, at, roots, known)
     return replace(result, activation=gamma[0])

@@ -15,10 +15,9 @@ from softreach.arm.tables import tables
 from softreach.kernels.lanes import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod, linear_strains, per_length
-from softreach.rod.loaded.phase import check_phase
 from softreach.rod.loaded.shapes import Shapes
 from softreach.rod.loaded.shooting import Equilibria
-from softreach.rod.loaded.solver import LATER_RUNGS, Solver
+from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.steps import (
     UNJUDGED,
     Differences,
@@ -51,6 +50,7 @@ __all__ = ["LoadedRod"]
 Array = NDArray[np.float64]
 
 _BLOCK = BLOCK // 8  # samples per task
+_SLOWLY = 8 * LANES  # samples per task that follows a branch
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,14 +78,8 @@ class LoadedRod(ArmRod):
 
     @lazy
     def tables(self) -> LoadTables:
-        """Tables for the kernels.
-
-        Raises:
-            InvalidInput: Loads so heavy that no walk from tip to base keeps its digits.
-        """
-        tables = LoadTables(self.arm, self.loads, self.body)
-        check_phase(self.arm, tables.phase)
-        return tables
+        """Tables for the kernels."""
+        return LoadTables(self.arm, self.loads, self.body)
 
     @property
     def steps(self) -> int:
@@ -146,10 +140,9 @@ class LoadedRod(ArmRod):
         equilibria = solver.empty(len(gamma))
         blocks = parallel.blocks(len(gamma), _BLOCK)
         parallel.run(partial(solver.direct, gamma[b], equilibria.of(b)) for b in blocks)
-        for rung in LATER_RUNGS:
-            rows = solver.doubtful(equilibria, rung)
-            blocks = parallel.blocks(len(rows), LANES)
-            parallel.run(partial(solver.again, gamma, rows[b], rung, equilibria) for b in blocks)
+        rows = solver.doubtful(equilibria)
+        blocks = parallel.blocks(len(rows), _SLOWLY)
+        parallel.run(partial(solver.slowly, gamma, rows[b], equilibria) for b in blocks)
         drop(lost, equilibria.status, equilibria.tips, equilibria.margin)
         return equilibria
 

@@ -75,7 +75,7 @@ def _enough(
     while steps <= max(_MOST_STEPS, _FINER * at_all):
         solver = solver_of(steps)
         allowed = tol * solver.tables.arm.length / _SAFETY
-        equilibria = solver.find(gamma, patient=False)
+        equilibria = solver.find(gamma)
         settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
         errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
         if not len(errors):

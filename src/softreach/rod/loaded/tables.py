@@ -122,6 +122,11 @@ class LoadTables:
         moments += [load.moment for load in loads.point_loads]
         return bool((np.abs(across) <= 1e-14 * size).all()) and not np.any(moments)
 
+    @property
+    def frame_size(self) -> int:
+        """Numbers by which the nodes of an arm tell how they see the world."""
+        return self.segments * (3 if self.one_direction else 6)
+
     @lazy
     def at_tip(self) -> Array:
         """Weight of the payload along the axes, its lever, force and moment that follow, (12,)."""
