@@ -271,13 +271,13 @@ def respond(gamma, tip, frames, tables, slopes, compliance, trace):
             g, h = node_world(turn_at(work, TURN, i), frames, row, 0, size)
             put_world(w, G, i, g, h)
             _begin(w, columns, units, tip, i)
-        if trace.shape[0] > 0:
-            _keep(w, unloaded[0], STEP_ROWS * LANES, trace[first:, 0])
         for s in range(count):
             for k in range(firsts[s], firsts[s + 1]):
                 if moments[k].any():
                     for i in range(LANES):
                         _push(w, columns, moments[k], i)
+                if k == 0 and trace.shape[0] > 0:
+                    _keep(w, unloaded[k], STEP_ROWS * LANES, trace[first:, 0])
                 copy(w, REST, unloaded[k], 0, STEP_ROWS * LANES)
                 _step_state(w, scalars[k])
                 if wanted:

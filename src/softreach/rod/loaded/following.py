@@ -90,8 +90,9 @@ def follow(
         guess = _units(frame[rows] + h[:, None] * slopes[rows])
         gamma, share = path.at(rows, to)
         found = solver.careful(gamma, guess, share)
-        turn = _turn(found.frame - guess)
-        off = np.linalg.norm(found.tips - tips[rows] - h[:, None] * moves[rows], axis=1) / length
+        with np.errstate(all="ignore"):  # of what is not found
+            turn = _turn(found.frame - guess)
+            off = np.linalg.norm(found.tips - tips[rows] - h[:, None] * moves[rows], axis=1) / length
         is_first = steps_known[rows] == 0
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
         most = np.where(is_first, 2.0, 1.0) * allowed
