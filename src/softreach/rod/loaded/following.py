@@ -19,7 +19,7 @@ from softreach.rod.loaded.shooting import Shots
 if TYPE_CHECKING:
     from softreach.rod.loaded.solver import Solver
 
-__all__ = ["Followed", "Path", "follow"]
+__all__ = ["Followed", "Path", "follow", "turn_between", "units"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -87,11 +87,11 @@ def follow(
             break
         to = np.minimum(1.0, place[rows] + step[rows])
         h = to - place[rows]
-        guess = _units(frame[rows] + h[:, None] * slopes[rows])
+        guess = units(frame[rows] + h[:, None] * slopes[rows])
         gamma, share = path.at(rows, to)
         found = solver.careful(gamma, guess, share)
         with np.errstate(all="ignore"):  # of what is not found
-            turn = _turn(found.frame - guess)
+            turn = turn_between(found.frame, guess)
             off = np.linalg.norm(found.tips - tips[rows] - h[:, None] * moves[rows], axis=1) / length
         is_first = steps_known[rows] == 0
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
@@ -112,12 +112,13 @@ def follow(
     return Followed(shots, place, slopes, ended)
 
 
-def _units(frames: Array) -> Array:
+def units(frames: Array) -> Array:
     """Frames whose directions have unit length."""
-    axes = frames.reshape(len(frames), -1, 3)
+    axes = frames.reshape(len(frames), frames.shape[1] // 3, 3)
     return (axes / np.linalg.norm(axes, axis=2, keepdims=True)).reshape(frames.shape)
 
 
-def _turn(change: Array) -> Array:
-    """The largest change of a direction, shape (n,)."""
-    return np.linalg.norm(change.reshape(len(change), -1, 3), axis=2).max(axis=1)
+def turn_between(frames: Array, others: Array) -> Array:
+    """The largest change of a direction [rad], shape (n,)."""
+    change = (frames - others).reshape(len(frames), frames.shape[1] // 3, 3)
+    return np.linalg.norm(change, axis=2).max(axis=1)

@@ -81,7 +81,7 @@ class PushingTip:
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
         known = solver.find(sample) if near is None else solver.near(sample, near.equilibrium)
-        response = solver.respond(sample, compliance=True, known=known)
+        response = solver.respond(sample, known, compliance=True)
         slopes = np.empty_like(response.twists[:, :3])
         position_slopes(response.tips, response.twists, slopes)
         retreat = response.compliance[0] @ self.direction

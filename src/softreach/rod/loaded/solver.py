@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.tables import tables
-from softreach.kernels.loaded.grid_values import interpolate
 from softreach.kernels.loaded.response import TRACE
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import linear_strains
-from softreach.rod.loaded.following import Path, follow
 from softreach.rod.loaded.shapes import Shapes, shapes_of
 from softreach.rod.loaded.shooting import (
     CAREFUL,
@@ -33,14 +31,14 @@ from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support import parallel
 from softreach.support.lazy import lazy
 
+if TYPE_CHECKING:
+    from softreach.rod.loaded.postures import Postures
+
 Array = NDArray[np.float64]
 
-_DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _ALL = np.ones(1)
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
-_NODES = {1: 33, 2: 33, 3: 17, 4: 9}
-"""Nodes per free bundle: at most a few thousand equilibria, some ten milliseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +54,9 @@ class Solver:
     tables: LoadTables
     steps: int
     tol: float
-    starts: StartGrid | None = None
-    """Grid of equilibria to begin from."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "steps", max(self.steps, self.tables.phase.fewest_steps))
-
-    def with_starts(self, box: ActivationBox) -> Solver:
-        """The same, beginning from equilibria on a grid over the box where that is worth it."""
-        sizes = grid_sizes(box)
-        if sizes is None:
-            return self
-        grid = StartGrid.over(box, sizes, lambda gamma: self.find(gamma).frame)
-        return Solver(self.tables, self.steps, self.tol, grid)
 
     @lazy
     def _fine(self) -> StepTables:
@@ -106,43 +94,25 @@ class Solver:
         """Room for n equilibria."""
         return Equilibria.empty(n, self.tables.frame_size)
 
+    @lazy
+    def postures(self) -> Postures:
+        """Postures of the arm, by lines from rest."""
+        from softreach.rod.loaded.postures import Postures
+
+        arm = self.tables.arm
+        return Postures(self, ActivationBox.between(arm.bounds, arm.bundle_names))
+
     def find(self, gamma: Array) -> Equilibria:
-        """The equilibria of activations (n, bundles), on the calling thread."""
-        equilibria = self.empty(len(gamma))
-        self.direct(gamma, equilibria)
-        rows = self.doubtful(equilibria)
-        if len(rows):
-            self.slowly(gamma, rows, equilibria)
-        return equilibria
-
-    def direct(self, gamma: Array, equilibria: Equilibria) -> None:
-        """Newton's method, all load at once, for some activations (n, bundles)."""
-        guesses = None if self.starts is None else self.starts.at(gamma)
-        self._put(gamma, slice(None), self.quick(gamma, guesses), equilibria)
-
-    def doubtful(self, equilibria: Equilibria) -> NDArray[np.intp]:
-        """Rows that are to be searched again."""
-        lost = ~has_tip(equilibria.status)
-        return np.flatnonzero(lost | (equilibria.margin < _DOUBTFUL))
-
-    def slowly(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
-        """The load grown in steps along the branch, for some rows of all activations."""
-        at = gamma[rows]
-        none, all_ = np.zeros(len(rows)), np.ones(len(rows))
-        start = self.careful(at, None, none)
-        path = Path(at, at, none, all_)
-        followed = follow(self, path, start, stable=False)
-        self._put(gamma, rows, followed.shots, equilibria)
-        ended = rows[followed.has_ended]
-        equilibria.status[ended] = TipStatus.NO_EQUILIBRIUM
+        """The postures at activations (n, bundles), on the calling thread."""
+        return self.postures.find(gamma)
 
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
         equilibria = self.empty(len(gamma))
-        self._put(gamma, slice(None), self.quick(gamma, known.frame), equilibria)
+        self.put(gamma, slice(None), self.quick(gamma, known.frame), equilibria)
         return equilibria
 
-    def _put(
+    def put(
         self,
         gamma: Array,
         rows: slice | NDArray[np.intp],
@@ -201,20 +171,20 @@ class Solver:
     def respond(
         self,
         gamma: Array,
+        known: Equilibria,
         *,
         compliance: bool = False,
         directions: bool = False,
-        known: Equilibria | None = None,
     ) -> Response:
         """Tips with their derivatives, theory (74); NaN where there is no equilibrium.
 
         Args:
             gamma: Activations (n, bundles).
+            known: Their equilibria, with these steps.
             compliance: Whether to tell ∂r/∂F.
             directions: Whether to tell the tangents of the tips.
-            known: Their equilibria, with these steps.
         """
-        known, fine = self.find(gamma) if known is None else known, self._fine
+        fine = self._fine
         lost = ~has_tip(known.status)
         rows = np.where(lost, lost.argmin(), np.arange(len(gamma)))  # none is walked in vain
         answers = {"slopes": True, "compliance": compliance, "trace": directions}
@@ -275,43 +245,3 @@ class Solver:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
         at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
         return at_ends[rows]
-
-
-def grid_sizes(box: ActivationBox) -> tuple[int, ...] | None:
-    """Nodes for every bundle, or None for more free bundles than a grid can hold."""
-    nodes = _NODES.get(box.dimension)
-    if nodes is None:
-        return None
-    return tuple(nodes if free else 1 for free in box.is_free)
-
-
-@dataclass(frozen=True, eq=False)
-class StartGrid:
-    """Frames of the tip at the nodes of a grid."""
-
-    box: ActivationBox
-    sizes: tuple[int, ...]
-    frames: Array
-    """`Equilibria.frame` of the nodes."""
-
-    @classmethod
-    def over(
-        cls, box: ActivationBox, sizes: tuple[int, ...], find: Callable[[Array], Array]
-    ) -> StartGrid:
-        """Solve at the nodes.
-
-        Args:
-            box: The activations within bounds.
-            sizes: Nodes for every bundle.
-            find: Frames of activations (n, bundles).
-        """
-        ends = zip(box.low, box.high, sizes, strict=True)
-        axes = np.meshgrid(*(np.linspace(*end) for end in ends), indexing="ij")
-        return cls(box, sizes, find(np.stack(axes, axis=-1).reshape(-1, box.bundles)))
-
-    def at(self, gamma: Array) -> Array:
-        """Frames to begin from."""
-        sizes = np.array(self.sizes)
-        frames = np.empty((len(gamma), self.frames.shape[1]))
-        interpolate(self.frames, gamma, self.box.low, (sizes - 1) / self.box.scales, sizes, frames)
-        return frames

@@ -72,10 +72,15 @@ def _enough(
     solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
 ) -> int | None:
     tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
+    known: Equilibria | None = None
     while steps <= max(_MOST_STEPS, _FINER * at_all):
         solver = solver_of(steps)
         allowed = tol * solver.tables.arm.length / _SAFETY
-        equilibria = solver.find(gamma)
+        if known is None:
+            known = solver.find(gamma)
+            held = has_tip(known.status)
+            gamma, known = gamma[held], known.of(held)
+        equilibria = solver.near(gamma, known)
         settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
         errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
         if not len(errors):

@@ -82,6 +82,8 @@ class LoadTables:
     body: Body
     longest: float = field(default=PHASE_OF_SEGMENT, kw_only=True)
     """Phase of the longest segment between nodes [rad]."""
+    twist: float = field(default=0.0, kw_only=True)
+    """Of the arm at rest [rad/m], beside that of its design."""
 
     @lazy
     def nodes(self) -> Array:
@@ -212,12 +214,14 @@ class LoadTables:
         z = profile.station(gauss)
         at = tables(self.arm, z.ravel())
         growth = at.growth.reshape(*z.shape, bundles)  # whose rotations alone are asked for
-        return rod.pack(
+        pieces = rod.pack(
             wide[:, None] * profile.radius(z),
             growth,
             growth,
             at.curvature.reshape(*z.shape, 3, bundles),
         )
+        pieces[:, 3::4, -1] += self.twist  # u3 at rest
+        return pieces
 
     def _forces(self, z: Array) -> Array:
         """Dead force n [N] at the nodes of steps, theory (60), (step, 5, 3)."""
@@ -279,11 +283,13 @@ class TipForceTables(LoadTables):
         """The same with another size of the force [N]."""
         kept = self.origin or self
         parts = self.arm, self.loads, self.body, self.direction, force
-        return TipForceTables(*parts, origin=kept, longest=self.longest)
+        return TipForceTables(*parts, origin=kept, longest=self.longest, twist=self.twist)
 
     @lazy
     def _given(self) -> LoadTables:
-        return LoadTables(self.arm, self.loads, self.body, longest=self.longest)
+        return LoadTables(
+            self.arm, self.loads, self.body, longest=self.longest, twist=self.twist
+        )
 
     @lazy
     def axes(self) -> Array:
