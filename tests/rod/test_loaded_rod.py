@@ -256,7 +256,7 @@ def upright():
 
 MANY = -5 / 3 * np.random.default_rng(1).random((100, 3))
 EQUAL = np.linspace(-5 / 3, 0.0, 20)[:, None] + np.zeros(3)
-STABLE, UNSTABLE, NONE, _ = TipStatus
+STABLE, UNSTABLE, NONE, _, SNAPS = TipStatus
 AMONG = {
     "along one direction": (rubber(TRUNK, KINDS["payload with a lever"]), MANY, {STABLE}),
     "across it": (rubber(TRUNK, KINDS["tip force"]), MANY, {STABLE}),

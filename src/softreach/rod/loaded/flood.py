@@ -45,10 +45,10 @@ class Flood:
 
     box: ActivationBox
     sizes: tuple[int, ...]
-    frames: Array
-    """`Equilibria.frame` of the nodes, the last bundle varying fastest, shape (node, component)."""
-    tips: Array
-    """r of the nodes [m], shape (node, 3); NaN where none is held."""
+    nodes: Array
+    """Activations, the last bundle varying fastest, shape (node, bundles)."""
+    held: Shots
+    """Postures of the nodes; not found where none is held."""
     is_whole: Mask
     """True for cells whose edges are all on one branch, shape of the cells."""
 
@@ -69,15 +69,23 @@ class Flood:
 
     def at(self, gamma: Array) -> tuple[Array, Mask]:
         """Frames to begin from, and mask of activations where they are known."""
-        sizes, frames = np.array(self.sizes), np.empty((len(gamma), self.frames.shape[1]))
-        scale = (sizes - 1) / self.box.scales
-        interpolate(self.frames, gamma, self.box.low, scale, sizes, frames)
+        sizes, of_nodes = np.array(self.sizes), self.held.frame
+        frames, scale = np.empty((len(gamma), of_nodes.shape[1])), (sizes - 1) / self.box.scales
+        interpolate(of_nodes, gamma, self.box.low, scale, sizes, frames)
         last = np.maximum(sizes - 2, 0)
         with np.errstate(invalid="ignore"):
             cells = np.clip(np.floor((gamma - self.box.low) * scale).astype(np.intp), 0, last)
         is_known = self.is_whole[tuple(cells.T)]
-        frames[~is_known] = self.frames[0]
+        frames[~is_known] = of_nodes[self.held.is_found.argmax()]
         return units(frames), is_known
+
+    def nearest(self, gamma: Array) -> tuple[Array, Shots]:
+        """The nodes next to some activations, and the postures there."""
+        sizes = np.array(self.sizes)
+        place = np.rint((gamma - self.box.low) * ((sizes - 1) / self.box.scales)).astype(np.intp)
+        place = np.clip(place, 0, sizes - 1)
+        nodes = np.ravel_multi_index(tuple(place.T), self.sizes) if len(sizes) else place[:, 0]
+        return self.nodes[nodes], Shots(*(each[nodes] for each in self.held))
 
 
 class _Flooding:
@@ -93,20 +101,19 @@ class _Flooding:
         self.linked = np.zeros((len(sizes), n), bool)  # to the next node along each axis
 
     def run(self, rest: Array, start: Shots) -> Flood:
-        scaled = (self.gamma - rest) / self.box.scales
-        nearest = int((scaled**2).sum(axis=1).argmin())
+        self.scaled = (self.gamma - rest) / self.box.scales
+        nearest = int((self.scaled**2).sum(axis=1).argmin())
         found = self._followed(rest[None], self.gamma[[nearest]], start, None)
         self._keep(np.array([nearest]), found)
         front = np.flatnonzero(self.is_known)
         while len(front):
             front = self._wave(front)
         self._link()
-        tips = np.where(self.is_known[:, None], self.states.tips, np.nan)
-        return Flood(self.box, self.sizes, self.states.frame, tips, self._whole_cells())
+        held = self._shots(np.arange(len(self.gamma)))
+        return Flood(self.box, self.sizes, self.gamma, held, self._whole_cells())
 
     def _followed(self, begin: Array, end: Array, start: Shots, slope: Array | None) -> Shots:
-        ones = np.ones(len(begin))
-        return follow(self.solver, Path(begin, end, ones, ones), start, slope=slope).shots
+        return follow(self.solver, Path.under_all_loads(begin, end), start, slope=slope).shots
 
     def _keep(self, nodes: Index, found: Shots) -> None:
         good = found.is_found
@@ -133,8 +140,10 @@ class _Flooding:
         for axis in range(len(self.sizes)):
             for way in (-1, 1):
                 to, inside = self._neighbors(front, axis, way)
-                edges.append(np.stack([front, to, np.full_like(to, axis), np.full_like(to, way)])[:, inside])
+                edge = front, to, np.full_like(to, axis), np.full_like(to, way)
+                edges.append(np.stack(edge)[:, inside])
         left, before = np.concatenate(edges, axis=1), self.is_known.copy()
+        left = left[:, np.argsort(self._from_line(left[0], left[1]), kind="stable")]
         while True:
             left = left[:, ~self.is_known[left[1]]]
             _, first = np.unique(left[1], return_index=True)
@@ -143,6 +152,12 @@ class _Flooding:
             self._grow(*left[:, first])
             left = np.delete(left, first, axis=1)
         return np.flatnonzero(self.is_known & ~before)
+
+    def _from_line(self, nodes: Index, ends: Index) -> Array:
+        """How far nodes are from the lines from rest to others, in ranges."""
+        at, line = self.scaled[nodes], self.scaled[ends]
+        share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
+        return np.linalg.norm(at - share[:, None] * line, axis=1)
 
     def _grow(self, origin: Index, to: Index, axis: Index, way: Index) -> None:
         slopes = np.zeros_like(self.states.frame[origin])

@@ -42,6 +42,17 @@ class Path:
     """Of the loads, shape (n,)."""
     to_share: Array
 
+    @classmethod
+    def under_all_loads(cls, begin: Array, end: Array) -> Path:
+        """From activations to others."""
+        ones = np.ones(len(begin))
+        return cls(begin, end, ones, ones)
+
+    @classmethod
+    def of_loads(cls, gamma: Array) -> Path:
+        """From no load to all of it, at fixed activations."""
+        return cls(gamma, gamma, np.zeros(len(gamma)), np.ones(len(gamma)))
+
     def at(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
         """Activations and shares at places of some paths."""
         gamma = self.begin[rows] + t[:, None] * (self.end[rows] - self.begin[rows])

@@ -78,9 +78,9 @@ class Postures:
 
     def _hung(self, gamma: Array) -> Followed:
         """Loads put on the twin at fixed activations."""
-        none, all_ = np.zeros(len(gamma)), np.ones(len(gamma))
-        start = self.twin.careful(gamma, None, none)
-        return follow(self.twin, Path(gamma, gamma, none, all_), start)
+        path = Path.of_loads(gamma)
+        start = self.twin.careful(gamma, None, path.from_share)
+        return follow(self.twin, path, start)
 
     def find(self, gamma: Array) -> Equilibria:
         """Postures at activations (n, bundles), on the calling thread."""
@@ -126,37 +126,42 @@ class Postures:
 
     def by_line(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
         """Postures at some rows along the straight lines from rest."""
-        at = gamma[rows]
-        followed = self.followed(at)
-        on_twin = followed.shots
-        shots = self.solver.careful(at, on_twin.frame)
-        good = on_twin.is_found & shots.is_found & (shots.margin > 0.0)
-        good &= turn_between(shots.frame, on_twin.frame) < _POLISHED
-        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
-        snaps = followed.has_ended & (on_twin.margin < _LOST)
+        followed = self.followed(gamma[rows])
+        self._polish(gamma, rows, followed, equilibria)
+        snaps = followed.has_ended & (followed.shots.margin < _LOST)
         gone = equilibria.status[rows] == TipStatus.UNDECIDED
         equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
-        at_rest = ~np.any(at != self.rest_activation, axis=1)
+        at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
         if not self.is_held_at_rest and at_rest.any():
             self._unstable(gamma, rows[at_rest], equilibria)
 
+    def _polish(
+        self, gamma: Array, rows: NDArray[np.intp], followed: Followed, equilibria: Equilibria
+    ) -> None:
+        """Put down the postures of the arm beside those of its twin."""
+        on_twin = followed.shots
+        shots = self.solver.careful(gamma[rows], on_twin.frame)
+        good = on_twin.is_found & shots.is_found & (shots.margin > 0.0)
+        good &= turn_between(shots.frame, on_twin.frame) < _POLISHED
+        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
+
     def _unstable(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
         """The equilibrium in which nothing holds the arm at rest."""
-        at, none, all_ = gamma[rows], np.zeros(len(rows)), np.ones(len(rows))
-        start = self.solver.careful(at, None, none)
-        hung = follow(self.solver, Path(at, at, none, all_), start, stable=False)
+        path = Path.of_loads(gamma[rows])
+        start = self.solver.careful(gamma[rows], None, path.from_share)
+        hung = follow(self.solver, path, start, stable=False)
         self.solver.put(gamma, rows, hung.shots, equilibria)
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
-        n, ones = len(gamma), np.ones(len(gamma))
+        n = len(gamma)
         begin = np.repeat(self.rest_activation, n, axis=0)
         if self.is_held_at_rest:
             start = Shots(*(np.repeat(each, n, axis=0) for each in self.rest))
         else:
             begin = begin + _FIRST_PART * (gamma - begin)
             start = self._hung(begin).shots
-        return follow(self.twin, Path(begin, gamma, ones, ones), start)
+        return follow(self.twin, Path.under_all_loads(begin, gamma), start)
 
     def with_flood(self) -> Postures:
         """The same, with starts from a grid over the box where that is worth it."""
@@ -180,3 +185,15 @@ class FloodedPostures(Postures):
     def _guesses(self, gamma: Array) -> tuple[Array | None, Mask]:
         assert self.flood is not None
         return self.flood.at(gamma)
+
+    def by_line(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
+        """Postures at some rows from the nodes next to them; from rest where a cut is near."""
+        assert self.flood is not None
+        guesses, is_whole = self.flood.at(gamma[rows])
+        near, guesses = rows[is_whole], guesses[is_whole]
+        begin, start = self.flood.nearest(gamma[near])
+        path, slope = Path.under_all_loads(begin, gamma[near]), guesses - start.frame
+        self._polish(gamma, near, follow(self.twin, path, start, slope=slope), equilibria)
+        left = rows[equilibria.status[rows] != TipStatus.STABLE]
+        if len(left):
+            super().by_line(gamma, left, equilibria)
