@@ -28,10 +28,10 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
     return arm.replace(section=section, loads=loads)
 
 
-def loaded_slowly(solver: Solver, gamma: np.ndarray) -> Equilibria:
-    """Equilibria found by continuation in the load alone."""
+def by_lines(solver: Solver, gamma: np.ndarray) -> Equilibria:
+    """Postures found along lines from rest alone."""
     equilibria = solver.empty(len(gamma))
-    solver.slowly(gamma, np.arange(len(gamma)), equilibria)
+    solver.postures.by_line(gamma, np.arange(len(gamma)), equilibria)
     return equilibria
 
 

@@ -89,7 +89,7 @@ def cloud_dataset(
     return cloud
 
 
-_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided"
+_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided 4=snaps"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:

@@ -13,7 +13,7 @@ from softreach.rod import tip_map
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
-from tests.bodies import loaded_slowly, oracle_rod, rubber
+from tests.bodies import by_lines, oracle_rod, rubber
 from tests.oracles import loaded_rod
 
 TARGETS = slice(40, 60)  # with one tip of several stable activations among them
@@ -97,7 +97,7 @@ def test_every_root_is_a_stable_equilibrium_at_its_target(heavy, stable):
 
 def test_the_most_patient_continuation_finds_the_roots_stable_too(heavy, stable):
     rod, gamma = loaded(heavy), stable[2].activations[:100]
-    slowly = loaded_slowly(rod.solver, gamma)
+    slowly = by_lines(rod.solver, gamma)
     assert (slowly.status == TipStatus.STABLE).all()
     assert np.abs(slowly.tips - rod.tips(gamma)).max() <= 1e-6 * heavy.length
 

@@ -20,7 +20,7 @@ from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidDesign
-from tests.bodies import loaded_slowly, oracle_rod, rubber, uniform
+from tests.bodies import by_lines, oracle_rod, rubber, uniform
 from tests.oracles import column, elastica, loaded_rod
 
 TRUNK = designs.minimal_trunk()
@@ -324,12 +324,12 @@ def test_statistics_of_strains_count_only_arms_that_have_an_equilibrium(monkeypa
         np.testing.assert_allclose(found[name], expected[name], rtol=1e-9)
 
 
-def test_what_is_stable_at_once_is_stable_and_the_same_when_loaded_slowly():
+def test_what_is_stable_at_once_is_stable_and_the_same_when_by_lines():
     young = 1000 * 9.81 / (5.0 * TRUNK.profile.outer_radius**2)
     solver = Solver(loaded(Loads(gravity=UP), young=young).tables, 16, 1e-8)
     gamma = np.random.default_rng(2).uniform(-5 / 3, 0, (256, 3))
     found = solver.find(gamma)
-    slowly = loaded_slowly(solver, gamma)
+    slowly = by_lines(solver, gamma)
     both = found.status != TipStatus.NO_EQUILIBRIUM
     np.testing.assert_allclose(found.tips[both], slowly.tips[both], atol=1e-7)
     np.testing.assert_array_equal(found.status, slowly.status)

@@ -16,7 +16,7 @@ from softreach.rod.loaded.all_equilibria import equilibria
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import loaded_slowly, oracle_rod, rubber
+from tests.bodies import by_lines, oracle_rod, rubber
 from tests.oracles import column
 from tests.oracles.chain import Chain
 
@@ -174,7 +174,7 @@ def test_arms_that_lean_a_little_fall_to_the_side_they_lean_to():
     solver = solver_of(weighed(CYLINDER, 5.0))
     leaning = SYMMETRIC + np.array([0.0, 1.0, 0.0]) * [[1e-3], [0.003], [0.01]]
     gamma = np.concatenate([SYMMETRIC, leaning, leaning[:, [1, 0, 2]]])
-    found, slowly = solver.find(gamma), loaded_slowly(solver, gamma)
+    found, slowly = solver.find(gamma), by_lines(solver, gamma)
     assert (found.status[:3] == TipStatus.UNSTABLE).all()
     assert (found.status[3:] == TipStatus.STABLE).all()
     np.testing.assert_allclose(found.tips, slowly.tips, atol=1e-7)

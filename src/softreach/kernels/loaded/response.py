@@ -13,9 +13,22 @@ from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.lanes import LANES, copy, get, get_four, load_all, put, put_four, turn_at
 from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.rod_step import column_step, frame_tip
-from softreach.kernels.loaded.shooting import SHARE, F, G, M, Y, along, begin_tip, inverse_rows
+from softreach.kernels.loaded.shooting import (
+    SHARE,
+    F,
+    G,
+    M,
+    Y,
+    along,
+    begin_tip,
+    inverse_rows,
+    missing_turn,
+    node_world,
+    orthonormal,
+    put_world,
+    world,
+)
 from softreach.kernels.loaded.shooting import SIZE as SECTION
-from softreach.kernels.loaded.shooting import missing_turn, node_world, orthonormal, put_world, world
 from softreach.kernels.loaded.unloaded_frames import (
     NODE_ROWS,
     STEP_ROWS,
@@ -44,12 +57,14 @@ SIZE = STAGES + 132 * LANES
 _COLUMN_ROWS = 15
 _NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
 
+
 @inline
 def _node(w, c, n, i):
     at = REST + NODE_ROWS * n * LANES
     force = plus(times(w[SHARE + i], (c[n, 3], c[n, 4], c[n, 5])), get(w, F, i))
     d = get(w, at + LANES, i)
     return w[at + i], w[at + 4 * LANES + i], d, c[n, 0], c[n, 1], c[n, 2], force
+
 
 @inline
 def _nodes(w, c, i):
@@ -62,6 +77,7 @@ def _nodes(w, c, i):
             _node(w, c, 4, i),
         )
     )
+
 
 @inline
 def _drives(w, change, i):
@@ -76,6 +92,7 @@ def _drives(w, change, i):
             (e, t, get(w, DRIVE + 12 * LANES, i), unit),
         )
     )
+
 
 @pasted
 def _step_state(w, c):
@@ -94,6 +111,7 @@ def _step_state(w, c):
         put_four(w, STAGES + 96 * LANES, i, at[8])
         put_four(w, STAGES + 108 * LANES, i, at[9])
         put_four(w, STAGES + 120 * LANES, i, at[10])
+
 
 @pasted
 def _step_column(w, c, change):
@@ -118,6 +136,7 @@ def _step_column(w, c, change):
         put(w, COLUMN + 3 * LANES, i, dm)
         put(w, COLUMN + 6 * LANES, i, dy)
 
+
 @inline
 def _bend(w, lanes, bends):
     """Put Uγ at the nodes of a step into BEND; U at the nodes is (node, 3, bundle)."""
@@ -128,6 +147,7 @@ def _bend(w, lanes, bends):
             u = bends[n, 0, b], bends[n, 1, b], bends[n, 2, b]
             for i in range(LANES):
                 put(w, at, i, plus(get(w, at, i), times(lanes[b, i], u)))
+
 
 @inline
 def _drive(w, unloaded, bends, change, j):
@@ -148,6 +168,7 @@ def _drive(w, unloaded, bends, change, j):
             q = turn_at(unloaded, (STEP_ROWS + 4 * n) * LANES, i)
             put(w, DRIVE + 3 * n * LANES, i, turned(q, bend))
 
+
 @pasted
 def _step_columns(w, columns, first, bundles, lanes, unloaded, tables):
     """Step the tangents from the first: three of turns, `bundles` of activations, the others."""
@@ -167,6 +188,7 @@ def _step_columns(w, columns, first, bundles, lanes, unloaded, tables):
         _step_column(w, c, change)
         copy(columns[n], 0, w, COLUMN, 12 * LANES)
 
+
 @inline
 def _begin(w, columns, units, tip, i):
     """The tip, theory (67), with turns of the world about its axes, and unit forces along them."""
@@ -182,6 +204,7 @@ def _begin(w, columns, units, tip, i):
         if units > 0:
             columns[columns.shape[0] - 3 + n, (9 + n) * LANES + i] = 1.0
 
+
 @inline
 def _push(w, columns, moment, i):
     """A dead moment at the tip end of a step, theory (67)."""
@@ -192,10 +215,12 @@ def _push(w, columns, moment, i):
         dm = get(columns[n], 3 * LANES, i)
         put(columns[n], 3 * LANES, i, plus(dm, cross(get(columns[n], 0, i), m)))
 
+
 @inline
 def _combine(columns, at, i, s):
     values = get(columns[0], at, i), get(columns[1], at, i), get(columns[2], at, i)
     return combination(s, values)
+
 
 @inline
 def _clear(columns, axes, i):
@@ -222,6 +247,7 @@ def _clear(columns, axes, i):
     for n in range(3, columns.shape[0]):
         put(columns[n], 0, i, (0.0, 0.0, 0.0))
 
+
 @inline
 def _enter(w, columns, now, node, i):
     """Turn the world of a section to what a node sees, and what lies beyond with it."""
@@ -232,6 +258,7 @@ def _enter(w, columns, now, node, i):
     put_world(w, G, i, node[0], node[1])
     for n in range(3):
         put(columns[n], 0, i, node[n])
+
 
 @kernel
 def respond(gamma, tip, frames, tables, slopes, compliance, trace):
@@ -299,6 +326,7 @@ def respond(gamma, tip, frames, tables, slopes, compliance, trace):
                     _enter(w, columns, now, orthonormal(g, h), i)
         for i in range(here):
             _store(w, work, columns, first, i, bundles, slopes, compliance)
+
 
 @inline
 def _store(w, work, columns, first, i, bundles, slopes, compliance):

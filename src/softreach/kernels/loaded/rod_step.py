@@ -57,7 +57,12 @@ def _tangent_rate(node, n, m, yields, theta, dm, dn, drive):
     d_zeta = growth * axial * dot(d, dn) + d_growth * axial * dot(d, n) + d_length
     turned = plus(_mix(growth * bending, dm, d_beta, d), _mix(d_growth * bending, m, 1.0, d_turn))
     pushed = plus(_mix(d_beta, m, beta, dm), _mix(d_zeta, n, zeta, dn))
-    return plus(cross(turn, theta), turned), plus(cross(d, pushed), cross(d_turn, m)), turned, d_zeta
+    return (
+        plus(cross(turn, theta), turned),
+        plus(cross(d, pushed), cross(d_turn, m)),
+        turned,
+        d_zeta,
+    )
 
 
 # Forces along one direction: the last of a node is w.

@@ -27,7 +27,10 @@ from softreach.kernels.quaternion import back, turned
 from softreach.kernels.vector import combination, cross, dot, minus, plus, times
 
 __all__ = [
-    "FOUND", "base_directions", "solve_directions", "solve_frames",
+    "FOUND",
+    "base_directions",
+    "solve_directions",
+    "solve_frames",
 ]
 
 # Rows of the workspace, LANES numbers each.
@@ -318,10 +321,10 @@ def _turns_about(w, i):
 
 
 @inline
-def _carry_normal(w, i):
+def _carry_normal(w, at, h, i):
     """Turn H no more than it has to be to stay normal to G."""
-    g, h = get(w, G, i), get(w, H, i)
-    put(w, H, i, unit(minus(h, times(dot(g, h), g))))
+    g = get(w, at, i)
+    put(w, at + 3 * LANES, i, unit(minus(h, times(dot(g, h), g))))
 
 
 @inline
@@ -333,11 +336,19 @@ def _watch_directions(w, i):
     trace. Both are those of the whole arm beyond, of which `CARRIED` brings what lies beyond the
     segment.
     """
-    _carry_normal(w, i)
+    _carry_normal(w, G, get(w, H, i), i)
     _, a, b = _turns_about(w, i)
-    p, q, r, s = w[TURNS + i], w[TURNS + LANES + i], w[TURNS + 2 * LANES + i], w[TURNS + 3 * LANES + i]
+    p, q, r, s = (
+        w[TURNS + i],
+        w[TURNS + LANES + i],
+        w[TURNS + 2 * LANES + i],
+        w[TURNS + 3 * LANES + i],
+    )
     c, d, e, f = (
-        w[CARRIED + i], w[CARRIED + LANES + i], w[CARRIED + 2 * LANES + i], w[CARRIED + 3 * LANES + i]
+        w[CARRIED + i],
+        w[CARRIED + LANES + i],
+        w[CARRIED + 2 * LANES + i],
+        w[CARRIED + 3 * LANES + i],
     )
     t, u, v, z = a[1] * c + b[1] * e, a[1] * d + b[1] * f, a[2] * c + b[2] * e, a[2] * d + b[2] * f
     before, after = p * p + q * q + r * r + s * s, t * t + u * u + v * v + z * z
@@ -363,7 +374,12 @@ def _first_directions(w, i):
 
 @inline
 def _next_directions(w, i):
-    p, q, r, s = w[TURNS + i], w[TURNS + LANES + i], w[TURNS + 2 * LANES + i], w[TURNS + 3 * LANES + i]
+    p, q, r, s = (
+        w[TURNS + i],
+        w[TURNS + LANES + i],
+        w[TURNS + 2 * LANES + i],
+        w[TURNS + 3 * LANES + i],
+    )
     f = 1.0 / math.sqrt(p * p + q * q + r * r + s * s)
     _put_square(w, TURNS, i, f * p, f * q, f * r, f * s)
     _put_square(w, CARRIED, i, f * p, f * q, f * r, f * s)
@@ -380,7 +396,9 @@ def watch_frames(w, i):
     put_three(w, TURNS, i, after)
     p, q = adjugate_rows(before), adjugate_rows(after)
     sizes = size_of(before), size_of(after), size_of(p), size_of(q)
-    trace = (dot(p[0], after[0]) + dot(p[1], after[1]) + dot(p[2], after[2])) / (sizes[2] * sizes[1])
+    trace = (dot(p[0], after[0]) + dot(p[1], after[1]) + dot(p[2], after[2])) / (
+        sizes[2] * sizes[1]
+    )
     minors = dot(q[0], before[0]) + dot(q[1], before[1]) + dot(q[2], before[2])
     determinant = 3.0 * dot(q[0], after[0]) / (sizes[3] * sizes[1])
     minors /= sizes[3] * sizes[0]
@@ -574,7 +592,7 @@ def _search_with(in_space):
             before, node = nodes[n], nodes[n + 1]
             for i in range(LANES):
                 if not in_space:
-                    put_world(node, WORLD, i, get(node, WORLD, i), get(w, H, i))
+                    _carry_normal(node, WORLD, get(w, H, i), i)
                 arrive(w, node, i)
                 _answer(w, turns(w, i), before, node, i)
                 _enter(w, node, i)

@@ -103,7 +103,9 @@ def follow(
         found = solver.careful(gamma, guess, share)
         with np.errstate(all="ignore"):  # of what is not found
             turn = turn_between(found.frame, guess)
-            off = np.linalg.norm(found.tips - tips[rows] - h[:, None] * moves[rows], axis=1) / length
+            off = (
+                np.linalg.norm(found.tips - tips[rows] - h[:, None] * moves[rows], axis=1) / length
+            )
         is_first = steps_known[rows] == 0
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
         most = np.where(is_first, 2.0, 1.0) * allowed
@@ -126,7 +128,8 @@ def follow(
 def units(frames: Array) -> Array:
     """Frames whose directions have unit length."""
     axes = frames.reshape(len(frames), frames.shape[1] // 3, 3)
-    return (axes / np.linalg.norm(axes, axis=2, keepdims=True)).reshape(frames.shape)
+    size = np.linalg.norm(axes, axis=2, keepdims=True)
+    return (axes / np.maximum(size, 1e-300)).reshape(frames.shape)
 
 
 def turn_between(frames: Array, others: Array) -> Array:

@@ -10,7 +10,7 @@ is then polished on the arm itself.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ _NEAR_GUESS = 0.15  # [rad], of what is found from an interpolated frame
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PART = 0.02  # of every line, at which an arm that nothing holds at rest leans already
+_PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
 _HANGING = 4.0  # [rad] of phase, from which on the unloaded arm tells nothing of one that hangs
 
 
@@ -93,6 +94,8 @@ class Postures:
 
     def direct(self, gamma: Array, rows: slice, equilibria: Equilibria) -> None:
         """Newton's method from where the posture may be, at some rows; UNDECIDED where it fails."""
+        if not self.is_held_at_rest:
+            return
         guesses, known = self._guesses(gamma[rows])
         shots = self.solver.quick(gamma[rows], guesses)
         good = shots.is_found & (shots.margin > _DOUBTFUL) & known
@@ -107,7 +110,7 @@ class Postures:
     def _guesses(self, gamma: Array) -> tuple[Array | None, Mask]:
         """Frames of the unloaded arm, or of one that hangs along it; and where they are known."""
         tables, known = self.solver.tables, np.ones(len(gamma), bool)
-        if tables.phase.entire <= _HANGING:
+        if tables.phase.entire <= _HANGING or tables.axes[0, 2] < _PULLED:
             return None, known
         stations = np.append(tables.nodes[::-1], tables.arm.length)
         directors = self._unloaded.frames(gamma, stations).directors[:, ::-1]
@@ -131,9 +134,8 @@ class Postures:
         snaps = followed.has_ended & (followed.shots.margin < _LOST)
         gone = equilibria.status[rows] == TipStatus.UNDECIDED
         equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
-        at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
-        if not self.is_held_at_rest and at_rest.any():
-            self._unstable(gamma, rows[at_rest], equilibria)
+        if not self.is_held_at_rest and gone.any():
+            self._unstable(gamma, rows[gone], equilibria)
 
     def _polish(
         self, gamma: Array, rows: NDArray[np.intp], followed: Followed, equilibria: Equilibria
@@ -146,7 +148,7 @@ class Postures:
         self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
 
     def _unstable(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
-        """The equilibrium in which nothing holds the arm at rest."""
+        """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
         path = Path.of_loads(gamma[rows])
         start = self.solver.careful(gamma[rows], None, path.from_share)
         hung = follow(self.solver, path, start, stable=False)

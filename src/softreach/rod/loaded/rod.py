@@ -15,13 +15,14 @@ from softreach.arm.tables import tables
 from softreach.kernels.lanes import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod, linear_strains, per_length
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shapes import Shapes
 from softreach.rod.loaded.shooting import Equilibria
-from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.steps import (
     UNJUDGED,
     Differences,
+    check_steps,
     checked,
     fewest_steps,
     shape_differences,
@@ -79,8 +80,14 @@ class LoadedRod(ArmRod):
 
     @lazy
     def tables(self) -> LoadTables:
-        """Tables for the kernels."""
-        return LoadTables(self.arm, self.loads, self.body)
+        """Tables for the kernels.
+
+        Raises:
+            InvalidInput: Loads so heavy that no number of steps resolves what they do.
+        """
+        tables = LoadTables(self.arm, self.loads, self.body)
+        check_steps(self.arm, tables.phase)
+        return tables
 
     @property
     def steps(self) -> int:

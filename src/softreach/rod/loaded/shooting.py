@@ -87,7 +87,15 @@ def shoot(
     limits = search.widest, search.small, tiny
     steps = tuple(coarse), tuple(fine)
     solve(
-        _columns(gamma), tables.axes, tables.at_tip, given, *steps, limits, search.walks, shares, out
+        _columns(gamma),
+        tables.axes,
+        tables.at_tip,
+        given,
+        *steps,
+        limits,
+        search.walks,
+        shares,
+        out,
     )
     found = (out[:, -1] == kernels.FOUND) & np.isfinite(out[:, :-1]).all(axis=1)
     return Shots(out[:, :3], out[:, 3:-2], out[:, -2], found)
@@ -144,7 +152,7 @@ class Equilibria(NamedTuple):
         """Room for n."""
         return cls(
             np.full((n, 3), np.nan),
-            np.full(n, TipStatus.NO_EQUILIBRIUM, np.int8),
+            np.full(n, TipStatus.UNDECIDED, np.int8),
             np.full(n, np.nan),
             np.zeros((n, components)),
         )

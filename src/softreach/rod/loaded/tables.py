@@ -287,9 +287,7 @@ class TipForceTables(LoadTables):
 
     @lazy
     def _given(self) -> LoadTables:
-        return LoadTables(
-            self.arm, self.loads, self.body, longest=self.longest, twist=self.twist
-        )
+        return LoadTables(self.arm, self.loads, self.body, longest=self.longest, twist=self.twist)
 
     @lazy
     def axes(self) -> Array:
