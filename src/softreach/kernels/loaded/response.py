@@ -12,23 +12,18 @@ import numpy as np
 from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.lanes import LANES, copy, get, get_four, load_all, put, put_four, turn_at
 from softreach.kernels.loaded.explicit_rk8 import at_stages
-from softreach.kernels.loaded.rod_step import column_step, frame_tip
-from softreach.kernels.loaded.shooting import (
-    SHARE,
-    F,
-    G,
-    M,
-    Y,
+from softreach.kernels.loaded.frames import (
     along,
-    begin_tip,
     inverse_rows,
     missing_turn,
-    node_world,
     orthonormal,
     put_world,
     world,
 )
-from softreach.kernels.loaded.shooting import SIZE as SECTION
+from softreach.kernels.loaded.rod_step import column_step, frame_tip
+from softreach.kernels.loaded.section import SHARE, F, G, M, Y, begin_tip
+from softreach.kernels.loaded.section import SIZE as SECTION
+from softreach.kernels.loaded.shooting import node_world
 from softreach.kernels.loaded.unloaded_frames import (
     NODE_ROWS,
     STEP_ROWS,
@@ -261,7 +256,7 @@ def _enter(w, columns, now, node, i):
 
 
 @kernel
-def respond(gamma, tip, frames, tables, slopes, compliance, trace):
+def respond(gamma, tip, frames, tables, slopes, compliance, trace):  # noqa: C901
     """Responses of n rods in equilibrium, whatever is asked for.
 
     Args:

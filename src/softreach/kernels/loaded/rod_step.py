@@ -15,7 +15,8 @@ A tangent turns the world of a section by θ, so that δG = θ × G. It is (θ, 
     dθ = ω × θ + δω,  δn = θ × n + u1 G + u2 H + u3 G × H,
 
 driven by its values at the tip, by a change of force u, or by a change of activation: that changes
-λ by δλ and ℓ by δℓ, and turns the unloaded arm by δω̂ over the step as the frames of the walk see it.
+λ by δλ and ℓ by δℓ, and turns the unloaded arm by δω̂ over the step, as the frames of the walk see
+it.
 """
 
 from __future__ import annotations

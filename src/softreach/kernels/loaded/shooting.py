@@ -7,8 +7,7 @@ there is no unknown: what lies beyond is in equilibrium, so that it answers a tu
 those of unit turns at the next node; so each segment is walked with two or three of them, and one
 segment alone is single shooting.
 
-All turns at a node are along its world's axes G, H, G × H. Where all forces are along G a turn about
-it changes nothing: it is left out, and H is any direction normal to G.
+All turns at a node are along its world's axes G, H, G × H.
 """
 
 from __future__ import annotations
@@ -19,28 +18,56 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.lanes import LANES, get, load_all, put, turn_at
-from softreach.kernels.loaded.explicit_rk8 import at_stages
-from softreach.kernels.loaded.rod_step import direction_tip, direction_walk, frame_tip, frame_walk
-from softreach.kernels.loaded.unloaded_frames import NODE_ROWS, STEP_ROWS, TURN, rest_frames
+from softreach.kernels.loaded.frames import (
+    along,
+    inverse_rows,
+    missing_direction,
+    missing_turn,
+    normal_to,
+    product,
+    put_three,
+    put_world,
+    three,
+    unit,
+    world,
+)
+from softreach.kernels.loaded.section import (
+    FORCE,
+    MARGIN,
+    MOMENT,
+    SHARE,
+    THETA,
+    F,
+    G,
+    H,
+    M,
+    Y,
+    begin_tangents,
+    begin_tip,
+    carry_normal,
+    first_directions,
+    first_frames,
+    next_directions,
+    push,
+    step_direction_tip,
+    step_direction_walk,
+    step_frame_tip,
+    step_frame_walk,
+    turns_about,
+    turns_of,
+    watch_directions,
+    watch_frames,
+)
+from softreach.kernels.loaded.section import SIZE as SECTION
+from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, rest_frames
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.quaternion import back, turned
-from softreach.kernels.vector import combination, cross, dot, minus, plus, times
+from softreach.kernels.vector import combination, cross, dot, plus
 
-__all__ = [
-    "FOUND",
-    "base_directions",
-    "solve_directions",
-    "solve_frames",
-]
+__all__ = ["FOUND", "base_directions", "node_world", "solve_directions", "solve_frames"]
 
-# Rows of the workspace, LANES numbers each.
-G, H, M, Y, F = (3 * k * LANES for k in range(5))  # of the section; F: what follows, along G, H, K
-THETA, MOMENT, FORCE = (15 * LANES + 9 * k * LANES for k in range(3))  # three tangents
-TURNS = 42 * LANES  # of the section by the tangents, along G, H, K, 3 x 3
-CARRIED = 51 * LANES  # the same of the tip where the segment began, 2 x 2 of size 1
-MARGIN, DONE, LEFT, SHARE = (55 * LANES + k * LANES for k in range(4))
-SIZE = 59 * LANES
-
+# Rows of the workspace behind those of the section.
+DONE, LEFT, SIZE = (SECTION + k * LANES for k in range(3))
 # Rows of a node.
 WORLD = 0  # G, H: the unknown
 INVERSE = 6 * LANES  # its turn per turn at the end of the segment, 3 x 3
@@ -51,367 +78,6 @@ NODE = 39 * LANES
 
 AT_WORK, FOUND, GIVEN_UP = 0.0, 1.0, 3.0
 _CONTRACTION = 0.6
-_SINGULAR = 1e-12
-
-
-@inline
-def unit(v):
-    """v / |v|."""
-    return times(1.0 / math.sqrt(dot(v, v)), v)
-
-
-@inline
-def normal_to(g):
-    """A unit vector normal to g."""
-    s = math.copysign(1.0, g[2])
-    a = -1.0 / (s + g[2])
-    return 1.0 + s * g[0] * g[0] * a, s * g[0] * g[1] * a, -s * g[0]
-
-
-@inline
-def world(w, at, i):
-    """G, H and G × H."""
-    g, h = get(w, at, i), get(w, at + 3 * LANES, i)
-    return g, h, cross(g, h)
-
-
-@inline
-def orthonormal(g, h):
-    """G, H and G × H made of G, and of an H that may lean a little."""
-    g = unit(g)
-    h = unit(minus(h, times(dot(g, h), g)))
-    return g, h, cross(g, h)
-
-
-@inline
-def put_world(w, at, i, g, h):
-    """Write G, and H normal to it."""
-    axes = orthonormal(g, h)
-    put(w, at, i, axes[0])
-    put(w, at + 3 * LANES, i, axes[1])
-
-
-@inline
-def three(w, at, i):
-    """Three vectors of one lane: a matrix by its columns."""
-    return get(w, at, i), get(w, at + 3 * LANES, i), get(w, at + 6 * LANES, i)
-
-
-@inline
-def put_three(w, at, i, s):
-    """Write three vectors of one lane."""
-    put(w, at, i, s[0])
-    put(w, at + 3 * LANES, i, s[1])
-    put(w, at + 6 * LANES, i, s[2])
-
-
-@inline
-def _product(columns, c):
-    """Columns of a matrix times those of another."""
-    return combination(c[0], columns), combination(c[1], columns), combination(c[2], columns)
-
-
-@inline
-def along(axes, v):
-    """Components of v along three axes."""
-    return dot(axes[0], v), dot(axes[1], v), dot(axes[2], v)
-
-
-@inline
-def adjugate_rows(a):
-    """Rows of det(A) A⁻¹ for a matrix of columns a."""
-    return cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])
-
-
-@inline
-def size_of(a):
-    """Frobenius norm of a matrix."""
-    return math.sqrt(dot(a[0], a[0]) + dot(a[1], a[1]) + dot(a[2], a[2]))
-
-
-@inline
-def inverse_rows(a):
-    """Rows of the inverse; of a singular matrix, where a conjugate point is, of one near it."""
-    rows = adjugate_rows(a)
-    determinant = dot(rows[0], a[0])
-    least = _SINGULAR * size_of(a) * size_of(rows)
-    scale = 1.0 / math.copysign(max(abs(determinant), least), determinant)
-    return times(scale, rows[0]), times(scale, rows[1]), times(scale, rows[2])
-
-
-@inline
-def missing_turn(now, wanted):
-    """The rotation from one frame to another, along their axes."""
-    twice = plus(cross(now[0], wanted[0]), plus(cross(now[1], wanted[1]), cross(now[2], wanted[2])))
-    sine = 0.5 * math.sqrt(dot(twice, twice))
-    cosine = 0.5 * (dot(now[0], wanted[0]) + dot(now[1], wanted[1]) + dot(now[2], wanted[2]) - 1.0)
-    scale = 0.5 * (math.atan2(sine, cosine) / sine if sine > 1e-9 else 1.0)
-    return times(scale, along(now, twice))
-
-
-@inline
-def _missing_direction(now, wanted):
-    """The same of the first axes alone, as the sine of the angle between them."""
-    return 0.0, -dot(now[2], wanted[0]), dot(now[1], wanted[0])
-
-
-# A segment: state and tangents at its tip end, its steps, and the signs of no conjugate point.
-
-
-@inline
-def begin_tip(w, tip, i):
-    """The section at the tip, theory (67): weight along the axes, lever, force and moment there."""
-    share, axes = w[SHARE + i], world(w, G, i)
-    weight = combination((share * tip[0], share * tip[1], share * tip[2]), axes)
-    m = cross((tip[3], tip[4], tip[5]), weight)
-    put(w, M, i, plus(m, (share * tip[9], share * tip[10], share * tip[11])))
-    put(w, F, i, along(axes, (share * tip[6], share * tip[7], share * tip[8])))
-    put(w, Y, i, (0.0, 0.0, 0.0))
-
-
-@inline
-def _begin_tangents(w, tip, i):
-    """What turns of the world about its axes change there, theory (68)."""
-    share, axes = w[SHARE + i], world(w, G, i)
-    weight = combination((share * tip[0], share * tip[1], share * tip[2]), axes)
-    lever, f = (tip[3], tip[4], tip[5]), (share * tip[6], share * tip[7], share * tip[8])
-    put_three(w, THETA, i, axes)
-    for j in range(3):
-        put(w, MOMENT + 3 * j * LANES, i, cross(lever, cross(axes[j], weight)))
-        put(w, FORCE + 3 * j * LANES, i, along(axes, cross(f, axes[j])))
-
-
-@inline
-def _push(w, moment, tangents, i):
-    """A dead moment at the tip end of a step, theory (67)."""
-    share, axes = w[SHARE + i], world(w, G, i)
-    m = combination((share * moment[0], share * moment[1], share * moment[2]), axes)
-    put(w, M, i, plus(get(w, M, i), m))
-    if tangents:
-        for j in range(3):
-            at = MOMENT + 3 * j * LANES
-            turn = get(w, THETA + 3 * j * LANES, i)
-            put(w, at, i, plus(get(w, at, i), cross(turn, m)))
-
-
-@inline
-def _place(rest, c, n, i):
-    at = NODE_ROWS * n * LANES + i
-    d = rest[at + LANES], rest[at + 2 * LANES], rest[at + 3 * LANES]
-    return rest[at], rest[at + 4 * LANES], d, c[n, 0], c[n, 1], c[n, 2]
-
-
-@inline
-def _along_one(w, rest, c, n, i):
-    return (*_place(rest, c, n, i), w[SHARE + i] * c[n, 3])
-
-
-@inline
-def _direction_nodes(w, r, c, i):
-    return at_stages(
-        (
-            _along_one(w, r, c, 0, i),
-            _along_one(w, r, c, 1, i),
-            _along_one(w, r, c, 2, i),
-            _along_one(w, r, c, 3, i),
-            _along_one(w, r, c, 4, i),
-        )
-    )
-
-
-@inline
-def _dead_load(w, c, n, i):
-    return plus(times(w[SHARE + i], (c[n, 3], c[n, 4], c[n, 5])), get(w, F, i))
-
-
-@inline
-def _in_space(w, rest, c, n, i):
-    return (*_place(rest, c, n, i), _dead_load(w, c, n, i))
-
-
-@inline
-def _with_changes(w, rest, c, n, i):
-    u = three(w, FORCE, i)
-    return (*_place(rest, c, n, i), (_dead_load(w, c, n, i), u[0], u[1], u[2]))
-
-
-@inline
-def _frame_nodes(w, r, c, i):
-    return at_stages(
-        (
-            _in_space(w, r, c, 0, i),
-            _in_space(w, r, c, 1, i),
-            _in_space(w, r, c, 2, i),
-            _in_space(w, r, c, 3, i),
-            _in_space(w, r, c, 4, i),
-        )
-    )
-
-
-@inline
-def _changing_nodes(w, r, c, i):
-    return at_stages(
-        (
-            _with_changes(w, r, c, 0, i),
-            _with_changes(w, r, c, 1, i),
-            _with_changes(w, r, c, 2, i),
-            _with_changes(w, r, c, 3, i),
-            _with_changes(w, r, c, 4, i),
-        )
-    )
-
-
-@inline
-def _step_direction_walk(w, rest, c, i):
-    _, t1, t2 = three(w, THETA, i)
-    _, m1, m2 = three(w, MOMENT, i)
-    s = get(w, G, i), get(w, M, i), t1, m1, t2, m2
-    (g, m, t1, m1, t2, m2), _ = direction_walk(_direction_nodes(w, rest, c, i), s)
-    put(w, G, i, g)
-    put(w, M, i, m)
-    put(w, THETA + 3 * LANES, i, t1)
-    put(w, THETA + 6 * LANES, i, t2)
-    put(w, MOMENT + 3 * LANES, i, m1)
-    put(w, MOMENT + 6 * LANES, i, m2)
-
-
-@inline
-def _step_direction_tip(w, rest, c, i):
-    s = get(w, G, i), get(w, M, i), get(w, Y, i)
-    (g, m, y), _ = direction_tip(_direction_nodes(w, rest, c, i), s)
-    put(w, G, i, g)
-    put(w, M, i, m)
-    put(w, Y, i, y)
-
-
-@inline
-def _step_frame_walk(w, rest, c, i):
-    t, m = three(w, THETA, i), three(w, MOMENT, i)
-    s = get(w, G, i), get(w, H, i), get(w, M, i), t[0], m[0], t[1], m[1], t[2], m[2]
-    s, _ = frame_walk(_changing_nodes(w, rest, c, i), s)
-    put(w, G, i, s[0])
-    put(w, H, i, s[1])
-    put(w, M, i, s[2])
-    put_three(w, THETA, i, (s[3], s[5], s[7]))
-    put_three(w, MOMENT, i, (s[4], s[6], s[8]))
-
-
-@inline
-def _step_frame_tip(w, rest, c, i):
-    s = get(w, G, i), get(w, H, i), get(w, M, i), get(w, Y, i)
-    (g, h, m, y), _ = frame_tip(_frame_nodes(w, rest, c, i), s)
-    put(w, G, i, g)
-    put(w, H, i, h)
-    put(w, M, i, m)
-    put(w, Y, i, y)
-
-
-@inline
-def turns_of(w, i):
-    """The turns of the section by the tangents, along the axes of the world: columns of D."""
-    axes, theta = world(w, G, i), three(w, THETA, i)
-    return along(axes, theta[0]), along(axes, theta[1]), along(axes, theta[2])
-
-
-@inline
-def _turns_about(w, i):
-    """The same without turns about G, which change nothing."""
-    (_, h, k), (_, a, b) = world(w, G, i), three(w, THETA, i)
-    return (1.0, 0.0, 0.0), (0.0, dot(h, a), dot(k, a)), (0.0, dot(h, b), dot(k, b))
-
-
-@inline
-def _carry_normal(w, at, h, i):
-    """Turn H no more than it has to be to stay normal to G."""
-    g = get(w, at, i)
-    put(w, at + 3 * LANES, i, unit(minus(h, times(dot(g, h), g))))
-
-
-@inline
-def _watch_directions(w, i):
-    """Note whether the turns lost their independence during the step, theory (77), (78).
-
-    With P and Q the 2 x 2 matrices before and after, Q P⁻¹ is near a positive multiple of the
-    identity for a short step. One conjugate point within makes its determinant negative, two its
-    trace. Both are those of the whole arm beyond, of which `CARRIED` brings what lies beyond the
-    segment.
-    """
-    _carry_normal(w, G, get(w, H, i), i)
-    _, a, b = _turns_about(w, i)
-    p, q, r, s = (
-        w[TURNS + i],
-        w[TURNS + LANES + i],
-        w[TURNS + 2 * LANES + i],
-        w[TURNS + 3 * LANES + i],
-    )
-    c, d, e, f = (
-        w[CARRIED + i],
-        w[CARRIED + LANES + i],
-        w[CARRIED + 2 * LANES + i],
-        w[CARRIED + 3 * LANES + i],
-    )
-    t, u, v, z = a[1] * c + b[1] * e, a[1] * d + b[1] * f, a[2] * c + b[2] * e, a[2] * d + b[2] * f
-    before, after = p * p + q * q + r * r + s * s, t * t + u * u + v * v + z * z
-    determinant = 2.0 * (t * z - u * v) / after
-    trace = (t * s - u * r - v * q + z * p) / math.sqrt(before * after)
-    w[MARGIN + i] = min(w[MARGIN + i], min(determinant, trace))
-    _put_square(w, TURNS, i, t, u, v, z)
-
-
-@inline
-def _put_square(w, at, i, p, q, r, s):
-    w[at + i] = p
-    w[at + LANES + i] = q
-    w[at + 2 * LANES + i] = r
-    w[at + 3 * LANES + i] = s
-
-
-@inline
-def _first_directions(w, i):
-    _put_square(w, TURNS, i, 1.0, 0.0, 0.0, 1.0)
-    _put_square(w, CARRIED, i, 1.0, 0.0, 0.0, 1.0)
-
-
-@inline
-def _next_directions(w, i):
-    p, q, r, s = (
-        w[TURNS + i],
-        w[TURNS + LANES + i],
-        w[TURNS + 2 * LANES + i],
-        w[TURNS + 3 * LANES + i],
-    )
-    f = 1.0 / math.sqrt(p * p + q * q + r * r + s * s)
-    _put_square(w, TURNS, i, f * p, f * q, f * r, f * s)
-    _put_square(w, CARRIED, i, f * p, f * q, f * r, f * s)
-
-
-@inline
-def watch_frames(w, i):
-    """The same of 3 x 3 matrices.
-
-    A conjugate point within gives Q P⁻¹ a negative eigenvalue, hence a negative trace, sum of
-    principal minors or determinant. Each segment begins with the identity.
-    """
-    before, after = three(w, TURNS, i), turns_of(w, i)
-    put_three(w, TURNS, i, after)
-    p, q = adjugate_rows(before), adjugate_rows(after)
-    sizes = size_of(before), size_of(after), size_of(p), size_of(q)
-    trace = (dot(p[0], after[0]) + dot(p[1], after[1]) + dot(p[2], after[2])) / (
-        sizes[2] * sizes[1]
-    )
-    minors = dot(q[0], before[0]) + dot(q[1], before[1]) + dot(q[2], before[2])
-    determinant = 3.0 * dot(q[0], after[0]) / (sizes[3] * sizes[1])
-    minors /= sizes[3] * sizes[0]
-    w[MARGIN + i] = min(w[MARGIN + i], min(determinant, min(trace, minors)))
-
-
-@inline
-def first_frames(w, i):
-    """Where a segment begins, the tangents are turns about the axes of the world."""
-    put_three(w, TURNS, i, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-
-
-# Nodes between segments.
 
 
 @inline
@@ -434,8 +100,8 @@ def _answer(w, turns, before, node, i):
         (rows[0][1], rows[1][1], rows[2][1]),
         (rows[0][2], rows[1][2], rows[2][2]),
     )
-    put_three(node, ANSWER, i, _product(three(w, MOMENT, i), columns))
-    put_three(node, ANSWER + 9 * LANES, i, _product(three(w, FORCE, i), columns))
+    put_three(node, ANSWER, i, product(three(w, MOMENT, i), columns))
+    put_three(node, ANSWER + 9 * LANES, i, product(three(w, FORCE, i), columns))
 
 
 @inline
@@ -551,13 +217,13 @@ def _store(w, nodes, work, first, here, tiny, out):
             out[row, -1] = AT_WORK
 
 
-def _search_with(in_space):
+def _search_with(in_space):  # noqa: C901
     """A search over all samples, for forces along one direction or, in space, for any loads."""
-    step_walk, step_tip = _step_direction_walk, _step_direction_tip
-    turns, missing = _turns_about, _missing_direction
-    watch, begin, go_on = _watch_directions, _first_directions, _next_directions
+    step_walk, step_tip = step_direction_walk, step_direction_tip
+    turns, missing = turns_about, missing_direction
+    watch, begin, go_on = watch_directions, first_directions, next_directions
     if in_space:
-        step_walk, step_tip = _step_frame_walk, _step_frame_tip
+        step_walk, step_tip = step_frame_walk, step_frame_tip
         turns, missing = turns_of, missing_turn
         watch, begin, go_on = watch_frames, first_frames, first_frames
 
@@ -576,7 +242,7 @@ def _search_with(in_space):
         firsts, scalars, moments = table[5], table[2], table[4]
         for i in range(LANES):
             start(w, nodes, tip, i)
-            _begin_tangents(w, tip, i)
+            begin_tangents(w, tip, i)
             begin(w, i)
             w[MARGIN + i] = 1.0
         for n in range(firsts.shape[0] - 1):
@@ -584,7 +250,7 @@ def _search_with(in_space):
                 r, c = rest[k], scalars[k]
                 if in_space and moments[k].any():
                     for i in range(LANES):
-                        _push(w, moments[k], True, i)
+                        push(w, moments[k], True, i)
                 for i in range(LANES):
                     step_walk(w, r, c, i)
                 for i in range(LANES):
@@ -592,7 +258,7 @@ def _search_with(in_space):
             before, node = nodes[n], nodes[n + 1]
             for i in range(LANES):
                 if not in_space:
-                    _carry_normal(node, WORLD, get(w, H, i), i)
+                    carry_normal(node, WORLD, get(w, H, i), i)
                 arrive(w, node, i)
                 _answer(w, turns(w, i), before, node, i)
                 _enter(w, node, i)
@@ -611,7 +277,7 @@ def _search_with(in_space):
                 r, c = rest[k], scalars[k]
                 if in_space and moments[k].any():
                     for i in range(LANES):
-                        _push(w, moments[k], False, i)
+                        push(w, moments[k], False, i)
                 for i in range(LANES):
                     step_tip(w, r, c, i)
             node = nodes[n + 1]
@@ -713,7 +379,7 @@ def base_directions(gamma, tip, directions, fine, out):
         for k in range(rest.shape[0]):
             r, c = rest[k], fine[2][k]
             for i in range(LANES):
-                _step_direction_tip(w, r, c, i)
+                step_direction_tip(w, r, c, i)
         for i in range(here):
             g = turned(back(turn_at(work, TURN, i)), get(w, G, i))
             for axis in range(3):
