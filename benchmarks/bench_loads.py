@@ -22,7 +22,6 @@ from benchmarks.bench_kernels import best_time, twelve_bundles
 from benchmarks.table import Row, print_table
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.shooting import Rung
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.support import parallel
 from softreach.workspace import reachable_set
@@ -183,14 +182,14 @@ def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
     arm = trunk(load_number, sr.Loads(gravity=BASES[base]), taper)
     loaded, free = LoadedRod(arm), FreeRod(arm)
     gamma = activations(loaded, n)
-    loaded.solver  # noqa: B018  makes the grid
-    cost = best_time(lambda: loaded.solver.find(gamma), repeat=2).cpu
+    loaded.prepare()  # makes the grid
+    cost = best_time(lambda: loaded.equilibria(gamma), repeat=2).cpu
     cost /= best_time(lambda: free.tips(gamma)).cpu
-    found = loaded.solver.find(gamma)
-    rungs = {"at once": Rung.DIRECT, "continued": Rung.CONTINUATION, "patient": Rung.PATIENT}
+    found = loaded.equilibria(gamma)
     ends = {
+        "stable": TipStatus.STABLE,
         "unstable": TipStatus.UNSTABLE,
-        "none": TipStatus.NO_EQUILIBRIUM,
+        "snaps": TipStatus.SNAPS,
         "undecided": TipStatus.UNDECIDED,
     }
     return {
@@ -199,7 +198,6 @@ def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
         "base": base,
         "steps": loaded.steps,
         "times a free tip": f"{cost:.0f}",
-        **{name: f"{np.mean(found.rung == rung):.2%}" for name, rung in rungs.items()},
         **{name: f"{np.mean(found.status == end):.2%}" for name, end in ends.items()},
         "error [L]": f"{_error(loaded, gamma, found):.1e}",
     }
@@ -207,7 +205,7 @@ def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
 
 def _error(loaded: LoadedRod, gamma: np.ndarray, found: sr.rod.Equilibria) -> float:
     """Largest tip error [L], where the arm is not about to lose its stability."""
-    settled = (found.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(found.margin) > MARGIN)
+    settled = has_tip(found.status) & (np.abs(found.margin) > MARGIN)
     finer = loaded.solver.halved().near(gamma[settled], found.of(settled))
     apart = np.linalg.norm(finer.tips - found.tips[settled], axis=1)
     return float(np.nanmax(apart)) / loaded.length

@@ -77,7 +77,7 @@ class PushingTip:
         Args:
             gamma: Activations, shape (bundles,).
             force: With which the tip pushes [N].
-            near: Response to begin with; None for the unloaded arm, by way of the whole load.
+            near: Response to begin with; None for the posture.
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
         known = solver.find(sample) if near is None else solver.near(sample, near.equilibrium)
@@ -100,7 +100,7 @@ class PushingTip:
         return float(np.linalg.norm(fine.tips[0] - response.tip))
 
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
-        """True if the arm that is activated first and loaded slowly then ends there."""
+        """True if the arm that is hung under the force too, and activated then, ends there."""
         branch = self._solver(force, self.steps).find(gamma[None])
         apart = float(np.linalg.norm(branch.tips[0] - response.tip))
         return apart <= self.rod.tol * self.rod.length
