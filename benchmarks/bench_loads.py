@@ -22,7 +22,7 @@ from benchmarks.bench_kernels import best_time, twelve_bundles
 from benchmarks.table import Row, print_table
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.support import parallel
 from softreach.workspace import reachable_set
 

@@ -53,7 +53,8 @@ def plot_equilibria(
     """Draw every equilibrium of an arm: stable ones solid, unstable ones dashed.
 
     The posture, which the tip map reports, is drawn as a body with its bundles, other stable ones
-    pale; of a ring one arm, and a dotted circle where its tip may be. An arrow shows the direction of gravity, or of the force that stands for it.
+    pale; of a ring one arm, and a dotted circle where its tip may be. An arrow shows the direction
+    of gravity, or of the force that stands for it.
 
     Args:
         equilibria: What `softreach.equilibria` returned.

@@ -84,8 +84,8 @@ class Flood:
         sizes = np.array(self.sizes)
         place = np.rint((gamma - self.box.low) * ((sizes - 1) / self.box.scales)).astype(np.intp)
         place = np.clip(place, 0, sizes - 1)
-        nodes = np.ravel_multi_index(tuple(place.T), self.sizes) if len(sizes) else place[:, 0]
-        return self.nodes[nodes], Shots(*(each[nodes] for each in self.held))
+        nodes = np.asarray(np.ravel_multi_index(tuple(place.T), self.sizes), np.intp)
+        return self.nodes[nodes], self.held.of(nodes)
 
 
 class _Flooding:

@@ -159,7 +159,7 @@ class Postures:
         n = len(gamma)
         begin = np.repeat(self.rest_activation, n, axis=0)
         if self.is_held_at_rest:
-            start = Shots(*(np.repeat(each, n, axis=0) for each in self.rest))
+            start = self.rest.of(np.zeros(n, np.intp))
         else:
             begin = begin + _FIRST_PART * (gamma - begin)
             start = self._hung(begin).shots

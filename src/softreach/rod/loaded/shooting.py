@@ -27,6 +27,10 @@ class Shots(NamedTuple):
     is_found: NDArray[np.bool_]
     """Mask of those that are equilibria, shape (n,)."""
 
+    def of(self, rows: NDArray[np.intp]) -> Shots:
+        """Some of them."""
+        return Shots(self.tips[rows], self.frame[rows], self.margin[rows], self.is_found[rows])
+
 
 class Search(NamedTuple):
     """Settings of a search by the kernels."""
@@ -159,7 +163,8 @@ class Equilibria(NamedTuple):
 
     def of(self, rows: slice | NDArray[np.bool_ | np.intp]) -> Equilibria:
         """Some of them; a slice shares memory."""
-        return Equilibria(*(each[rows] for each in self))
+        tips, status, margin, frame = self
+        return Equilibria(tips[rows], status[rows], margin[rows], frame[rows])
 
 
 class Response(NamedTuple):
