@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.flood import Flood, grid_sizes
 from softreach.rod.loaded.following import Followed, Path, follow, turn_between
@@ -37,6 +38,10 @@ _NEAR_GUESS = 0.15  # [rad], of what is found from an interpolated frame
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PART = 0.02  # of every line, at which an arm that nothing holds at rest leans already
+_AZIMUTHS = 2.0 * np.pi * np.arange(16) / 16  # at which a leaning arm is looked for
+_NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
+_SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
+_HEAVIEST = 20.0  # [rad] of phase, of single shooting
 _PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
 _HANGING = 4.0  # [rad] of phase, from which on the unloaded arm tells nothing of one that hangs
 
@@ -82,6 +87,51 @@ class Postures:
         path = Path.of_loads(gamma)
         start = self.twin.careful(gamma, None, path.from_share)
         return follow(self.twin, path, start)
+
+    def _leaning(self, gamma: Array) -> Shots:
+        """Where the twin leans beside rest that nothing holds: near the ring of it, or as hung."""
+        if not len(self._ring):
+            return self._hung(gamma).shots
+        shots = self.twin.careful(gamma, None)
+        shots.is_found[:] = False
+        for frame in self._ring:
+            left = np.flatnonzero(~shots.is_found)
+            if not len(left):
+                break
+            found = self.twin.careful(gamma[left], np.repeat(frame[None], len(left), axis=0))
+            good = found.is_found & (found.margin > _NEUTRAL)
+            for values, new in zip(shots, found, strict=True):
+                values[left[good]] = new[good]
+        return shots
+
+    @lazy
+    def _ring(self) -> Array:
+        """Frames in which an arm leans at rest that nothing holds upright, all around.
+
+        Shape (k, component); none under loads of several directions, or too heavy ones for single
+        shooting.
+        """
+        solver, rest, axis = self.solver, self.rest_activation, self.solver.tables.axes[0]
+        if not solver.tables.one_direction or solver.tables.phase.entire > _HEAVIEST:
+            return np.empty((0, solver.tables.frame_size))
+
+        def image(points: Array) -> Array:
+            images = solver.base_directions(rest, np.ascontiguousarray(points))
+            return images / np.linalg.norm(images, axis=1, keepdims=True)
+
+        if not is_axisymmetric(image, axis, _SYMMETRIC):
+            return np.empty((0, solver.tables.frame_size))
+        rings = pole_rings(image, axis, axis)
+        points = rings.points[rings.signs > 0]
+        frames, margin = solver.frames_facing(np.repeat(rest, len(points), axis=0), points)
+        frames = frames[margin > -_NEUTRAL].reshape(-1, solver.tables.segments, 3)
+        about, axes = np.zeros((len(_AZIMUTHS), 3, 3)), solver.tables.axes
+        about[:, 0, 0] = 1.0
+        about[:, 1, 1] = about[:, 2, 2] = np.cos(_AZIMUTHS)
+        about[:, 2, 1] = np.sin(_AZIMUTHS)
+        about[:, 1, 2] = -np.sin(_AZIMUTHS)
+        turns = axes.T @ about @ axes
+        return np.einsum("aij,knj->akni", turns, frames).reshape(-1, solver.tables.frame_size)
 
     def find(self, gamma: Array) -> Equilibria:
         """Postures at activations (n, bundles), on the calling thread."""
@@ -162,7 +212,7 @@ class Postures:
             start = self.rest.of(np.zeros(n, np.intp))
         else:
             begin = begin + _FIRST_PART * (gamma - begin)
-            start = self._hung(begin).shots
+            start = self._leaning(begin)
         return follow(self.twin, Path.under_all_loads(begin, gamma), start)
 
     def with_flood(self) -> Postures:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import tables
 from softreach.kernels.loaded.response import TRACE
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import linear_strains
+from softreach.rod.loaded.following import units
 from softreach.rod.loaded.shapes import Shapes, shapes_of
 from softreach.rod.loaded.shooting import (
     CAREFUL,
@@ -167,6 +169,19 @@ class Solver:
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
         shapes = shapes_of(at, trace, rows, self._force_at(table, rows), nowhere)
         return shapes.on_base(), margin
+
+    def frames_facing(self, gamma: Array, directions: Array) -> tuple[Array, Array]:
+        """Frames of arms whose tips see gravity along given directions, and their margins.
+
+        As `shapes_facing`, but of arms of any number of segments: frames as in `Equilibria`.
+        """
+        whole = self._fine._replace(firsts=np.array([0, len(self._fine.lengths)]))
+        tables = replace(self.tables, longest=np.inf)
+        trace = walk(gamma, tables, directions, whole, trace=True).trace
+        margin = shoot(gamma, tables, directions, whole, whole, MARGIN_ALONE, 0.0, _ALL).margin
+        turn = rotation_matrices(trace[:, -1, 12:16])
+        seen = trace[:, self._fine.firsts[:-1], :3] @ turn
+        return units(seen.reshape(len(gamma), self.tables.frame_size)), margin
 
     def respond(
         self,
