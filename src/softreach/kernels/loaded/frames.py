@@ -11,23 +11,6 @@ from softreach.kernels.compiler import inline
 from softreach.kernels.lanes import LANES, get, put
 from softreach.kernels.vector import combination, cross, dot, minus, plus, times
 
-__all__ = [
-    "adjugate_rows",
-    "along",
-    "inverse_rows",
-    "missing_direction",
-    "missing_turn",
-    "normal_to",
-    "orthonormal",
-    "product",
-    "put_three",
-    "put_world",
-    "size_of",
-    "three",
-    "unit",
-    "world",
-]
-
 _SINGULAR = 1e-12
 
 

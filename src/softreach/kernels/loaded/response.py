@@ -21,7 +21,7 @@ from softreach.kernels.loaded.frames import (
     world,
 )
 from softreach.kernels.loaded.rod_step import column_step, frame_tip
-from softreach.kernels.loaded.section import SHARE, F, G, M, Y, begin_tip
+from softreach.kernels.loaded.section import SHARE, F, G, M, Y, begin_tip, frame_nodes
 from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.shooting import node_world
 from softreach.kernels.loaded.unloaded_frames import (
@@ -54,27 +54,6 @@ _NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inline
-def _node(w, c, n, i):
-    at = REST + NODE_ROWS * n * LANES
-    force = plus(times(w[SHARE + i], (c[n, 3], c[n, 4], c[n, 5])), get(w, F, i))
-    d = get(w, at + LANES, i)
-    return w[at + i], w[at + 4 * LANES + i], d, c[n, 0], c[n, 1], c[n, 2], force
-
-
-@inline
-def _nodes(w, c, i):
-    return at_stages(
-        (
-            _node(w, c, 0, i),
-            _node(w, c, 1, i),
-            _node(w, c, 2, i),
-            _node(w, c, 3, i),
-            _node(w, c, 4, i),
-        )
-    )
-
-
-@inline
 def _drives(w, change, i):
     (a, b, c, d, e), (p, q, r, s, t) = change
     unit = get(w, COLUMN + 9 * LANES, i)
@@ -93,7 +72,7 @@ def _drives(w, change, i):
 def _step_state(w, c):
     """Step the states, and keep those at the stages."""
     for i in range(LANES):
-        s, at = frame_tip(_nodes(w, c, i), get_four(w, G, i))
+        s, at = frame_tip(frame_nodes(w, w, REST, c, i), get_four(w, G, i))
         put_four(w, G, i, s)
         put_four(w, STAGES, i, at[0])
         put_four(w, STAGES + 12 * LANES, i, at[1])
@@ -111,7 +90,7 @@ def _step_state(w, c):
 @pasted
 def _step_column(w, c, change):
     for i in range(LANES):
-        n, v = _nodes(w, c, i), _drives(w, change, i)
+        n, v = frame_nodes(w, w, REST, c, i), _drives(w, change, i)
         places = (
             (n[0], get_four(w, STAGES, i), v[0]),
             (n[1], get_four(w, STAGES + 12 * LANES, i), v[1]),

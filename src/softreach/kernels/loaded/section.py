@@ -16,6 +16,8 @@ from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.frames import (
     adjugate_rows,
     along,
+    missing_direction,
+    missing_turn,
     put_three,
     size_of,
     three,
@@ -25,35 +27,6 @@ from softreach.kernels.loaded.frames import (
 from softreach.kernels.loaded.rod_step import direction_tip, direction_walk, frame_tip, frame_walk
 from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
 from softreach.kernels.vector import combination, cross, dot, minus, plus, times
-
-__all__ = [
-    "FORCE",
-    "MARGIN",
-    "MOMENT",
-    "SHARE",
-    "SIZE",
-    "THETA",
-    "F",
-    "G",
-    "H",
-    "M",
-    "Y",
-    "begin_tangents",
-    "begin_tip",
-    "carry_normal",
-    "first_directions",
-    "first_frames",
-    "next_directions",
-    "push",
-    "step_direction_tip",
-    "step_direction_walk",
-    "step_frame_tip",
-    "step_frame_walk",
-    "turns_about",
-    "turns_of",
-    "watch_directions",
-    "watch_frames",
-]
 
 # Rows of the workspace, LANES numbers each.
 G, H, M, Y, F = (3 * k * LANES for k in range(5))  # of the section; F: what follows, along G, H, K
@@ -99,80 +72,60 @@ def push(w, moment, tangents, i):
             put(w, at, i, plus(get(w, at, i), cross(turn, m)))
 
 
-@inline
-def _place(rest, c, n, i):
-    at = NODE_ROWS * n * LANES + i
-    d = rest[at + LANES], rest[at + 2 * LANES], rest[at + 3 * LANES]
-    return rest[at], rest[at + 4 * LANES], d, c[n, 0], c[n, 1], c[n, 2]
+def _nodes_with(load):
+    """A function that has the nodes of the stages of a step, each with what loads it.
 
+    The unloaded arm is in the rows of `rest` from one on, the constants of the nodes are in `c`.
+    """
 
-@inline
-def _along_one(w, rest, c, n, i):
-    return (*_place(rest, c, n, i), w[SHARE + i] * c[n, 3])
+    @inline
+    def node(w, rest, first, c, n, i):
+        at = first + NODE_ROWS * n * LANES
+        place = rest[at + i], rest[at + 4 * LANES + i], get(rest, at + LANES, i)
+        return (*place, c[n, 0], c[n, 1], c[n, 2], load(w, c, n, i))
 
-
-@inline
-def _direction_nodes(w, r, c, i):
-    return at_stages(
-        (
-            _along_one(w, r, c, 0, i),
-            _along_one(w, r, c, 1, i),
-            _along_one(w, r, c, 2, i),
-            _along_one(w, r, c, 3, i),
-            _along_one(w, r, c, 4, i),
+    @inline
+    def nodes(w, rest, first, c, i):
+        return at_stages(
+            (
+                node(w, rest, first, c, 0, i),
+                node(w, rest, first, c, 1, i),
+                node(w, rest, first, c, 2, i),
+                node(w, rest, first, c, 3, i),
+                node(w, rest, first, c, 4, i),
+            )
         )
-    )
+
+    return nodes
 
 
 @inline
-def _dead_load(w, c, n, i):
+def _weight(w, c, n, i):
+    return w[SHARE + i] * c[n, 3]
+
+
+@inline
+def _force(w, c, n, i):
     return plus(times(w[SHARE + i], (c[n, 3], c[n, 4], c[n, 5])), get(w, F, i))
 
 
 @inline
-def _in_space(w, rest, c, n, i):
-    return (*_place(rest, c, n, i), _dead_load(w, c, n, i))
-
-
-@inline
-def _with_changes(w, rest, c, n, i):
+def _changing_force(w, c, n, i):
     u = three(w, FORCE, i)
-    return (*_place(rest, c, n, i), (_dead_load(w, c, n, i), u[0], u[1], u[2]))
+    return _force(w, c, n, i), u[0], u[1], u[2]
+
+
+_direction_nodes, _changing_nodes = _nodes_with(_weight), _nodes_with(_changing_force)
+frame_nodes = _nodes_with(_force)
+"""Nodes of a step under any loads."""
 
 
 @inline
-def _frame_nodes(w, r, c, i):
-    return at_stages(
-        (
-            _in_space(w, r, c, 0, i),
-            _in_space(w, r, c, 1, i),
-            _in_space(w, r, c, 2, i),
-            _in_space(w, r, c, 3, i),
-            _in_space(w, r, c, 4, i),
-        )
-    )
-
-
-@inline
-def _changing_nodes(w, r, c, i):
-    return at_stages(
-        (
-            _with_changes(w, r, c, 0, i),
-            _with_changes(w, r, c, 1, i),
-            _with_changes(w, r, c, 2, i),
-            _with_changes(w, r, c, 3, i),
-            _with_changes(w, r, c, 4, i),
-        )
-    )
-
-
-@inline
-def step_direction_walk(w, rest, c, i):
-    """Step of G, M and two tangents of one lane."""
+def _step_direction_walk(w, rest, c, i):
     _, t1, t2 = three(w, THETA, i)
     _, m1, m2 = three(w, MOMENT, i)
     s = get(w, G, i), get(w, M, i), t1, m1, t2, m2
-    (g, m, t1, m1, t2, m2), _ = direction_walk(_direction_nodes(w, rest, c, i), s)
+    (g, m, t1, m1, t2, m2), _ = direction_walk(_direction_nodes(w, rest, 0, c, i), s)
     put(w, G, i, g)
     put(w, M, i, m)
     put(w, THETA + 3 * LANES, i, t1)
@@ -185,18 +138,17 @@ def step_direction_walk(w, rest, c, i):
 def step_direction_tip(w, rest, c, i):
     """Step of G, M and the tip."""
     s = get(w, G, i), get(w, M, i), get(w, Y, i)
-    (g, m, y), _ = direction_tip(_direction_nodes(w, rest, c, i), s)
+    (g, m, y), _ = direction_tip(_direction_nodes(w, rest, 0, c, i), s)
     put(w, G, i, g)
     put(w, M, i, m)
     put(w, Y, i, y)
 
 
 @inline
-def step_frame_walk(w, rest, c, i):
-    """Step of G, H, M and three tangents."""
+def _step_frame_walk(w, rest, c, i):
     t, m = three(w, THETA, i), three(w, MOMENT, i)
     s = get(w, G, i), get(w, H, i), get(w, M, i), t[0], m[0], t[1], m[1], t[2], m[2]
-    s, _ = frame_walk(_changing_nodes(w, rest, c, i), s)
+    s, _ = frame_walk(_changing_nodes(w, rest, 0, c, i), s)
     put(w, G, i, s[0])
     put(w, H, i, s[1])
     put(w, M, i, s[2])
@@ -205,10 +157,9 @@ def step_frame_walk(w, rest, c, i):
 
 
 @inline
-def step_frame_tip(w, rest, c, i):
-    """Step of G, H, M and the tip."""
+def _step_frame_tip(w, rest, c, i):
     s = get(w, G, i), get(w, H, i), get(w, M, i), get(w, Y, i)
-    (g, h, m, y), _ = frame_tip(_frame_nodes(w, rest, c, i), s)
+    (g, h, m, y), _ = frame_tip(frame_nodes(w, rest, 0, c, i), s)
     put(w, G, i, g)
     put(w, H, i, h)
     put(w, M, i, m)
@@ -216,14 +167,14 @@ def step_frame_tip(w, rest, c, i):
 
 
 @inline
-def turns_of(w, i):
+def _turns_of(w, i):
     """The turns of the section by the tangents, along the axes of the world: columns of D."""
     axes, theta = world(w, G, i), three(w, THETA, i)
     return along(axes, theta[0]), along(axes, theta[1]), along(axes, theta[2])
 
 
 @inline
-def turns_about(w, i):
+def _turns_about(w, i):
     """The same without turns about G, which change nothing."""
     (_, h, k), (_, a, b) = world(w, G, i), three(w, THETA, i)
     return (1.0, 0.0, 0.0), (0.0, dot(h, a), dot(k, a)), (0.0, dot(h, b), dot(k, b))
@@ -237,7 +188,7 @@ def carry_normal(w, at, h, i):
 
 
 @inline
-def watch_directions(w, i):
+def _watch_directions(w, i):
     """Note whether the turns lost their independence during the step, theory (77), (78).
 
     With P and Q the 2 x 2 matrices before and after, Q P⁻¹ is near a positive multiple of the
@@ -246,7 +197,7 @@ def watch_directions(w, i):
     segment.
     """
     carry_normal(w, G, get(w, H, i), i)
-    _, a, b = turns_about(w, i)
+    _, a, b = _turns_about(w, i)
     p, q, r, s = (
         w[TURNS + i],
         w[TURNS + LANES + i],
@@ -276,15 +227,13 @@ def _put_square(w, at, i, p, q, r, s):
 
 
 @inline
-def first_directions(w, i):
-    """At the tip of the arm the tangents are turns about H and G × H."""
+def _first_directions(w, i):
     _put_square(w, TURNS, i, 1.0, 0.0, 0.0, 1.0)
     _put_square(w, CARRIED, i, 1.0, 0.0, 0.0, 1.0)
 
 
 @inline
-def next_directions(w, i):
-    """So they are where a segment begins; what lies beyond has turned already."""
+def _next_directions(w, i):
     p, q, r, s = (
         w[TURNS + i],
         w[TURNS + LANES + i],
@@ -297,13 +246,13 @@ def next_directions(w, i):
 
 
 @inline
-def watch_frames(w, i):
+def _watch_frames(w, i):
     """The same of 3 x 3 matrices.
 
     A conjugate point within gives Q P⁻¹ a negative eigenvalue, hence a negative trace, sum of
     principal minors or determinant. Each segment begins with the identity.
     """
-    before, after = three(w, TURNS, i), turns_of(w, i)
+    before, after = three(w, TURNS, i), _turns_of(w, i)
     put_three(w, TURNS, i, after)
     p, q = adjugate_rows(before), adjugate_rows(after)
     sizes = size_of(before), size_of(after), size_of(p), size_of(q)
@@ -317,6 +266,29 @@ def watch_frames(w, i):
 
 
 @inline
-def first_frames(w, i):
+def _first_frames(w, i):
     """Where a segment begins, the tangents are turns about the axes of the world."""
     put_three(w, TURNS, i, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+ALONG_ONE = (
+    _step_direction_walk,
+    step_direction_tip,
+    _watch_directions,
+    _first_directions,
+    _next_directions,
+    _turns_about,
+    missing_direction,
+)
+"""Steps with tangents and without; the watch, where it begins and where it goes on; turns of
+tangents, and of what is missing: for forces along one direction."""
+IN_SPACE = (
+    _step_frame_walk,
+    _step_frame_tip,
+    _watch_frames,
+    _first_frames,
+    _first_frames,
+    _turns_of,
+    missing_turn,
+)
+"""The same for any loads."""

@@ -21,8 +21,6 @@ from softreach.kernels.lanes import LANES, get, load_all, put, turn_at
 from softreach.kernels.loaded.frames import (
     along,
     inverse_rows,
-    missing_direction,
-    missing_turn,
     normal_to,
     product,
     put_three,
@@ -32,7 +30,9 @@ from softreach.kernels.loaded.frames import (
     world,
 )
 from softreach.kernels.loaded.section import (
+    ALONG_ONE,
     FORCE,
+    IN_SPACE,
     MARGIN,
     MOMENT,
     SHARE,
@@ -45,18 +45,8 @@ from softreach.kernels.loaded.section import (
     begin_tangents,
     begin_tip,
     carry_normal,
-    first_directions,
-    first_frames,
-    next_directions,
     push,
     step_direction_tip,
-    step_direction_walk,
-    step_frame_tip,
-    step_frame_walk,
-    turns_about,
-    turns_of,
-    watch_directions,
-    watch_frames,
 )
 from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, rest_frames
@@ -219,13 +209,8 @@ def _store(w, nodes, work, first, here, tiny, out):
 
 def _search_with(in_space):  # noqa: C901
     """A search over all samples, for forces along one direction or, in space, for any loads."""
-    step_walk, step_tip = step_direction_walk, step_direction_tip
-    turns, missing = turns_about, missing_direction
-    watch, begin, go_on = watch_directions, first_directions, next_directions
-    if in_space:
-        step_walk, step_tip = step_frame_walk, step_frame_tip
-        turns, missing = turns_of, missing_turn
-        watch, begin, go_on = watch_frames, first_frames, first_frames
+    parts = IN_SPACE if in_space else ALONG_ONE
+    step_walk, step_tip, watch, begin, go_on, turns, missing = parts
 
     @inline
     def start(w, nodes, tip, i):
