@@ -28,7 +28,7 @@ _NODES = {1: 33, 2: 33, 3: 17}
 """Nodes per free bundle: at most a few thousand postures."""
 _SAME_FRAME, _SAME_TIP = 0.02, 0.02  # [rad], [L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
-_TOGETHER = 256  # branches to a task
+_PARTS = 64  # of a line, at which it is asked for cuts
 
 
 def grid_sizes(box: ActivationBox) -> tuple[int, ...] | None:
@@ -45,10 +45,8 @@ class Flood:
 
     box: ActivationBox
     sizes: tuple[int, ...]
-    nodes: Array
-    """Activations, the last bundle varying fastest, shape (node, bundles)."""
     held: Shots
-    """Postures of the nodes; not found where none is held."""
+    """Postures of the nodes, the last bundle varying fastest; not found where none is held."""
     is_whole: Mask
     """True for cells whose edges are all on one branch, shape of the cells."""
 
@@ -72,20 +70,31 @@ class Flood:
         sizes, of_nodes = np.array(self.sizes), self.held.frame
         frames, scale = np.empty((len(gamma), of_nodes.shape[1])), (sizes - 1) / self.box.scales
         interpolate(of_nodes, gamma, self.box.low, scale, sizes, frames)
-        last = np.maximum(sizes - 2, 0)
-        with np.errstate(invalid="ignore"):
-            cells = np.clip(np.floor((gamma - self.box.low) * scale).astype(np.intp), 0, last)
-        is_known = self.is_whole[tuple(cells.T)]
+        is_known = self._is_whole_at(gamma)
         frames[~is_known] = of_nodes[self.held.is_found.argmax()]
         return units(frames), is_known
 
-    def nearest(self, gamma: Array) -> tuple[Array, Shots]:
-        """The nodes next to some activations, and the postures there."""
-        sizes = np.array(self.sizes)
-        place = np.rint((gamma - self.box.low) * ((sizes - 1) / self.box.scales)).astype(np.intp)
-        place = np.clip(place, 0, sizes - 1)
-        nodes = np.asarray(np.ravel_multi_index(tuple(place.T), self.sizes), np.intp)
-        return self.nodes[nodes], self.held.of(nodes)
+    def clear(self, rest: Array, gamma: Array) -> Array:
+        """Shares of the lines from rest up to which they meet no cut, shape (n,)."""
+        clear, goes_on = np.zeros(len(gamma)), np.ones(len(gamma), bool)
+        for t in np.arange(1, _PARTS + 1) / _PARTS:
+            goes_on &= self._is_whole_at(rest + t * (gamma - rest))
+            clear[goes_on] = t
+        return clear
+
+    def _is_whole_at(self, gamma: Array) -> Mask:
+        place = (gamma - self.box.low) * ((np.array(self.sizes) - 1) / self.box.scales)
+        cells = np.floor(place).astype(np.intp)
+        cells = np.clip(cells, 0, np.maximum(np.array(self.sizes) - 2, 0))
+        return np.asarray(self.is_whole[tuple(cells.T)])
+
+
+def from_lines(places: Array, ends: Array, scales: Array) -> Array:
+    """How far places are from the lines from 0 to others, in ranges, shape (n,)."""
+    at, line = places / scales, ends / scales
+    share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
+    off = at - np.clip(share, 0.0, 1.0)[:, None] * line
+    return np.sqrt((off * off).sum(axis=1))
 
 
 class _Flooding:
@@ -101,8 +110,8 @@ class _Flooding:
         self.linked = np.zeros((len(sizes), n), bool)  # to the next node along each axis
 
     def run(self, rest: Array, start: Shots) -> Flood:
-        self.scaled = (self.gamma - rest) / self.box.scales
-        nearest = int((self.scaled**2).sum(axis=1).argmin())
+        self.rest = rest
+        nearest = int((((self.gamma - rest) / self.box.scales) ** 2).sum(axis=1).argmin())
         found = self._followed(rest[None], self.gamma[[nearest]], start, None)
         self._keep(np.array([nearest]), found)
         front = np.flatnonzero(self.is_known)
@@ -110,7 +119,7 @@ class _Flooding:
             front = self._wave(front)
         self._link()
         held = self._shots(np.arange(len(self.gamma)))
-        return Flood(self.box, self.sizes, self.gamma, held, self._whole_cells())
+        return Flood(self.box, self.sizes, held, self._whole_cells())
 
     def _followed(self, begin: Array, end: Array, start: Shots, slope: Array | None) -> Shots:
         return follow(self.solver, Path.under_all_loads(begin, end), start, slope=slope).shots
@@ -143,7 +152,8 @@ class _Flooding:
                 edge = front, to, np.full_like(to, axis), np.full_like(to, way)
                 edges.append(np.stack(edge)[:, inside])
         left, before = np.concatenate(edges, axis=1), self.is_known.copy()
-        left = left[:, np.argsort(self._from_line(left[0], left[1]), kind="stable")]
+        at, to = self.gamma[left[0]] - self.rest, self.gamma[left[1]] - self.rest
+        left = left[:, np.argsort(from_lines(at, to, self.box.scales), kind="stable")]
         while True:
             left = left[:, ~self.is_known[left[1]]]
             _, first = np.unique(left[1], return_index=True)
@@ -152,12 +162,6 @@ class _Flooding:
             self._grow(*left[:, first])
             left = np.delete(left, first, axis=1)
         return np.flatnonzero(self.is_known & ~before)
-
-    def _from_line(self, nodes: Index, ends: Index) -> Array:
-        """How far nodes are from the lines from rest to others, in ranges."""
-        at, line = self.scaled[nodes], self.scaled[ends]
-        share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
-        return np.linalg.norm(at - share[:, None] * line, axis=1)
 
     def _grow(self, origin: Index, to: Index, axis: Index, way: Index) -> None:
         slopes = np.zeros_like(self.states.frame[origin])

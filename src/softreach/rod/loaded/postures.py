@@ -238,14 +238,16 @@ class FloodedPostures(Postures):
         assert self.flood is not None
         return self.flood.at(gamma)
 
-    def by_line(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
-        """Postures at some rows from the nodes next to them; from rest where a cut is near."""
+    def followed(self, gamma: Array) -> Followed:
+        """The same from where the lines meet the first cut: before, they are on one branch."""
         assert self.flood is not None
-        guesses, is_whole = self.flood.at(gamma[rows])
-        near, guesses = rows[is_whole], guesses[is_whole]
-        begin, start = self.flood.nearest(gamma[near])
-        path, slope = Path.under_all_loads(begin, gamma[near]), guesses - start.frame
-        self._polish(gamma, near, follow(self.twin, path, start, slope=slope), equilibria)
-        left = rows[equilibria.status[rows] != TipStatus.STABLE]
-        if len(left):
-            super().by_line(gamma, left, equilibria)
+        rest = self.rest_activation
+        begin = rest + self.flood.clear(rest, gamma)[:, None] * (gamma - rest)
+        guesses = self.flood.at(begin)[0]
+        start = self.twin.careful(begin, guesses)
+        good = start.is_found & (start.margin > 0.0)
+        lost = ~good | (turn_between(start.frame, guesses) > _NEAR_GUESS)
+        begin[lost] = rest
+        for values, at_rest in zip(start, self.rest, strict=True):
+            values[lost] = at_rest[0]
+        return follow(self.twin, Path.under_all_loads(begin, gamma), start)
