@@ -52,7 +52,7 @@ __all__ = ["LoadedRod"]
 Array = NDArray[np.float64]
 
 _BLOCK = BLOCK // 8  # samples per task
-_OF_LINES = 8 * LANES  # samples per task that follows branches
+_OF_LINES = 32 * LANES  # samples per task that follows branches
 
 
 @dataclass(frozen=True, repr=False)
