@@ -2,8 +2,7 @@
 
 A step along a path predicts how the nodes of an arm see the world by the slope of the last one,
 and corrects that by Newton's method. It counts where the correction is small, of the frames and of
-the tip, and where the equilibrium is stable, if only stable ones are to be followed; otherwise it
-is tried at half its length.
+the tip, and where the equilibrium is stable; otherwise it is tried at half its length.
 """
 
 from __future__ import annotations
@@ -73,16 +72,13 @@ class Followed(NamedTuple):
     """Mask of branches that end before the path does, shape (n,)."""
 
 
-def follow(
-    solver: Solver, path: Path, start: Shots, *, stable: bool = True, slope: Array | None = None
-) -> Followed:
-    """Branches of equilibria along paths, each by itself.
+def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None) -> Followed:
+    """Branches of stable equilibria along paths, each by itself.
 
     Args:
         solver: That of the arm.
         path: Paths.
         start: Equilibria at their beginning.
-        stable: Whether only stable equilibria count.
         slope: Change of the frame along the path, if it is known, shape (n, component).
     """
     n, length = len(path.begin), solver.tables.arm.length
@@ -109,8 +105,7 @@ def follow(
         is_first = steps_known[rows] == 0
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
         most = np.where(is_first, 2.0, 1.0) * allowed
-        good = found.is_found & (change < most)
-        good &= (found.margin > 0.0) if stable else np.isfinite(found.margin)
+        good = found.is_found & (change < most) & (found.margin > 0.0)
         on, h_on = rows[good], h[good, None]
         slopes[on] = (found.frame[good] - frame[on]) / h_on
         moves[on] = (found.tips[good] - tips[on]) / h_on

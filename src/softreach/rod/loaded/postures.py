@@ -40,6 +40,7 @@ _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PART = 0.02  # of every line, at which an arm that nothing holds at rest leans already
 _AZIMUTHS = 2.0 * np.pi * np.arange(16) / 16  # at which a leaning arm is looked for
 _NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
+_STRAIGHT = 1e-8  # [rad], of an arm that no activation leans to any side
 _SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
 _HEAVIEST = 20.0  # [rad] of phase, of single shooting
 _PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
@@ -92,14 +93,15 @@ class Postures:
         """Where the twin leans beside rest that nothing holds: near the ring of it, or as hung."""
         if not len(self._ring):
             return self._hung(gamma).shots
-        shots = self.twin.careful(gamma, None)
+        tables, shots = self.solver.tables, self.twin.careful(gamma, None)
+        stations = np.linspace(0.0, tables.arm.length, 9)[1:]
+        along = self._unloaded.frames(gamma, stations).directors[:, :, 2]
+        aside = np.linalg.norm(np.cross(along, tables.axes[0]), axis=2).max(axis=1)
         shots.is_found[:] = False
         for frame in self._ring:
-            left = np.flatnonzero(~shots.is_found)
-            if not len(left):
-                break
+            left = np.flatnonzero((aside > _STRAIGHT) & ~shots.is_found)
             found = self.twin.careful(gamma[left], np.repeat(frame[None], len(left), axis=0))
-            good = found.is_found & (found.margin > _NEUTRAL)
+            good = found.is_found & (found.margin > 0.0)
             for values, new in zip(shots, found, strict=True):
                 values[left[good]] = new[good]
         return shots
@@ -199,10 +201,9 @@ class Postures:
 
     def _unstable(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
         """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
-        path = Path.of_loads(gamma[rows])
-        start = self.solver.careful(gamma[rows], None, path.from_share)
-        hung = follow(self.solver, path, start, stable=False)
-        self.solver.put(gamma, rows, hung.shots, equilibria)
+        shots = self.solver.careful(gamma[rows], None)
+        lost = ~shots.is_found | (shots.margin > 0.0)  # stable ones are not those of the branch
+        self.solver.put(gamma, rows, shots._replace(is_found=~lost), equilibria)
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
