@@ -1,4 +1,4 @@
-"""Arms under load: tips, volumes and the ladder to equilibria beside free arms, in one run.
+"""Arms under load: tips, volumes and postures beside free arms, in one run.
 
 `python -m benchmarks.bench_loads [n]` prints Markdown tables; under pytest-benchmark the same work
 runs on few samples.
@@ -109,7 +109,7 @@ def main(n: int = 400_000) -> None:
     _tip_table(n)
     _volume_table()
     _bundle_table(n // 10)
-    _ladder_table()
+    _posture_table()
     _peer_table()
 
 
@@ -167,18 +167,18 @@ def _bundle_table(n: int) -> None:
     print_table(itertools.starmap(row, ARMS.items()))
 
 
-def _ladder_table(n: int = 2048) -> None:
-    print(f"\n### The ladder to an equilibrium, {n:,} activations with all corners\n")
+def _posture_table(n: int = 2048) -> None:
+    print(f"\n### Postures of {n:,} activations with all corners\n")
     print("Steps that the rule chose; error against twice the steps; shares of samples that the")
     print(
         "rungs of the ladder found, and of those that are unstable, have no equilibrium or were not"
     )
     print("followed to their end.\n")
     places = itertools.product((0, 2, 3), (0.1, 1, 2.5, 5, 8, 12), BASES)
-    print_table((_ladder_row(*place, n) for place in places), words=["base"])
+    print_table((_posture_row(*place, n) for place in places), words=["base"])
 
 
-def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
+def _posture_row(taper: float, load_number: float, base: str, n: int) -> Row:
     arm = trunk(load_number, sr.Loads(gravity=BASES[base]), taper)
     loaded, free = LoadedRod(arm), FreeRod(arm)
     gamma = activations(loaded, n)

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.flood import Flood, grid_sizes
 from softreach.rod.loaded.following import Followed, Path, follow, turn_between
+from softreach.rod.loaded.ring import Ring
 from softreach.rod.loaded.shooting import Equilibria, Shots
 from softreach.rod.tip_map import TipStatus
 from softreach.support.lazy import lazy
@@ -37,12 +37,7 @@ _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothi
 _NEAR_GUESS = 0.15  # [rad], of what is found from an interpolated frame
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
-_FIRST_PART = 0.02  # of every line, at which an arm that nothing holds at rest leans already
-_AZIMUTHS = 2.0 * np.pi * np.arange(16) / 16  # at which a leaning arm is looked for
-_NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
-_STRAIGHT = 1e-8  # [rad], of an arm that no activation leans to any side
-_SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
-_HEAVIEST = 20.0  # [rad] of phase, of single shooting
+_FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
 _PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
 _HANGING = 4.0  # [rad] of phase, from which on the unloaded arm tells nothing of one that hangs
 
@@ -89,51 +84,9 @@ class Postures:
         start = self.twin.careful(gamma, None, path.from_share)
         return follow(self.twin, path, start)
 
-    def _leaning(self, gamma: Array) -> Shots:
-        """Where the twin leans beside rest that nothing holds: near the ring of it, or as hung."""
-        if not len(self._ring):
-            return self._hung(gamma).shots
-        tables, shots = self.solver.tables, self.twin.careful(gamma, None)
-        stations = np.linspace(0.0, tables.arm.length, 9)[1:]
-        along = self._unloaded.frames(gamma, stations).directors[:, :, 2]
-        aside = np.linalg.norm(np.cross(along, tables.axes[0]), axis=2).max(axis=1)
-        shots.is_found[:] = False
-        for frame in self._ring:
-            left = np.flatnonzero((aside > _STRAIGHT) & ~shots.is_found)
-            found = self.twin.careful(gamma[left], np.repeat(frame[None], len(left), axis=0))
-            good = found.is_found & (found.margin > 0.0)
-            for values, new in zip(shots, found, strict=True):
-                values[left[good]] = new[good]
-        return shots
-
     @lazy
-    def _ring(self) -> Array:
-        """Frames in which an arm leans at rest that nothing holds upright, all around.
-
-        Shape (k, component); none under loads of several directions, or too heavy ones for single
-        shooting.
-        """
-        solver, rest, axis = self.solver, self.rest_activation, self.solver.tables.axes[0]
-        if not solver.tables.one_direction or solver.tables.phase.entire > _HEAVIEST:
-            return np.empty((0, solver.tables.frame_size))
-
-        def image(points: Array) -> Array:
-            images = solver.base_directions(rest, np.ascontiguousarray(points))
-            return images / np.linalg.norm(images, axis=1, keepdims=True)
-
-        if not is_axisymmetric(image, axis, _SYMMETRIC):
-            return np.empty((0, solver.tables.frame_size))
-        rings = pole_rings(image, axis, axis)
-        points = rings.points[rings.signs > 0]
-        frames, margin = solver.frames_facing(np.repeat(rest, len(points), axis=0), points)
-        frames = frames[margin > -_NEUTRAL].reshape(-1, solver.tables.segments, 3)
-        about, axes = np.zeros((len(_AZIMUTHS), 3, 3)), solver.tables.axes
-        about[:, 0, 0] = 1.0
-        about[:, 1, 1] = about[:, 2, 2] = np.cos(_AZIMUTHS)
-        about[:, 2, 1] = np.sin(_AZIMUTHS)
-        about[:, 1, 2] = -np.sin(_AZIMUTHS)
-        turns = axes.T @ about @ axes
-        return np.einsum("aij,knj->akni", turns, frames).reshape(-1, solver.tables.frame_size)
+    def _ring(self) -> Ring | None:
+        return Ring.at_rest(self.solver, self.rest_activation)
 
     def find(self, gamma: Array) -> Equilibria:
         """Postures at activations (n, bundles), on the calling thread."""
@@ -207,14 +160,27 @@ class Postures:
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
-        n = len(gamma)
-        begin = np.repeat(self.rest_activation, n, axis=0)
         if self.is_held_at_rest:
-            start = self.rest.of(np.zeros(n, np.intp))
+            begin = np.repeat(self.rest_activation, len(gamma), axis=0)
+            start = self.rest.of(np.zeros(len(gamma), np.intp))
         else:
-            begin = begin + _FIRST_PART * (gamma - begin)
-            start = self._leaning(begin)
+            begin, start = self._leaning(gamma)
         return follow(self.twin, Path.under_all_loads(begin, gamma), start)
+
+    def _leaning(self, gamma: Array) -> tuple[Array, Shots]:
+        """Places on lines where the twin leans that nothing holds at rest, and how it does."""
+        rest, ring = self.rest_activation, self._ring
+        begin = rest + _FIRST_PARTS[0] * (gamma - rest)
+        if ring is None:
+            return begin, self._hung(begin).shots
+        start = ring.near(self.twin, begin)
+        for part in _FIRST_PARTS[1:]:
+            left = np.flatnonzero(~start.is_found)
+            begin[left] = rest + part * (gamma[left] - rest)
+            found = ring.near(self.twin, begin[left])
+            for values, new in zip(start, found, strict=True):
+                values[left] = new
+        return begin, start
 
     def with_flood(self) -> Postures:
         """The same, with starts from a grid over the box where that is worth it."""
