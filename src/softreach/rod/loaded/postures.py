@@ -155,8 +155,11 @@ class Postures:
     def _unstable(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
         """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
         shots = self.solver.careful(gamma[rows], None)
-        lost = ~shots.is_found | (shots.margin > 0.0)  # stable ones are not those of the branch
-        self.solver.put(gamma, rows, shots._replace(is_found=~lost), equilibria)
+        at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
+        good = shots.is_found & (
+            (shots.margin <= 0.0) | at_rest
+        )  # no stable ones of other branches
+        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
