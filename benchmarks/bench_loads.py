@@ -170,9 +170,11 @@ def _bundle_table(n: int) -> None:
 def _posture_table(n: int = 2048) -> None:
     print(f"\n### Postures of {n:,} activations with all corners\n")
     print(
-        "Steps that the rule chose; error against twice the steps; shares of samples whose posture is"
+        "Steps that the rule chose; error against twice the steps; shares of samples whose posture"
     )
-    print("stable, that are unstable, that snap before, and that were not followed to their end.\n")
+    print(
+        "is stable, that are unstable, that snap before, and that were not followed to their end.\n"
+    )
     places = itertools.product((0, 2, 3), (0.1, 1, 2.5, 5, 8, 12), BASES)
     print_table((_posture_row(*place, n) for place in places), words=["base"])
 
