@@ -1,4 +1,4 @@
-"""Arms under load: tips, volumes and the ladder to equilibria beside free arms, in one run.
+"""Arms under load: tips, volumes and postures beside free arms, in one run.
 
 `python -m benchmarks.bench_loads [n]` prints Markdown tables; under pytest-benchmark the same work
 runs on few samples.
@@ -22,8 +22,7 @@ from benchmarks.bench_kernels import best_time, twelve_bundles
 from benchmarks.table import Row, print_table
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.shooting import Rung
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.support import parallel
 from softreach.workspace import reachable_set
 
@@ -110,7 +109,7 @@ def main(n: int = 400_000) -> None:
     _tip_table(n)
     _volume_table()
     _bundle_table(n // 10)
-    _ladder_table()
+    _posture_table()
     _peer_table()
 
 
@@ -168,29 +167,30 @@ def _bundle_table(n: int) -> None:
     print_table(itertools.starmap(row, ARMS.items()))
 
 
-def _ladder_table(n: int = 2048) -> None:
-    print(f"\n### The ladder to an equilibrium, {n:,} activations with all corners\n")
-    print("Steps that the rule chose; error against twice the steps; shares of samples that the")
+def _posture_table(n: int = 2048) -> None:
+    print(f"\n### Postures of {n:,} activations with all corners\n")
     print(
-        "rungs of the ladder found, and of those that are unstable, have no equilibrium or were not"
+        "Steps that the rule chose; error against twice the steps; shares of samples whose posture"
     )
-    print("followed to their end.\n")
+    print(
+        "is stable, that are unstable, that snap before, and that were not followed to their end.\n"
+    )
     places = itertools.product((0, 2, 3), (0.1, 1, 2.5, 5, 8, 12), BASES)
-    print_table((_ladder_row(*place, n) for place in places), words=["base"])
+    print_table((_posture_row(*place, n) for place in places), words=["base"])
 
 
-def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
+def _posture_row(taper: float, load_number: float, base: str, n: int) -> Row:
     arm = trunk(load_number, sr.Loads(gravity=BASES[base]), taper)
     loaded, free = LoadedRod(arm), FreeRod(arm)
     gamma = activations(loaded, n)
-    loaded.solver  # noqa: B018  makes the grid
-    cost = best_time(lambda: loaded.solver.find(gamma), repeat=2).cpu
+    loaded.prepare()  # makes the grid
+    cost = best_time(lambda: loaded.equilibria(gamma), repeat=2).cpu
     cost /= best_time(lambda: free.tips(gamma)).cpu
-    found = loaded.solver.find(gamma)
-    rungs = {"at once": Rung.DIRECT, "continued": Rung.CONTINUATION, "patient": Rung.PATIENT}
+    found = loaded.equilibria(gamma)
     ends = {
+        "stable": TipStatus.STABLE,
         "unstable": TipStatus.UNSTABLE,
-        "none": TipStatus.NO_EQUILIBRIUM,
+        "snaps": TipStatus.SNAPS,
         "undecided": TipStatus.UNDECIDED,
     }
     return {
@@ -199,7 +199,6 @@ def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
         "base": base,
         "steps": loaded.steps,
         "times a free tip": f"{cost:.0f}",
-        **{name: f"{np.mean(found.rung == rung):.2%}" for name, rung in rungs.items()},
         **{name: f"{np.mean(found.status == end):.2%}" for name, end in ends.items()},
         "error [L]": f"{_error(loaded, gamma, found):.1e}",
     }
@@ -207,7 +206,7 @@ def _ladder_row(taper: float, load_number: float, base: str, n: int) -> Row:
 
 def _error(loaded: LoadedRod, gamma: np.ndarray, found: sr.rod.Equilibria) -> float:
     """Largest tip error [L], where the arm is not about to lose its stability."""
-    settled = (found.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(found.margin) > MARGIN)
+    settled = has_tip(found.status) & (np.abs(found.margin) > MARGIN)
     finer = loaded.solver.halved().near(gamma[settled], found.of(settled))
     apart = np.linalg.norm(finer.tips - found.tips[settled], axis=1)
     return float(np.nanmax(apart)) / loaded.length

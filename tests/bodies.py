@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev
 
 from softreach.arm import Loads, Manipulator
 from softreach.arm.tables import tables
-from softreach.rod.loaded.shooting import Equilibria, Rung
+from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import Body
 from tests.oracles import rod
@@ -28,10 +28,10 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
     return arm.replace(section=section, loads=loads)
 
 
-def loaded_slowly(solver: Solver, gamma: np.ndarray) -> Equilibria:
-    """Equilibria found by the most patient continuation alone."""
+def by_lines(solver: Solver, gamma: np.ndarray) -> Equilibria:
+    """Postures found along lines from rest alone."""
     equilibria = solver.empty(len(gamma))
-    solver.again(gamma, np.arange(len(gamma)), Rung.PATIENT, equilibria)
+    solver.postures.by_line(gamma, np.arange(len(gamma)), equilibria)
     return equilibria
 
 

@@ -238,7 +238,7 @@ def test_making_and_keeping_a_large_cloud_takes_little_more_memory_than_the_clou
 
 
 SAMPLES = 3000
-LOADS = Loads(gravity=(0.0, 0.0, 9.81), payload=0.020)
+LOADS = Loads(gravity=(9.81, 0.0, 0.0), payload=0.005)  # under which a few samples snap
 
 
 @pytest.fixture(scope="module")

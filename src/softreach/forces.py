@@ -66,9 +66,9 @@ def blocked_force(
         Dataset over `place`: `force` [N] with `force_error` from the tip error, the `activation`
         and the `start_activation`, `tip_force`, which then acts on the tip [N], `status`, which
         says what ended the growth, and `limit` (place, bundle), true for bundles at the bounds that
-        did. `settles` says whether the arm comes to rest in the end so if it is activated first and
-        loaded slowly then, as the other functions have it; else only the way there, along which
-        the tip was held, leads to that equilibrium. NaN where no stable start was found.
+        did. `settles` says whether the force alone, raised from the posture of these activations,
+        leads there; else only the way along which the tip was held does. NaN where no stable start
+        was found.
 
     Raises:
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
@@ -179,7 +179,7 @@ def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | N
             "settles": (
                 "place",
                 settles,
-                {"units": "1", "long_name": "also at rest if activated first, then loaded"},
+                {"units": "1", "long_name": "reached by the force alone, too"},
             ),
             "limit": (
                 ("place", "bundle"),

@@ -89,7 +89,7 @@ def cloud_dataset(
     return cloud
 
 
-_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided"
+_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided 4=snaps"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
@@ -207,7 +207,7 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
     arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
     for what, shown, wanted in _disagreements(cloud, arm):
         raise InvalidInput(f"cloud.{what}", shown, f"{wanted}, as its design says")
-    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2, 3)).all():
+    if "status" in cloud.coords and not np.isin(cloud["status"].values, np.arange(5)).all():
         raise InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
     return cloud
 

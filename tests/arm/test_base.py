@@ -224,9 +224,9 @@ def test_parameters_of_loads_are_written_as_the_keys_of_files(trunk):
 
 
 def test_a_cloud_of_a_loaded_arm_says_which_samples_are_stable(trunk):
-    hanging = sr.Loads(gravity=(0, 0, 9.81), payload=0.03)
-    heavy = sr.designs.lce_arm().replace(loads=hanging)
-    cloud = sr.compute_cloud(heavy, n=2000)
+    aside = sr.Loads(gravity=(9.81, 0, 0), payload=0.005)
+    heavy = sr.designs.lce_arm().replace(loads=aside)
+    cloud = sr.compute_cloud(heavy, n=3000)
     assert set(np.unique(cloud.status)) > {0}
     np.testing.assert_array_equal(~has_tip(cloud.status), np.isnan(cloud.tip).any("axis"))
     rod = sr.rod.tip_map(heavy)

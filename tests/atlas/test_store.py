@@ -243,8 +243,8 @@ def imported_from_zarr(tree: ast.AST) -> list[str]:
 
 def test_a_store_of_another_version_is_refused():
     text = command(small_space(), **SMALL).to_json()
-    with pytest.raises(InvalidInput, match="version of the atlas = 1: must be 4; build"):
-        Command.from_json(text.replace('"atlas_version": 4', '"atlas_version": 1'))
+    with pytest.raises(InvalidInput, match="version of the atlas = 1: must be 5; build"):
+        Command.from_json(text.replace('"atlas_version": 5', '"atlas_version": 1'))
 
 
 def test_a_store_says_how_long_each_design_is_and_steps_by_the_shortest(tmp_path):

@@ -12,6 +12,7 @@ import pytest
 import softreach as sr
 from softreach import schema
 from softreach.arm import designs
+from softreach.arm.loads import Loads
 from softreach.cloud.clouds import compute_cloud
 from softreach.picture.axes_box import axes_box, seen_from
 from softreach.plot.coloring import BundleKey, ScalarKey
@@ -365,8 +366,9 @@ def test_a_loaded_cloud_comes_before_its_volume(lce):
 
 @pytest.fixture(scope="module")
 def torn(lce) -> Reach:
-    """With 30 g a few activations have no equilibrium."""
-    *_, fine = stages(hanging(lce, 30.0), 13, SMALL, lambda: None)
+    """Held aside with 5 g it snaps at a few activations."""
+    aside = lce.replace(loads=Loads(gravity=(9.81, 0.0, 0.0), payload=0.005))
+    *_, fine = stages(aside, 13, SMALL, lambda: None)
     return fine
 
 
@@ -374,7 +376,7 @@ def test_samples_are_counted_by_status_and_those_without_a_tip_are_not_shown(tor
     shares = [torn.share(status) for status in TipStatus]
     assert sum(shares) == pytest.approx(1.0)
     assert shares[TipStatus.STABLE] > 0.98
-    assert shares[TipStatus.NO_EQUILIBRIUM] > 0
+    assert shares[TipStatus.SNAPS] > 0
     points = cloud_points(torn, 13)
     assert np.isfinite(points).all()
     assert len(points) == has_tip(torn.status).sum()
@@ -393,7 +395,7 @@ def test_unstable_samples_are_those_of_the_cloud_that_are_shown(torn):
 
 @pytest.mark.filterwarnings("ignore:the load number is above")
 def test_an_arm_loaded_beyond_what_can_be_computed_is_refused_and_remembered(lce):
-    heavy = hanging(lce, 1000.0)
+    heavy = hanging(lce, 1e6)
     for _ in range(2):
         with pytest.raises(InvalidInput, match="loads = too large"):
             solvable_rod(heavy)

@@ -20,7 +20,7 @@ from softreach.support.errors import InvalidInput, SoftreachError, counted
 
 __all__ = ["ATLAS_VERSION", "Command", "check_names"]
 
-ATLAS_VERSION = 4
+ATLAS_VERSION = 5
 """Version of the layout of a store."""
 STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
 

@@ -230,8 +230,9 @@ def _rest(arm: Manipulator) -> Rest | None:
 _STABILITY = {
     "STABLE": "stable",
     "UNSTABLE": "not stable",
-    "NO_EQUILIBRIUM": "no equilibrium follows from the unloaded arm",
+    "NO_EQUILIBRIUM": "the loads shorten the arm to nothing",
     "UNDECIDED": "undecided: the search for an equilibrium gave up",
+    "SNAPS": "the arm snaps before",
 }
 
 

@@ -47,8 +47,7 @@ def equilibria(
 ) -> None:
     """Find every equilibrium of a loaded arm at given activations.
 
-    Stable ones come first. The one that the arm comes to from its unloaded shape
-    is marked.
+    Stable ones come first. The posture of the arm that hangs first is marked.
 
     Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
     """
@@ -104,6 +103,6 @@ def _print(result: AllEquilibria, lengths: Lengths) -> None:
     console.line(f"equilibria{f' at {at}' if at else ''}: {count}, degree {result.degree}")
     for k, status in enumerate(_statuses(result)):
         kind = f"{status}, any way around" if result.is_ring[k] else status
-        which = ", from the unloaded arm" if k == result.followed else ""
+        which = ", the posture" if k == result.followed else ""
         tip = lengths.place(result.tips[k])
         console.line(f"  tip {tip}: {kind}, margin {result.margin[k]:.3g}{which}")

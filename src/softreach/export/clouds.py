@@ -154,7 +154,8 @@ def export_cloud(
     Tables have the columns x, y, z and one activation per bundle, such as ``gamma_left``; in CSV,
     where nothing else would say the unit, x_mm, y_mm, z_mm if it is not the meter. NPZ and MAT hold
     the arrays tip, activation and bundle. Clouds of arms under loads have the column or array
-    status too: 0 stable, 1 unstable; 2 no equilibrium and 3 undecided, whose tips are NaN. Design,
+    status too: 0 stable, 1 unstable; 2 no equilibrium, 3 undecided and 4 snaps,
+    whose tips are NaN. Design,
     seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
     them. PLY carries the picture's colors too.
 

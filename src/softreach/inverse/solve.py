@@ -66,9 +66,8 @@ def solve_inverse(
     proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
 
-    Of an arm under loads every activation given holds the arm in a stable equilibrium, the one that
-    follows from the unloaded arm as the load grows; nothing is proved, so that a target that no
-    search reaches is `NOT_FOUND`.
+    Of an arm under loads every activation given holds the arm in its posture; nothing is proved, so
+    that a target that no search reaches is `NOT_FOUND`.
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.

@@ -217,7 +217,7 @@ class Scene:
         stable = equilibria.status == TipStatus.STABLE
         for k, shape in enumerate(shapes):
             if k == equilibria.followed:
-                name = "from the unloaded arm" + ("" if stable[k] else ", unstable")
+                name = "posture" + ("" if stable[k] else ", unstable")
                 self._add_body(arm, shape, name)
             elif stable[k]:
                 self._add_body(arm, shape, "other stable ones", _PALE)

@@ -52,9 +52,9 @@ def plot_equilibria(
 ) -> Axes:
     """Draw every equilibrium of an arm: stable ones solid, unstable ones dashed.
 
-    The one that follows from the unloaded arm, which the tip map reports, is drawn as a body with
-    its bundles, other stable ones pale; of a ring one arm, and a dotted circle where its tip may
-    be. An arrow shows the direction of gravity, or of the force that stands for it.
+    The posture, which the tip map reports, is drawn as a body with its bundles, other stable ones
+    pale; of a ring one arm, and a dotted circle where its tip may be. An arrow shows the direction
+    of gravity, or of the force that stands for it.
 
     Args:
         equilibria: What `softreach.equilibria` returned.
@@ -211,7 +211,7 @@ def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
         "color": _FOLLOWED if follows else _STABLE if stable else _UNSTABLE,
         "linestyle": "-" if stable else "--",
         "linewidth": 1.4 if stable or follows else 1.0,
-        "label": f"{kind}, from the unloaded arm" if follows else kind,
+        "label": f"{kind}, the posture" if follows else kind,
     }
 
 

@@ -8,7 +8,6 @@ from .loaded.all_equilibria import equilibria as equilibria
 from .loaded.rod import LoadedRod as LoadedRod
 from .loaded.shapes import Shapes as Shapes
 from .loaded.shooting import Equilibria as Equilibria
-from .loaded.shooting import Rung as Rung
 from .rods import tip_map as tip_map
 from .summary import DesignSummary as DesignSummary
 from .summary import describe as describe

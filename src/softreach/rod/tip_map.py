@@ -46,11 +46,13 @@ class TipStatus(IntEnum):
     UNSTABLE = 1
     """An unstable equilibrium."""
     NO_EQUILIBRIUM = 2
-    """The branch that starts at the unloaded arm ends before, or there is no such arm; the tip is
-    NaN."""
+    """There is no such arm: it would be shortened to nothing; the tip is NaN."""
     UNDECIDED = 3
-    """The branch was not followed to its end: nobody knows whether it has an equilibrium; the tip
-    is NaN."""
+    """The branch was not followed to its end: nobody knows whether it leads there; the tip is
+    NaN."""
+    SNAPS = 4
+    """The branch of stable postures from rest ends before: the arm snaps to another one; the tip is
+    NaN."""
 
 
 def has_tip(status: Status) -> NDArray[np.bool_]:

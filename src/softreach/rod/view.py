@@ -288,9 +288,10 @@ class View(DerivedMap):
         self._drop(status, tips, slopes, twists, directions)
 
     def _drop(self, status: Status | None, *values: Array | None) -> None:
-        """Make NaN, and say that there is no equilibrium, where only stable ones count."""
+        """Make NaN what is not stable where only that counts, and unstable ones as none."""
         if self.only_stable and status is not None:
-            drop(np.flatnonzero(status != TipStatus.STABLE), status, *values)
+            drop(np.flatnonzero(status != TipStatus.STABLE), None, *values)
+            status[status == TipStatus.UNSTABLE] = TipStatus.NO_EQUILIBRIUM
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         return self.base.extension_and_turn(self.activations(gamma))

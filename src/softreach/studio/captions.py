@@ -34,8 +34,9 @@ _GAP = "\N{EN SPACE} "
 _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
     TipStatus.UNSTABLE: "an unstable equilibrium: a real arm leaves it",
-    TipStatus.NO_EQUILIBRIUM: "no equilibrium: the arm is not drawn",
+    TipStatus.NO_EQUILIBRIUM: "the loads shorten the arm to nothing: it is not drawn",
     TipStatus.UNDECIDED: "the search for an equilibrium gave up: the arm is not drawn",
+    TipStatus.SNAPS: "the arm snaps on the way from rest to here: it is not drawn",
 }
 
 
@@ -87,11 +88,13 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     parts: list[Part] = []
     if unstable := reach.share(TipStatus.UNSTABLE):
         parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples {_GAP}"]
+    if snaps := reach.share(TipStatus.SNAPS):
+        parts.append(f"snaps on the way, not shown: {_percent(snaps)} {_GAP}")
     if lost := reach.share(TipStatus.NO_EQUILIBRIUM):
         parts.append(f"no equilibrium, not shown: {_percent(lost)} {_GAP}")
     if undecided := reach.share(TipStatus.UNDECIDED):
         parts.append(f"undecided, not shown: {_percent(undecided)} {_GAP}")
-    if not (unstable or lost or undecided):
+    if not (unstable or snaps or lost or undecided):
         parts.append(f"every sample rests in a stable equilibrium {_GAP}")
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 

@@ -130,7 +130,7 @@ class Reach:
             return np.full(self.samples, TipStatus.STABLE, np.int8)
         status = self.cloud.status.values
         lost = has_tip(status) & np.isnan(self.cloud.tip.values).any(axis=1)
-        return np.where(lost, TipStatus.NO_EQUILIBRIUM, status).astype(np.int8)
+        return np.where(lost, TipStatus.UNDECIDED, status).astype(np.int8)
 
     @cached_property
     def counts(self) -> NDArray[np.float64]:

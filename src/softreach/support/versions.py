@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 __all__ = ["SCHEMA_VERSION", "versions"]
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Of the names, dimensions and units of datasets."""
 
 

@@ -10,7 +10,7 @@ import math
 
 from softreach.kernels.compiler import inline
 
-__all__ = ["NODES", "at_stages", "step_function", "sum3", "sum6"]
+__all__ = ["NODES", "at_stages", "step_function", "sums"]
 
 _S = math.sqrt(21)
 NODES = (0.0, (7 - _S) / 14, 0.5, (7 + _S) / 14, 1.0)
@@ -30,7 +30,7 @@ def _value(x, c, a, b, e, f, g, h):
 
 
 @inline
-def sum3(x, c, a, b, e, f, g, h):
+def _sum(x, c, a, b, e, f, g, h):
     """x + Σ ci ki of tuples of three; a coefficient that is the literal 0 costs nothing."""
     return (
         _value(x[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),
@@ -40,16 +40,22 @@ def sum3(x, c, a, b, e, f, g, h):
 
 
 @inline
-def sum6(x, c, a, b, e, f, g, h):
-    """`sum3` of tuples of six."""
-    return (
-        _value(x[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),
-        _value(x[1], c, a[1], b[1], e[1], f[1], g[1], h[1]),
-        _value(x[2], c, a[2], b[2], e[2], f[2], g[2], h[2]),
-        _value(x[3], c, a[3], b[3], e[3], f[3], g[3], h[3]),
-        _value(x[4], c, a[4], b[4], e[4], f[4], g[4], h[4]),
-        _value(x[5], c, a[5], b[5], e[5], f[5], g[5], h[5]),
-    )
+def _last(x, c, a, b, e, f, g, h):
+    return (_sum(x[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),)
+
+
+def sums(count):
+    """A function x + Σ ci ki of states of so many vectors."""
+    if count == 1:
+        return _last
+    rest = sums(count - 1)
+
+    @inline
+    def plus(x, c, a, b, e, f, g, h):
+        first = _sum(x[0], c, a[0], b[0], e[0], f[0], g[0], h[0])
+        return (first, *rest(x[1:], c, a[1:], b[1:], e[1:], f[1:], g[1:], h[1:]))
+
+    return plus
 
 
 def step_function(rates, plus):

@@ -1,8 +1,13 @@
-"""Equilibria of many loaded rods under forces along one direction, by shooting from the tip.
+"""Equilibria of many loaded rods by multiple shooting, theory (69) to (71).
 
-Unknown is the direction G(L) of gravity that the tip sees: two numbers. A walk from the tip to the
-base gives the direction G(0) that the base would have to see; Newton's method, with the exact
-tangents of the walk, makes it the one that it does see.
+An arm is walked from tip to base in segments. Unknown is how the section at the tip end of each
+sees the world: the direction G of all forces, or, where they have several, a frame G, H. The moment
+there is no unknown: what lies beyond is in equilibrium, so that it answers a turn φ of the world by
+δM = S φ, and S is in the tangents that are walked anyway. Where a segment ends, its tangents become
+those of unit turns at the next node; so each segment is walked with two or three of them, and one
+segment alone is single shooting.
+
+All turns at a node are along its world's axes G, H, G × H.
 """
 
 from __future__ import annotations
@@ -11,201 +16,356 @@ import math
 
 import numpy as np
 
-from softreach.kernels.branches.chord import by_inverse, chord_with, keep_inverse
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.lanes import LANES, get, load_all, put, turn_at
-from softreach.kernels.loaded.direction_walk import (
-    SIZE,
-    A,
-    B,
-    X,
-    Y,
-    tangents,
+from softreach.kernels.loaded.frames import (
+    along,
+    inverse_rows,
+    normal_to,
+    product,
+    put_three,
+    put_world,
+    three,
     unit,
-    walk_tangents,
-    walk_tip,
+    world,
 )
-from softreach.kernels.loaded.load_continuation import (
-    BEFORE,
-    DETERMINANT,
-    DONE,
-    FOUND,
-    HELD,
-    LEFT,
-    LOAD,
+from softreach.kernels.loaded.section import (
+    ALONG_ONE,
+    FORCE,
+    IN_SPACE,
     MARGIN,
-    OLD,
-    PAST,
-    STEP,
-    TRIAL,
-    advance_with,
-    start,
+    MOMENT,
+    SHARE,
+    THETA,
+    F,
+    G,
+    H,
+    M,
+    Y,
+    begin_tangents,
+    begin_tip,
+    carry_normal,
+    push,
+    step_direction_tip,
 )
+from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, rest_frames
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.quaternion import back, turned
-from softreach.kernels.vector import combination, cross, dot, minus, plus, times
+from softreach.kernels.vector import combination, cross, dot, plus
 
-__all__ = ["base_directions", "solve"]
+__all__ = ["FOUND", "base_directions", "node_world", "solve_directions", "solve_frames"]
 
-TARGET = SIZE  # gravity as seen by the base, in the frame of the walk
-WHOLE = SIZE + 3 * LANES
+# Rows of the workspace behind those of the section.
+DONE, LEFT, SIZE = (SECTION + k * LANES for k in range(3))
+# Rows of a node.
+WORLD = 0  # G, H: the unknown
+INVERSE = 6 * LANES  # its turn per turn at the end of the segment, 3 x 3
+MISSING = 15 * LANES  # the turn from what arrives to what is there
+STEP = 18 * LANES  # the turn of the node that Newton's method asks for
+ANSWER = 21 * LANES  # change of M per turn, then that of F, 3 x 3 each
+NODE = 39 * LANES
+
+AT_WORK, FOUND, GIVEN_UP = 0.0, 1.0, 3.0
+_CONTRACTION = 0.6
 
 
 @inline
-def _missing(w, i):
-    """Residual at the base, in the plane normal to G(0), whose size steps do not keep at 1."""
-    g, t = get(w, X, i), get(w, TARGET, i)
-    return minus(t, times(dot(g, t) / dot(g, g), g))
+def _enter(w, node, i):
+    """Go on with what the node sees, and with the moment and force that belong to it."""
+    phi, answer = get(node, MISSING, i), three(node, ANSWER, i)
+    put(w, M, i, plus(get(w, M, i), combination(phi, answer)))
+    put(w, F, i, plus(get(w, F, i), combination(phi, three(node, ANSWER + 9 * LANES, i))))
+    put(w, G, i, get(node, WORLD, i))
+    put(w, H, i, get(node, WORLD + 3 * LANES, i))
 
 
 @inline
-def _newton(w, i):
-    """The Newton step of G(L), theory (69), and its linear map, kept for the chord steps."""
-    g, a, b = get(w, X, i), get(w, A, i), get(w, B, i)
-    t1, t2 = tangents(get(w, TRIAL, i))
-    c1, c2 = cross(b, g), cross(g, a)
-    determinant = dot(a, c1)
-    w[DETERMINANT + i] = determinant
-    determinant = math.copysign(max(abs(determinant), 1e-12), determinant)
-    c = times(1.0 / determinant, c1), times(1.0 / determinant, c2), (0.0, 0.0, 0.0)
-    rows = (
-        combination((t1[0], t2[0], 0.0), c),
-        combination((t1[1], t2[1], 0.0), c),
-        combination((t1[2], t2[2], 0.0), c),
+def _answer(w, turns, before, node, i):
+    """Tangents of unit turns at a node, theory (70), from those that arrive there."""
+    rows = inverse_rows(turns)
+    put_three(before, INVERSE, i, rows)
+    columns = (
+        (rows[0][0], rows[1][0], rows[2][0]),
+        (rows[0][1], rows[1][1], rows[2][1]),
+        (rows[0][2], rows[1][2], rows[2][2]),
     )
-    keep_inverse(w, i, rows)
-    missing = _missing(w, i)
-    put(w, BEFORE, i, missing)
-    put(w, STEP, i, by_inverse(w, i, missing))
+    put_three(node, ANSWER, i, product(three(w, MOMENT, i), columns))
+    put_three(node, ANSWER + 9 * LANES, i, product(three(w, FORCE, i), columns))
 
 
 @inline
-def _move(w, i):
-    put(w, TRIAL, i, unit(plus(get(w, TRIAL, i), get(w, STEP, i))))
+def _solve(nodes, count, i):
+    """Newton's step of every node, theory (71), from base to tip; the largest turn, squared."""
+    step, largest = (0.0, 0.0, 0.0), 0.0
+    for n in range(count - 1, -1, -1):
+        missing = get(nodes[n + 1], MISSING, i)
+        step = along(three(nodes[n], INVERSE, i), plus(step, missing))
+        put(nodes[n], STEP, i, step)
+        largest = max(largest, max(dot(missing, missing), dot(step, step)))
+    return largest
 
 
 @inline
-def _move_all(w):
+def _move(nodes, count, i):
+    for n in range(count):
+        axes = world(nodes[n], WORLD, i)
+        turn = combination(get(nodes[n], STEP, i), axes)
+        g, h = plus(axes[0], cross(turn, axes[0])), plus(axes[1], cross(turn, axes[1]))
+        put_world(nodes[n], WORLD, i, g, h)
+
+
+@inline
+def _newton(w, nodes, count, small):
+    """A step in every lane at work; how many are at work still.
+
+    A step counts by its longest turn or, where the arm hangs and that is small, by what a node
+    misses. Once it is short the lane is done, and the step is left to be taken: walked again with
+    others, it gets the same bits.
+    """
+    waiting = 0
     for i in range(LANES):
-        _move(w, i)
+        if w[DONE + i] == AT_WORK:
+            size = math.sqrt(_solve(nodes, count, i))
+            if size < small:
+                w[DONE + i] = FOUND
+            elif size < w[LEFT + i]:
+                _move(nodes, count, i)
+                w[LEFT + i] = _CONTRACTION * size
+            else:
+                w[DONE + i] = GIVEN_UP
+        waiting += w[DONE + i] == AT_WORK
+    return waiting
 
 
 @inline
-def _extrapolate(w, i, last, first):
-    """The parabola of theory (71)."""
-    g, p, o = get(w, HELD, i), get(w, PAST, i), get(w, OLD, i)
-    ahead = plus(times(last, minus(g, p)), times(first, minus(p, o)))
-    put(w, TRIAL, i, unit(plus(g, ahead)))
-
-
-_advance_all = advance_with(_newton, _move, _extrapolate)
-_chord_all = chord_with(_missing, _move)
+def _chords(w, nodes, count, turn, least):
+    """Steps by the matrices that Newton's method left, in every lane that is not there yet."""
+    waiting = 0
+    for i in range(LANES):
+        if w[DONE + i] == FOUND and (turn == 0 or w[LEFT + i] > least):
+            w[LEFT + i] = _solve(nodes, count, i)
+            if w[LEFT + i] > least:
+                _move(nodes, count, i)
+                waiting += 1
+    return waiting
 
 
 @inline
-def _aim(w, work, gravity):
-    """Directions that the base must see, in the frame of the walk, theory (65)."""
+def _aim(node, work, axes, again):
+    """The world as the base sees it, in the frame of the walk, theory (65).
+
+    Again, on other tables, the tangents know a normal of one direction already.
+    """
     for i in range(LANES):
         q = turn_at(work, TURN, i)
-        put(w, TARGET, i, turned(q, (gravity[0], gravity[1], gravity[2])))
+        put(node, WORLD, i, turned(q, (axes[0, 0], axes[0, 1], axes[0, 2])))
+        if not again:
+            put(node, WORLD + 3 * LANES, i, turned(q, (axes[1, 0], axes[1, 1], axes[1, 2])))
 
 
 @inline
-def _set_out(w, work, guesses, first, count, increment, widest):
+def node_world(q, guesses, row, n, size):
+    """G, H of a node as the frame of the walk sees them; of a direction alone some H."""
+    at = size * n
+    g = unit(turned(q, (guesses[row, at], guesses[row, at + 1], guesses[row, at + 2])))
+    h = normal_to(g)
+    if size > 3:
+        h = turned(q, (guesses[row, at + 3], guesses[row, at + 4], guesses[row, at + 5]))
+    return g, h
+
+
+@inline
+def _set_out(w, nodes, work, guesses, first, here):
+    """Begin at guesses or, without any, where the unloaded arm is."""
+    count = nodes.shape[0] - 1
     for i in range(LANES):
-        put(w, TRIAL, i, get(w, TARGET, i))
-    start(w, increment, widest)
-    if guesses.shape[0] > 0:
+        row, q = first + min(i, here - 1), turn_at(work, TURN, i)
+        for n in range(count):
+            g, h = get(nodes[count], WORLD, i), get(nodes[count], WORLD + 3 * LANES, i)
+            if guesses.shape[0] > 0:
+                g, h = node_world(q, guesses, row, n, guesses.shape[1] // count)
+            put_world(nodes[n], WORLD, i, g, h)
+
+
+@inline
+def _store(w, nodes, work, first, here, tiny, out):
+    count = nodes.shape[0] - 1
+    size = (out.shape[1] - 5) // count
+    for i in range(here):
+        q, row = back(turn_at(work, TURN, i)), first + i
+        r = turned(q, get(w, Y, i))
+        for axis in range(3):
+            out[row, axis] = r[axis]
+        for n in range(count):
+            for axis in range(size // 3):
+                seen = turned(q, get(nodes[n], WORLD + 3 * axis * LANES, i))
+                at = 3 + size * n + 3 * axis
+                out[row, at], out[row, at + 1], out[row, at + 2] = seen
+        out[row, -2], out[row, -1] = w[MARGIN + i], w[DONE + i]
+        if w[DONE + i] == FOUND and w[LEFT + i] > tiny * tiny:
+            out[row, -1] = AT_WORK
+
+
+def _search_with(in_space):  # noqa: C901
+    """A search over all samples, for forces along one direction or, in space, for any loads."""
+    parts = IN_SPACE if in_space else ALONG_ONE
+    step_walk, step_tip, watch, begin, go_on, turns, missing = parts
+
+    @inline
+    def start(w, nodes, tip, i):
+        put(w, G, i, get(nodes[0], WORLD, i))
+        put(w, H, i, get(nodes[0], WORLD + 3 * LANES, i))
+        begin_tip(w, tip, i)
+
+    @inline
+    def arrive(w, node, i):
+        put(node, MISSING, i, missing(world(w, G, i), world(node, WORLD, i)))
+
+    @pasted
+    def walk(w, nodes, rest, table, tip):
+        firsts, scalars, moments = table[5], table[2], table[4]
         for i in range(LANES):
-            n = first + min(i, count - 1)
-            g = (guesses[n, 0], guesses[n, 1], guesses[n, 2])
-            put(w, TRIAL, i, unit(turned(turn_at(work, TURN, i), g)))
+            start(w, nodes, tip, i)
+            begin_tangents(w, tip, i)
+            begin(w, i)
+            w[MARGIN + i] = 1.0
+        for n in range(firsts.shape[0] - 1):
+            for k in range(firsts[n], firsts[n + 1]):
+                r, c = rest[k], scalars[k]
+                if in_space and moments[k].any():
+                    for i in range(LANES):
+                        push(w, moments[k], True, i)
+                for i in range(LANES):
+                    step_walk(w, r, c, i)
+                for i in range(LANES):
+                    watch(w, i)
+            before, node = nodes[n], nodes[n + 1]
+            for i in range(LANES):
+                if not in_space:
+                    carry_normal(node, WORLD, get(w, H, i), i)
+                arrive(w, node, i)
+                _answer(w, turns(w, i), before, node, i)
+                _enter(w, node, i)
+                put_three(w, THETA, i, world(w, G, i))
+                put_three(w, MOMENT, i, three(node, ANSWER, i))
+                put_three(w, FORCE, i, three(node, ANSWER + 9 * LANES, i))
+                go_on(w, i)
+
+    @pasted
+    def walk_tip(w, nodes, rest, table, tip):
+        firsts, scalars, moments = table[5], table[2], table[4]
+        for i in range(LANES):
+            start(w, nodes, tip, i)
+        for n in range(firsts.shape[0] - 1):
+            for k in range(firsts[n], firsts[n + 1]):
+                r, c = rest[k], scalars[k]
+                if in_space and moments[k].any():
+                    for i in range(LANES):
+                        push(w, moments[k], False, i)
+                for i in range(LANES):
+                    step_tip(w, r, c, i)
+            node = nodes[n + 1]
+            for i in range(LANES):
+                if not in_space:
+                    put_world(w, G, i, get(w, G, i), get(node, WORLD + 3 * LANES, i))
+                arrive(w, node, i)
+                _enter(w, node, i)
+
+    @pasted
+    def search(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+        widest, small, tiny = limits
+        count = coarse[5].shape[0] - 1
+        lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
+        work, w = np.zeros(REST_WORK), np.zeros(SIZE)
+        nodes = np.zeros((count + 1, NODE))
+        rest = np.zeros((max(coarse[1].shape[0], fine[1].shape[0]), STEP_ROWS * LANES))
+        for first in range(0, gamma.shape[0], LANES):
+            here = min(LANES, gamma.shape[0] - first)
+            load_all(lanes, gamma, first, here)
+            rest_frames(work, lanes, coarse[0], coarse[1], rest[: coarse[1].shape[0]])
+            _aim(nodes[count], work, axes, False)
+            _set_out(w, nodes, work, guesses, first, here)
+            for i in range(LANES):
+                w[SHARE + i] = shares[min(first + min(i, here - 1), shares.shape[0] - 1)]
+                w[DONE + i], w[LEFT + i] = AT_WORK, widest
+            for _ in range(most[0]):
+                walk(w, nodes, rest, coarse, tip)
+                if _newton(w, nodes, count, small) == 0:
+                    break
+            rest_frames(work, lanes, fine[0], fine[1], rest[: fine[1].shape[0]])
+            _aim(nodes[count], work, axes, not in_space)
+            for i in range(LANES):
+                if w[DONE + i] == FOUND:
+                    _move(nodes, count, i)
+            for turn in range(most[1]):
+                walk_tip(w, nodes, rest, fine, tip)
+                if _chords(w, nodes, count, turn, tiny * tiny) == 0:
+                    break
+            _store(w, nodes, work, first, here, tiny, out)
+
+    return search
+
+
+_search_directions, _search_frames = _search_with(in_space=False), _search_with(in_space=True)
 
 
 @kernel
-def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
-    """Equilibria, tips and stability margins.
+def solve_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+    """Equilibria under forces along one direction, with three numbers for each node.
 
     Args:
         gamma: Activations (n, bundle).
-        gravity: Direction of gravity in the base frame (3,).
-        tip: Lever times weight of the payload, then moment at the tip (6,) [N m].
-        guesses: G(L) as the base of the unloaded arm sees it (n, 3), or (0, 3).
-        coarse: Tables (pieces, lengths, scalars) for Newton steps.
+        axes: Orthonormal directions of the world in the base frame, as rows (3, 3).
+        tip: Weight of the payload along them, its lever, force and moment that follow (12,).
+        guesses: G of the nodes, tip first, as the base of the unloaded arm sees them, (n, 3 node)
+            or (0, 3 node).
+        coarse: Tables (pieces, lengths, scalars, bends, moments, firsts) for Newton steps.
         fine: Tables for the last steps.
-        limits: First share of the load to try; longest first Newton step [rad] that is trusted;
-            step at which the coarse tables have done their work; what the fine ones may leave.
+        limits: Longest first Newton step [rad] that is trusted; step at which the coarse tables
+            have done their work; what the fine ones may leave.
         most: Walks (coarse, fine) allowed.
-        out: Filled with the tip, G(L), the margin, and the state (0 not found, 1 found, 2 the
-            branch has ended, 3 given up), (n, 8).
+        shares: Shares of the loads (n,), or (1,) for all.
+        out: Filled with the tip, G of the nodes, the margin, and the state (0 not found, 1 found, 3
+            given up), (n, 5 + 3 node).
     """
-    increment, widest, small, tiny = limits
-    lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
-    work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
-    unloaded = np.zeros((coarse[1].shape[0], STEP_ROWS * LANES))
-    fine_rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
-    for first in range(0, gamma.shape[0], LANES):
-        count = min(LANES, gamma.shape[0] - first)
-        load_all(lanes, gamma, first, count)
-        rest_frames(work, lanes, coarse[0], coarse[1], unloaded)
-        _aim(w, work, gravity)
-        _set_out(w, work, guesses, first, count, increment, widest)
-        walks = 0
-        while walks < most[0]:
-            walk_tangents(w, unloaded, coarse[2], tip)
-            walks += 1
-            if _advance_all(w, small, widest) == 0:
-                break
-        rest_frames(work, lanes, fine[0], fine[1], fine_rest)
-        _aim(w, work, gravity)
-        _move_all(w)
-        for turn in range(most[1]):
-            walk_tip(w, fine_rest, fine[2], tip)
-            if _chord_all(w, turn, tiny * tiny) == 0:
-                break
-        _store(w, work, first, count, tiny, out)
+    _search_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out)
 
 
-@inline
-def _store(w, work, first, count, tiny, out):
-    for i in range(count):
-        q, n = back(turn_at(work, TURN, i)), first + i
-        r, g = turned(q, get(w, Y, i)), turned(q, get(w, TRIAL, i))
-        for j in range(3):
-            out[n, j] = r[j]
-            out[n, 3 + j] = g[j]
-        out[n, 6] = w[MARGIN + i]
-        out[n, 7] = w[DONE + i]
-        if w[DONE + i] == FOUND and w[LEFT + i] > tiny * tiny:
-            out[n, 7] = 0.0
+@kernel
+def solve_frames(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+    """The same under any loads, with six numbers for each node: G, H."""
+    _search_frames(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out)
 
 
 @kernel
 def base_directions(gamma, tip, directions, fine, out):
-    """Directions of gravity that the base must see, for those that the tip of one rod sees.
+    """Directions of the forces that the base must see, for those that the tip of one rod sees.
 
     Args:
         gamma: One activation (1, bundle).
-        tip: As of `solve`.
+        tip: As of `solve_directions`.
         directions: G(L) as the base of the unloaded arm sees them (n, 3).
-        fine: As of `solve`.
+        fine: As of `solve_directions`.
         out: Filled, (n, 3).
     """
     lanes = np.zeros((fine[0].shape[2] - 1, LANES))
-    work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
-    unloaded = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
+    work, w = np.zeros(REST_WORK), np.zeros(SIZE)
+    rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
     load_all(lanes, gamma, 0, 1)
-    rest_frames(work, lanes, fine[0], fine[1], unloaded)
+    rest_frames(work, lanes, fine[0], fine[1], rest)
     for first in range(0, directions.shape[0], LANES):
-        count = min(LANES, directions.shape[0] - first)
+        here = min(LANES, directions.shape[0] - first)
         for i in range(LANES):
-            n = first + min(i, count - 1)
-            g = (directions[n, 0], directions[n, 1], directions[n, 2])
-            put(w, TRIAL, i, turned(turn_at(work, TURN, i), g))
-            w[LOAD + i] = 1.0
-        walk_tip(w, unloaded, fine[2], tip)
-        for i in range(count):
-            g = turned(back(turn_at(work, TURN, i)), get(w, X, i))
+            w[SHARE + i] = 1.0
+            g, h = node_world(turn_at(work, TURN, i), directions, first + min(i, here - 1), 0, 3)
+            put_world(w, G, i, g, h)
+            begin_tip(w, tip, i)
+        for k in range(rest.shape[0]):
+            r, c = rest[k], fine[2][k]
+            for i in range(LANES):
+                step_direction_tip(w, r, c, i)
+        for i in range(here):
+            g = turned(back(turn_at(work, TURN, i)), get(w, G, i))
             for axis in range(3):
                 out[first + i, axis] = g[axis]

@@ -53,7 +53,7 @@ class AllEquilibria:
     rod: TipMap
     """The arm."""
     solver: Solver | None
-    """Solver that walked along it; None without loads."""
+    """Solver that walked along it; None without loads, or with too heavy ones for a search."""
     activation: Array
     """Of each bundle, shape (bundles,)."""
     tips: Array
@@ -71,8 +71,7 @@ class AllEquilibria:
     is_ring: NDArray[np.bool_]
     """Mask of those that stand for a ring, all around the direction of gravity; shape (n,)."""
     followed: int | None
-    """The one that follows continuously from the unloaded arm, which is that of the tip map; None
-    where that branch has ended."""
+    """The posture, which is that of the tip map; None where the arm snaps before."""
     complete: bool
     """True if the degree is 1, and the branch is among them: nothing says that one is missing."""
 
@@ -132,10 +131,11 @@ class AllEquilibria:
         small = _SMALL * self.rod.length
         tip = ", ".join(f"{x:.4g}" if abs(x) > small else "0" for x in self.tips[k])
         kind = TipStatus(self.status[k]).name.lower() + (" ring" if self.is_ring[k] else "")
-        which = ", follows from the unloaded arm" if k == self.followed else ""
+        which = ", the posture" if k == self.followed else ""
         return f"{kind}: tip ({tip}) m, margin {self.margin[k]:.3g}{which}"
 
 
+_MOST_PHASE = 20.0  # [rad]; e^20 roundings are 1e-7 rad
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
 _MOST_WALKED = 20_000_000  # steps of one search, which take about a second
@@ -181,7 +181,7 @@ def equilibria(
     if isinstance(rod, View):  # whose equilibria are those of the arm
         rod, gamma = rod.base, rod.activations(gamma)
     if not rod.supports_unstable:
-        return _without_loads(rod, gamma)
+        return _one_of(rod, gamma, np.full((1, 3), np.nan), np.ones(1), complete=True)
     inner, at = inner_rod(rod, gamma)
     loaded = tip_map(inner, frame="base")  # where all directions of the search are
     if not isinstance(loaded, LoadedRod):
@@ -190,9 +190,13 @@ def equilibria(
         crossing = ", ".join(_crossing(loaded.loads, loaded.tables.axes[0]))
         allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
         raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
-    solver = _resolving(Solver(loaded.tables, loaded.unloaded_steps, rod.tol), at)
-    branch = solver.find(at)
-    known = branch.frame[has_tip(branch.status)]
+    posture = loaded.equilibria(at)
+    if loaded.tables.phase.entire > _MOST_PHASE:
+        warn("the posture alone is listed: the loads are too heavy for a search of all others")
+        return _one_of(rod, gamma, posture.frame[:, :3], posture.margin, complete=False)
+    known = posture.frame[has_tip(posture.status), :3]  # as the tip sees it
+    whole = replace(loaded.tables, longest=np.inf)
+    solver = _resolving(Solver(whole, loaded.unloaded_steps, rod.tol), at)
     solver, roots = _accurate(solver, at, _search(solver, at, known))
     result = _judged(rod, solver, at, roots, known)
     return replace(result, activation=gamma[0])
@@ -224,19 +228,22 @@ def _crossing(loads: Loads, direction: Array) -> list[str]:
     ]
 
 
-def _without_loads(rod: TipMap, gamma: Array) -> AllEquilibria:
+def _one_of(
+    rod: TipMap, gamma: Array, directions: Array, margin: Array, *, complete: bool
+) -> AllEquilibria:
+    """The posture alone."""
     return AllEquilibria(
         rod=rod,
         solver=None,
         activation=gamma[0],
         tips=rod.tips(gamma),
         status=rod.status(gamma),
-        margin=np.ones(1),
-        directions=np.full((1, 3), np.nan),
+        margin=margin,
+        directions=directions,
         signs=np.ones(1, np.int8),
         is_ring=np.zeros(1, bool),
         followed=0,
-        complete=True,
+        complete=complete,
     )
 
 
@@ -360,7 +367,7 @@ def _judged(
 
 
 def _nearest(roots: _Roots, known: Array, axis: Array) -> int | None:
-    """Index of the one at which the branch of the unloaded arm ends, if it does."""
+    """Index of the posture, if there is one."""
     if not len(known) or not len(roots.directions):
         return None
     apart = np.linalg.norm(roots.directions - known[0], axis=1)

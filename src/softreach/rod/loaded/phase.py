@@ -13,19 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.load_number import load_number
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, ends_over, tables
-from softreach.support.errors import InvalidInput
 
-__all__ = ["LoadPhase", "check_phase", "load_phase", "phase_stations"]
+__all__ = ["LoadPhase", "load_phase", "phase_stations"]
 
 Array = NDArray[np.float64]
 
 _MOST_PHASE = math.pi / 2.0
 _MOST_STEPS = 1 << 16
-_MOST_GROWTH = 25.0  # e^25 roundings are 1e-5 rad
 _STATIONS = 65
 
 
@@ -39,6 +36,16 @@ class LoadPhase(NamedTuple):
     squeeze: float
     """The largest force over K0, times the largest η/ζ̂ [-]: from 1 on it could squeeze the arm to
     nothing."""
+
+    stations: Array
+    """Z from base to tip [m], shape (station,)."""
+    along: Array
+    """Phase from the base to there [rad], shape (station,)."""
+
+    def parted(self, count: int) -> Array:
+        """Z between so many parts of equal phase [m], from tip to base, shape (count - 1,)."""
+        wanted = self.along[-1] * (1.0 - np.arange(1, count) / count)
+        return np.interp(wanted, self.along, self.stations)
 
     @property
     def fewest_steps(self) -> int:
@@ -78,24 +85,8 @@ def load_phase(
         squeeze = float((force * axial * relative).max())
         rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
     steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
-    return LoadPhase(float(np.trapezoid(rate, z)), float(steepest.max()), squeeze)
-
-
-def check_phase(arm: Manipulator, phase: LoadPhase) -> None:
-    """Refuse what shooting from the tip cannot follow.
-
-    A turn at the tip of a hanging arm grows to the base with the exponential of the phase, until
-    the last digit of the one is all of the other.
-
-    Raises:
-        InvalidInput: Too heavy loads.
-    """
-    if not phase.entire <= _MOST_GROWTH:
-        load = f"of load number {load_number(arm):.3g}"
-        allowed = (
-            f"lighter: their phase is {phase.entire:.3g} rad, at most {_MOST_GROWTH:g} allowed"
-        )
-        raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
+    along = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(z)))
+    return LoadPhase(float(along[-1]), float(steepest.max()), squeeze, z, along)
 
 
 def phase_stations(arm: Manipulator) -> Array:

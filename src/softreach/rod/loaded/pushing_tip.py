@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.loaded.following import turn_between
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
@@ -24,6 +25,8 @@ __all__ = ["PushingTip", "TipResponse"]
 Array = NDArray[np.float64]
 
 _MOST_STEPS = 256
+_SHORTEST = 2.0**-12  # part of a force by which it is raised
+_MOST_TURN = 0.2  # [rad], of what a node sees
 _DOUBTFUL = 0.05  # margin of stability below which a quick search decides nothing
 
 
@@ -77,11 +80,11 @@ class PushingTip:
         Args:
             gamma: Activations, shape (bundles,).
             force: With which the tip pushes [N].
-            near: Response to begin with; None for the unloaded arm, by way of the whole load.
+            near: Response to begin with; None for the posture.
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
         known = solver.find(sample) if near is None else solver.near(sample, near.equilibrium)
-        response = solver.respond(sample, compliance=True, known=known)
+        response = solver.respond(sample, known, compliance=True)
         slopes = np.empty_like(response.twists[:, :3])
         position_slopes(response.tips, response.twists, slopes)
         retreat = response.compliance[0] @ self.direction
@@ -100,10 +103,19 @@ class PushingTip:
         return float(np.linalg.norm(fine.tips[0] - response.tip))
 
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
-        """True if the arm that is activated first and loaded slowly then ends there."""
-        branch = self._solver(force, self.steps).find(gamma[None])
-        apart = float(np.linalg.norm(branch.tips[0] - response.tip))
-        return apart <= self.rod.tol * self.rod.length
+        """True if the force alone, raised from the posture without it, leads there."""
+        sample, share, step = gamma[None], 0.0, 0.25
+        held = self._solver(0.0, self.steps).find(sample)
+        while share < 1.0 and step > _SHORTEST:
+            to = min(1.0, share + step)
+            found = self._solver(to * force, self.steps).near(sample, held)
+            turn = turn_between(found.frame, held.frame)[0]
+            if found.status[0] == TipStatus.STABLE and turn < _MOST_TURN:
+                held, share, step = found, to, 2.0 * step
+            else:
+                step *= 0.5
+        apart = float(np.linalg.norm(held.tips[0] - response.tip))
+        return share == 1.0 and apart <= self.rod.tol * self.rod.length
 
     @property
     def is_finest(self) -> bool:

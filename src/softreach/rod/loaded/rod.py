@@ -15,13 +15,14 @@ from softreach.arm.tables import tables
 from softreach.kernels.lanes import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod, linear_strains, per_length
-from softreach.rod.loaded.phase import check_phase
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shapes import Shapes
 from softreach.rod.loaded.shooting import Equilibria
-from softreach.rod.loaded.solver import LATER_RUNGS, Solver
+from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.steps import (
     UNJUDGED,
     Differences,
+    check_steps,
     checked,
     fewest_steps,
     shape_differences,
@@ -51,6 +52,7 @@ __all__ = ["LoadedRod"]
 Array = NDArray[np.float64]
 
 _BLOCK = BLOCK // 8  # samples per task
+_OF_LINES = 32 * LANES  # samples per task that follows branches
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,7 +60,7 @@ class LoadedRod(ArmRod):
     """r' = ζ d3, dᵢ' = η u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ + η n3/K0, theory (57), (58).
 
     It is shot from the tip.
-    The equilibrium is the one that an arm comes to which is activated first and loaded slowly then.
+    The equilibrium is the posture that the arm comes to when it hangs first and is then activated.
     """
 
     @property
@@ -81,10 +83,10 @@ class LoadedRod(ArmRod):
         """Tables for the kernels.
 
         Raises:
-            InvalidInput: Loads so heavy that no walk from tip to base keeps its digits.
+            InvalidInput: Loads so heavy that no number of steps resolves what they do.
         """
         tables = LoadTables(self.arm, self.loads, self.body)
-        check_phase(self.arm, tables.phase)
+        check_steps(self.arm, tables.phase)
         return tables
 
     @property
@@ -122,7 +124,12 @@ class LoadedRod(ArmRod):
     @lazy
     def solver(self) -> Solver:
         """Solver with the steps that `tol` needs for tips."""
-        return self._solver_of(self.steps).with_starts(self.box)
+        return self._solver_of(self.steps)
+
+    @lazy
+    def postures(self) -> Postures:
+        """Postures, with starts on a grid over the box where that is worth it."""
+        return self.solver.postures.with_flood()
 
     @lazy
     def _shape_solver(self) -> Solver:
@@ -133,7 +140,7 @@ class LoadedRod(ArmRod):
         return self
 
     def _prepare(self) -> None:
-        self.solver  # noqa: B018
+        self.postures  # noqa: B018
 
     def equilibria(self, activations: ArrayLike) -> Equilibria:
         """Tips with their status, the margin of stability, and how each was found.
@@ -142,14 +149,12 @@ class LoadedRod(ArmRod):
         """
         self.prepare()
         gamma, lost = self.with_arms(self.box.check(activations))
-        solver = self.solver
-        equilibria = solver.empty(len(gamma))
+        postures, equilibria = self.postures, self.solver.empty(len(gamma))
         blocks = parallel.blocks(len(gamma), _BLOCK)
-        parallel.run(partial(solver.direct, gamma[b], equilibria.of(b)) for b in blocks)
-        for rung in LATER_RUNGS:
-            rows = solver.doubtful(equilibria, rung)
-            blocks = parallel.blocks(len(rows), LANES)
-            parallel.run(partial(solver.again, gamma, rows[b], rung, equilibria) for b in blocks)
+        parallel.run(partial(postures.direct, gamma, b, equilibria) for b in blocks)
+        rows = np.flatnonzero(equilibria.status != TipStatus.STABLE)
+        blocks = parallel.blocks(len(rows), _OF_LINES)
+        parallel.run(partial(postures.by_line, gamma, rows[b], equilibria) for b in blocks)
         drop(lost, equilibria.status, equilibria.tips, equilibria.margin)
         return equilibria
 
@@ -165,9 +170,10 @@ class LoadedRod(ArmRod):
     ) -> None:
         """Put tips, and what else is asked for, into place; each equilibrium is found once."""
         if slopes is None and twists is None and directions is None:
-            equilibria = self.solver.find(gamma)
+            equilibria = self.postures.find(gamma)
         else:
-            equilibria = self.solver.respond(gamma, directions=directions is not None)
+            known = self.postures.find(gamma)
+            equilibria = self.solver.respond(gamma, known, directions=directions is not None)
             if slopes is not None:
                 position_slopes(equilibria.tips, equilibria.twists, slopes)
             if twists is not None:
@@ -185,7 +191,8 @@ class LoadedRod(ArmRod):
         compliance = np.empty((len(gamma), 3, 3))
 
         def fill(block: slice) -> None:
-            compliance[block] = solver.respond(gamma[block], compliance=True).compliance
+            known = self.postures.find(gamma[block])
+            compliance[block] = solver.respond(gamma[block], known, compliance=True).compliance
 
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
         return compliance
@@ -199,7 +206,8 @@ class LoadedRod(ArmRod):
     def shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
         """Shapes at ascending stations; each equilibrium is found once."""
         gamma, lost = self.with_arms(gamma)
-        shapes = self._shape_solver.shapes(gamma, z, status=status)
+        known = self.equilibria(gamma)
+        shapes = self._shape_solver.shapes(gamma, z, known, status=status)
         if status is not None:
             gone = np.isnan(shapes.frames.position[:, 0, 0])
             status[gone & has_tip(status)] = TipStatus.UNDECIDED

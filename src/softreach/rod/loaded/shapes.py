@@ -51,7 +51,7 @@ def shapes_of(
 
     Args:
         tips: r [m], shape (n, 3).
-        trace: Of all boundaries of steps, tip first, as `any_loads.solve` fills it.
+        trace: Of all boundaries of steps, tip first, as `respond` fills it.
         rows: The boundary of each station.
         force: Dead force at the stations along the world's axes [N], shape (station, 3).
         stations: Z [m].

@@ -15,6 +15,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.load_number import load_number
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.loaded.phase import LoadPhase
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.steps import enough_for_all_breaks
@@ -24,6 +27,7 @@ from softreach.support.errors import InvalidInput
 __all__ = [
     "UNJUDGED",
     "Differences",
+    "check_steps",
     "checked",
     "fewest_steps",
     "shape_differences",
@@ -72,10 +76,15 @@ def _enough(
     solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
 ) -> int | None:
     tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
+    known: Equilibria | None = None
     while steps <= max(_MOST_STEPS, _FINER * at_all):
         solver = solver_of(steps)
         allowed = tol * solver.tables.arm.length / _SAFETY
-        equilibria = solver.find(gamma, patient=False)
+        if known is None:
+            known = solver.find(gamma)
+            held = has_tip(known.status)
+            gamma, known = gamma[held], known.of(held)
+        equilibria = solver.near(gamma, known)
         settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
         errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
         if not len(errors):
@@ -111,6 +120,18 @@ def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
 
 def _distances(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=-1)
+
+
+def check_steps(arm: Manipulator, phase: LoadPhase) -> None:
+    """Refuse loads that turn tangents more often than any number of steps can tell.
+
+    Raises:
+        InvalidInput: Too heavy loads.
+    """
+    if phase.fewest_steps > _MOST_STEPS:
+        load, most = f"of load number {load_number(arm):.3g}", f"at most {_MOST_STEPS} allowed"
+        allowed = f"lighter: they need {phase.fewest_steps:,} steps, {most}"
+        raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
 
 
 def checked(steps: int | None, tol: float) -> int:

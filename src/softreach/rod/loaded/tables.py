@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -21,6 +22,8 @@ from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 
+PHASE_OF_SEGMENT = 4.0  # [rad]
+MOST_SEGMENTS = 64
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
@@ -53,10 +56,6 @@ class ArmBody:
         return self.arm.section.mass_per_length_at(self.arm.profile, z)
 
 
-OneDirection = tuple[Array, Array, Array]
-"""Tables for the kernel of loads along one direction: pieces, lengths and scalars."""
-
-
 class StepTables(NamedTuple):
     """Steps from tip to base."""
 
@@ -68,13 +67,10 @@ class StepTables(NamedTuple):
     """1/K1, 1/K3 - 1/K1, 1/K0 and the dead force along the world's axes, (step, 5, 6)."""
     bends: Array
     """U at the nodes, (step, 5, 3, bundle)."""
-    jumps: Array
-    """Point loads at the tip end of a step, (step, 18)."""
-
-    @property
-    def for_one_direction(self) -> OneDirection:
-        """Tables for the kernel of loads along one direction."""
-        return self.pieces, self.lengths, np.ascontiguousarray(self.scalars[..., :4])
+    moments: Array
+    """Dead moment at the tip end of each step along the world's axes, (step, 3)."""
+    firsts: NDArray[np.int64]
+    """The first step of each segment, and the number of steps, (segment + 1,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +80,21 @@ class LoadTables:
     arm: Manipulator
     loads: Loads
     body: Body
+    longest: float = field(default=PHASE_OF_SEGMENT, kw_only=True)
+    """Phase of the longest segment between nodes [rad]."""
+    twist: float = field(default=0.0, kw_only=True)
+    """Of the arm at rest [rad/m], beside that of its design."""
+
+    @lazy
+    def nodes(self) -> Array:
+        """Z of the nodes between tip and base [m], even in phase, from tip to base."""
+        segments = max(1, math.ceil(min(self.phase.entire / self.longest, MOST_SEGMENTS)))
+        return self.phase.parted(segments)
+
+    @property
+    def segments(self) -> int:
+        """Segments of the arm, each shot from its tip end."""
+        return len(self.nodes) + 1
 
     @lazy
     def axes(self) -> Array:
@@ -113,11 +124,18 @@ class LoadTables:
         moments += [load.moment for load in loads.point_loads]
         return bool((np.abs(across) <= 1e-14 * size).all()) and not np.any(moments)
 
+    @property
+    def frame_size(self) -> int:
+        """Numbers by which the nodes of an arm tell how they see the world."""
+        return self.segments * (3 if self.one_direction else 6)
+
     @lazy
     def at_tip(self) -> Array:
-        """Lever of the payload times its weight along the first axis, then the moment, (6,)."""
-        lever = np.array(self.loads.payload_arm) * float(self._weight @ self.axes[0])
-        return np.concatenate([lever, self.loads.follower_moment])
+        """Weight of the payload along the axes, its lever, force and moment that follow, (12,)."""
+        loads = self.loads
+        weight = self.axes @ self._weight
+        parts = weight, loads.payload_arm, loads.follower_force, loads.follower_moment
+        return np.concatenate([np.array(part, float) for part in parts])
 
     @property
     def _weight(self) -> Array:
@@ -147,7 +165,7 @@ class LoadTables:
         return self._made[steps]
 
     def edges(self, stations: Array, steps: int) -> Array:
-        """Boundaries S of steps from tip to base, among them stations Z [m] and breaks.
+        """Boundaries S of steps from tip to base, among them stations Z [m], nodes and breaks.
 
         No step is longer in S than those of `steps` uniform ones.
         """
@@ -156,7 +174,7 @@ class LoadTables:
             *ends_of_steps(self.arm, steps),
             *(load.station for load in self.loads.point_loads),
         ]
-        z = np.unique(np.concatenate([[0.0, self.arm.length], breaks, stations]))
+        z = np.unique(np.concatenate([[0.0, self.arm.length], self.nodes, breaks, stations]))
         return edges_between(profile, profile.slender_coordinate(z), steps)[::-1]
 
     def of_edges(self, edges: Array) -> StepTables:
@@ -184,7 +202,8 @@ class LoadTables:
             ),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
-            self._jumps(profile.station(edges[:-1])),
+            self._moments(profile.station(edges[:-1])),
+            self._firsts(profile.station(edges)),
         )
 
     def _pieces(self, s: Array, width: Array) -> Array:
@@ -195,12 +214,14 @@ class LoadTables:
         z = profile.station(gauss)
         at = tables(self.arm, z.ravel())
         growth = at.growth.reshape(*z.shape, bundles)  # whose rotations alone are asked for
-        return rod.pack(
+        pieces = rod.pack(
             wide[:, None] * profile.radius(z),
             growth,
             growth,
             at.curvature.reshape(*z.shape, 3, bundles),
         )
+        pieces[:, 3::4, -1] += self.twist  # u3 at rest
+        return pieces
 
     def _forces(self, z: Array) -> Array:
         """Dead force n [N] at the nodes of steps, theory (60), (step, 5, 3)."""
@@ -217,16 +238,17 @@ class LoadTables:
             force[_step_inward(z[:, 0], load.station) :] += load.force
         return force
 
-    def _jumps(self, z: Array) -> Array:
-        """Moments, and forces that follow, at the tip end of every step, for theory (67)."""
-        loads, jumps = self.loads, np.zeros((len(z), 18))
-        jumps[0, :9] = np.outer(loads.payload_arm, self.axes @ self._weight).ravel()
-        jumps[0, 9:12] = self.axes @ np.array(loads.tip_moment)
-        jumps[0, 12:15], jumps[0, 15:18] = loads.follower_force, loads.follower_moment
-        for load in loads.point_loads:
+    def _moments(self, z: Array) -> Array:
+        moments = np.zeros((len(z), 3))
+        moments[0] = self.axes @ np.array(self.loads.tip_moment)
+        for load in self.loads.point_loads:
             step = _step_inward(z, load.station)
-            jumps[step : step + 1, 9:12] += self.axes @ np.array(load.moment)
-        return jumps
+            moments[step : step + 1] += self.axes @ np.array(load.moment)
+        return moments
+
+    def _firsts(self, ends: Array) -> NDArray[np.int64]:
+        inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
+        return np.array([0, *inner, len(ends) - 1], np.int64)
 
 
 def _step_inward(ends: Array, station: float) -> int:
@@ -260,11 +282,12 @@ class TipForceTables(LoadTables):
     def under(self, force: float) -> TipForceTables:
         """The same with another size of the force [N]."""
         kept = self.origin or self
-        return TipForceTables(self.arm, self.loads, self.body, self.direction, force, origin=kept)
+        parts = self.arm, self.loads, self.body, self.direction, force
+        return TipForceTables(*parts, origin=kept, longest=self.longest, twist=self.twist)
 
     @lazy
     def _given(self) -> LoadTables:
-        return LoadTables(self.arm, self.loads, self.body)
+        return LoadTables(self.arm, self.loads, self.body, longest=self.longest, twist=self.twist)
 
     @lazy
     def axes(self) -> Array:

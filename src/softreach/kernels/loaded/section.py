@@ -1,0 +1,294 @@
+"""Sections of loaded rods, and steps of them from tip to base, theory (64) to (68), (77), (78).
+
+A section is the world as it sees it, the moment and the tip. Walks with tangents carry turns of the
+world too, at the tip end of a segment along the axes of that, and what they change. Where all
+forces are along G a turn about it changes nothing: it is left out, and H is any direction normal to
+G.
+"""
+
+from __future__ import annotations
+
+import math
+
+from softreach.kernels.compiler import inline
+from softreach.kernels.lanes import LANES, get, put
+from softreach.kernels.loaded.explicit_rk8 import at_stages
+from softreach.kernels.loaded.frames import (
+    adjugate_rows,
+    along,
+    missing_direction,
+    missing_turn,
+    put_three,
+    size_of,
+    three,
+    unit,
+    world,
+)
+from softreach.kernels.loaded.rod_step import direction_tip, direction_walk, frame_tip, frame_walk
+from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
+from softreach.kernels.vector import combination, cross, dot, minus, plus, times
+
+# Rows of the workspace, LANES numbers each.
+G, H, M, Y, F = (3 * k * LANES for k in range(5))  # of the section; F: what follows, along G, H, K
+THETA, MOMENT, FORCE = (15 * LANES + 9 * k * LANES for k in range(3))  # three tangents
+TURNS = 42 * LANES  # of the section by the tangents, along G, H, K, 3 x 3
+CARRIED = 51 * LANES  # the same of the tip where the segment began, 2 x 2 of size 1
+MARGIN, SHARE, SIZE = (55 * LANES + k * LANES for k in range(3))
+
+
+@inline
+def begin_tip(w, tip, i):
+    """The section at the tip, theory (67): weight along the axes, lever, force and moment there."""
+    share, axes = w[SHARE + i], world(w, G, i)
+    weight = combination((share * tip[0], share * tip[1], share * tip[2]), axes)
+    m = cross((tip[3], tip[4], tip[5]), weight)
+    put(w, M, i, plus(m, (share * tip[9], share * tip[10], share * tip[11])))
+    put(w, F, i, along(axes, (share * tip[6], share * tip[7], share * tip[8])))
+    put(w, Y, i, (0.0, 0.0, 0.0))
+
+
+@inline
+def begin_tangents(w, tip, i):
+    """What turns of the world about its axes change there, theory (68)."""
+    share, axes = w[SHARE + i], world(w, G, i)
+    weight = combination((share * tip[0], share * tip[1], share * tip[2]), axes)
+    lever, f = (tip[3], tip[4], tip[5]), (share * tip[6], share * tip[7], share * tip[8])
+    put_three(w, THETA, i, axes)
+    for j in range(3):
+        put(w, MOMENT + 3 * j * LANES, i, cross(lever, cross(axes[j], weight)))
+        put(w, FORCE + 3 * j * LANES, i, along(axes, cross(f, axes[j])))
+
+
+@inline
+def push(w, moment, tangents, i):
+    """A dead moment at the tip end of a step, theory (67)."""
+    share, axes = w[SHARE + i], world(w, G, i)
+    m = combination((share * moment[0], share * moment[1], share * moment[2]), axes)
+    put(w, M, i, plus(get(w, M, i), m))
+    if tangents:
+        for j in range(3):
+            at = MOMENT + 3 * j * LANES
+            turn = get(w, THETA + 3 * j * LANES, i)
+            put(w, at, i, plus(get(w, at, i), cross(turn, m)))
+
+
+def _nodes_with(load):
+    """A function that has the nodes of the stages of a step, each with what loads it.
+
+    The unloaded arm is in the rows of `rest` from one on, the constants of the nodes are in `c`.
+    """
+
+    @inline
+    def node(w, rest, first, c, n, i):
+        at = first + NODE_ROWS * n * LANES
+        place = rest[at + i], rest[at + 4 * LANES + i], get(rest, at + LANES, i)
+        return (*place, c[n, 0], c[n, 1], c[n, 2], load(w, c, n, i))
+
+    @inline
+    def nodes(w, rest, first, c, i):
+        return at_stages(
+            (
+                node(w, rest, first, c, 0, i),
+                node(w, rest, first, c, 1, i),
+                node(w, rest, first, c, 2, i),
+                node(w, rest, first, c, 3, i),
+                node(w, rest, first, c, 4, i),
+            )
+        )
+
+    return nodes
+
+
+@inline
+def _weight(w, c, n, i):
+    return w[SHARE + i] * c[n, 3]
+
+
+@inline
+def _force(w, c, n, i):
+    return plus(times(w[SHARE + i], (c[n, 3], c[n, 4], c[n, 5])), get(w, F, i))
+
+
+@inline
+def _changing_force(w, c, n, i):
+    u = three(w, FORCE, i)
+    return _force(w, c, n, i), u[0], u[1], u[2]
+
+
+_direction_nodes, _changing_nodes = _nodes_with(_weight), _nodes_with(_changing_force)
+frame_nodes = _nodes_with(_force)
+"""Nodes of a step under any loads."""
+
+
+@inline
+def _step_direction_walk(w, rest, c, i):
+    _, t1, t2 = three(w, THETA, i)
+    _, m1, m2 = three(w, MOMENT, i)
+    s = get(w, G, i), get(w, M, i), t1, m1, t2, m2
+    (g, m, t1, m1, t2, m2), _ = direction_walk(_direction_nodes(w, rest, 0, c, i), s)
+    put(w, G, i, g)
+    put(w, M, i, m)
+    put(w, THETA + 3 * LANES, i, t1)
+    put(w, THETA + 6 * LANES, i, t2)
+    put(w, MOMENT + 3 * LANES, i, m1)
+    put(w, MOMENT + 6 * LANES, i, m2)
+
+
+@inline
+def step_direction_tip(w, rest, c, i):
+    """Step of G, M and the tip."""
+    s = get(w, G, i), get(w, M, i), get(w, Y, i)
+    (g, m, y), _ = direction_tip(_direction_nodes(w, rest, 0, c, i), s)
+    put(w, G, i, g)
+    put(w, M, i, m)
+    put(w, Y, i, y)
+
+
+@inline
+def _step_frame_walk(w, rest, c, i):
+    t, m = three(w, THETA, i), three(w, MOMENT, i)
+    s = get(w, G, i), get(w, H, i), get(w, M, i), t[0], m[0], t[1], m[1], t[2], m[2]
+    s, _ = frame_walk(_changing_nodes(w, rest, 0, c, i), s)
+    put(w, G, i, s[0])
+    put(w, H, i, s[1])
+    put(w, M, i, s[2])
+    put_three(w, THETA, i, (s[3], s[5], s[7]))
+    put_three(w, MOMENT, i, (s[4], s[6], s[8]))
+
+
+@inline
+def _step_frame_tip(w, rest, c, i):
+    s = get(w, G, i), get(w, H, i), get(w, M, i), get(w, Y, i)
+    (g, h, m, y), _ = frame_tip(frame_nodes(w, rest, 0, c, i), s)
+    put(w, G, i, g)
+    put(w, H, i, h)
+    put(w, M, i, m)
+    put(w, Y, i, y)
+
+
+@inline
+def _turns_of(w, i):
+    """The turns of the section by the tangents, along the axes of the world: columns of D."""
+    axes, theta = world(w, G, i), three(w, THETA, i)
+    return along(axes, theta[0]), along(axes, theta[1]), along(axes, theta[2])
+
+
+@inline
+def _turns_about(w, i):
+    """The same without turns about G, which change nothing."""
+    (_, h, k), (_, a, b) = world(w, G, i), three(w, THETA, i)
+    return (1.0, 0.0, 0.0), (0.0, dot(h, a), dot(k, a)), (0.0, dot(h, b), dot(k, b))
+
+
+@inline
+def carry_normal(w, at, h, i):
+    """Turn H no more than it has to be to stay normal to G."""
+    g = get(w, at, i)
+    put(w, at + 3 * LANES, i, unit(minus(h, times(dot(g, h), g))))
+
+
+@inline
+def _watch_directions(w, i):
+    """Note whether the turns lost their independence during the step, theory (77), (78).
+
+    With P and Q the 2 x 2 matrices before and after, Q P⁻¹ is near a positive multiple of the
+    identity for a short step. One conjugate point within makes its determinant negative, two its
+    trace. Both are those of the whole arm beyond, of which `CARRIED` brings what lies beyond the
+    segment.
+    """
+    carry_normal(w, G, get(w, H, i), i)
+    _, a, b = _turns_about(w, i)
+    p, q, r, s = (
+        w[TURNS + i],
+        w[TURNS + LANES + i],
+        w[TURNS + 2 * LANES + i],
+        w[TURNS + 3 * LANES + i],
+    )
+    c, d, e, f = (
+        w[CARRIED + i],
+        w[CARRIED + LANES + i],
+        w[CARRIED + 2 * LANES + i],
+        w[CARRIED + 3 * LANES + i],
+    )
+    t, u, v, z = a[1] * c + b[1] * e, a[1] * d + b[1] * f, a[2] * c + b[2] * e, a[2] * d + b[2] * f
+    before, after = p * p + q * q + r * r + s * s, t * t + u * u + v * v + z * z
+    determinant = 2.0 * (t * z - u * v) / after
+    trace = (t * s - u * r - v * q + z * p) / math.sqrt(before * after)
+    w[MARGIN + i] = min(w[MARGIN + i], min(determinant, trace))
+    _put_square(w, TURNS, i, t, u, v, z)
+
+
+@inline
+def _put_square(w, at, i, p, q, r, s):
+    w[at + i] = p
+    w[at + LANES + i] = q
+    w[at + 2 * LANES + i] = r
+    w[at + 3 * LANES + i] = s
+
+
+@inline
+def _first_directions(w, i):
+    _put_square(w, TURNS, i, 1.0, 0.0, 0.0, 1.0)
+    _put_square(w, CARRIED, i, 1.0, 0.0, 0.0, 1.0)
+
+
+@inline
+def _next_directions(w, i):
+    p, q, r, s = (
+        w[TURNS + i],
+        w[TURNS + LANES + i],
+        w[TURNS + 2 * LANES + i],
+        w[TURNS + 3 * LANES + i],
+    )
+    f = 1.0 / math.sqrt(p * p + q * q + r * r + s * s)
+    _put_square(w, TURNS, i, f * p, f * q, f * r, f * s)
+    _put_square(w, CARRIED, i, f * p, f * q, f * r, f * s)
+
+
+@inline
+def _watch_frames(w, i):
+    """The same of 3 x 3 matrices.
+
+    A conjugate point within gives Q P⁻¹ a negative eigenvalue, hence a negative trace, sum of
+    principal minors or determinant. Each segment begins with the identity.
+    """
+    before, after = three(w, TURNS, i), _turns_of(w, i)
+    put_three(w, TURNS, i, after)
+    p, q = adjugate_rows(before), adjugate_rows(after)
+    sizes = size_of(before), size_of(after), size_of(p), size_of(q)
+    trace = (dot(p[0], after[0]) + dot(p[1], after[1]) + dot(p[2], after[2])) / (
+        sizes[2] * sizes[1]
+    )
+    minors = dot(q[0], before[0]) + dot(q[1], before[1]) + dot(q[2], before[2])
+    determinant = 3.0 * dot(q[0], after[0]) / (sizes[3] * sizes[1])
+    minors /= sizes[3] * sizes[0]
+    w[MARGIN + i] = min(w[MARGIN + i], min(determinant, min(trace, minors)))
+
+
+@inline
+def _first_frames(w, i):
+    """Where a segment begins, the tangents are turns about the axes of the world."""
+    put_three(w, TURNS, i, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+ALONG_ONE = (
+    _step_direction_walk,
+    step_direction_tip,
+    _watch_directions,
+    _first_directions,
+    _next_directions,
+    _turns_about,
+    missing_direction,
+)
+"""Steps with tangents and without; the watch, where it begins and where it goes on; turns of
+tangents, and of what is missing: for forces along one direction."""
+IN_SPACE = (
+    _step_frame_walk,
+    _step_frame_tip,
+    _watch_frames,
+    _first_frames,
+    _first_frames,
+    _turns_of,
+    missing_turn,
+)
+"""The same for any loads."""

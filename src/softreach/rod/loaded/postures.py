@@ -1,0 +1,223 @@
+"""The postures of a loaded arm: it hangs first, and is then activated.
+
+The posture of γ is the stable equilibrium that follows continuously from that of the arm at rest,
+under all loads, when all activations are raised together to γ. Arms with a plane of symmetry lose
+their stability in it at pitchforks, and lean to either side from there on. So branches are followed
+on a twin of the arm with a tiny intrinsic twist, which decides between the sides, and every posture
+is then polished on the arm itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.rod.free import FreeRod
+from softreach.rod.loaded.flood import Flood, grid_sizes
+from softreach.rod.loaded.following import Followed, Path, follow, turn_between
+from softreach.rod.loaded.ring import Ring
+from softreach.rod.loaded.shooting import Equilibria, Shots
+from softreach.rod.tip_map import TipStatus
+from softreach.support.lazy import lazy
+
+if TYPE_CHECKING:
+    from softreach.rod.activation_box import ActivationBox
+    from softreach.rod.loaded.solver import Solver
+
+__all__ = ["Postures"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TWIST = 1e-4  # [rad], of the twin over its length
+_DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
+_NEAR_GUESS = 0.15  # [rad], of what is found from an interpolated frame
+_POLISHED = 0.5  # [rad], by which the arm may differ from its twin
+_LOST = 0.05  # margin below which a branch that ends has lost its stability
+_FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
+_PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
+_HANGING = 4.0  # [rad] of phase, from which on the unloaded arm tells nothing of one that hangs
+
+
+@dataclass(frozen=True, eq=False)
+class Postures:
+    """Postures of one arm, by lines from rest.
+
+    Args:
+        solver: That of the arm.
+        box: Bounds of its activations.
+        side: Sense of the twist that decides between mirror images, 1 or -1.
+    """
+
+    solver: Solver
+    box: ActivationBox
+    side: int = 1
+
+    @lazy
+    def twin(self) -> Solver:
+        """The solver of the twin."""
+        tables = self.solver.tables
+        twist = self.side * TWIST / tables.arm.length
+        return replace(self.solver, tables=replace(tables, twist=twist))
+
+    @lazy
+    def rest_activation(self) -> Array:
+        """0, or the bound next to it, shape (1, bundles)."""
+        return np.clip(0.0, self.box.low, self.box.high)[None]
+
+    @lazy
+    def rest(self) -> Shots:
+        """The twin at rest, as it was hung; not found where nothing holds it there."""
+        return self._hung(self.rest_activation).shots
+
+    @property
+    def is_held_at_rest(self) -> bool:
+        """True if the arm has a stable posture at rest."""
+        return bool(self.rest.is_found[0])
+
+    def _hung(self, gamma: Array) -> Followed:
+        """Loads put on the twin at fixed activations."""
+        path = Path.of_loads(gamma)
+        start = self.twin.careful(gamma, None, path.from_share)
+        return follow(self.twin, path, start)
+
+    @lazy
+    def _ring(self) -> Ring | None:
+        return Ring.at_rest(self.solver, self.rest_activation)
+
+    def find(self, gamma: Array) -> Equilibria:
+        """Postures at activations (n, bundles), on the calling thread."""
+        equilibria = self.solver.empty(len(gamma))
+        self.direct(gamma, slice(None), equilibria)
+        rows = np.flatnonzero(equilibria.status != TipStatus.STABLE)
+        if len(rows):
+            self.by_line(gamma, rows, equilibria)
+        return equilibria
+
+    def direct(self, gamma: Array, rows: slice, equilibria: Equilibria) -> None:
+        """Newton's method from where the posture may be, at some rows; UNDECIDED where it fails."""
+        if not self.is_held_at_rest:
+            return
+        guesses, known = self._guesses(gamma[rows])
+        shots = self.solver.quick(gamma[rows], guesses)
+        good = shots.is_found & (shots.margin > _DOUBTFUL) & known
+        if self._begins_near and guesses is not None:
+            good &= turn_between(shots.frame, guesses) < _NEAR_GUESS
+        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
+
+    @property
+    def _begins_near(self) -> bool:
+        return False
+
+    def _guesses(self, gamma: Array) -> tuple[Array | None, Mask]:
+        """Frames of the unloaded arm, or of one that hangs along it; and where they are known."""
+        tables, known = self.solver.tables, np.ones(len(gamma), bool)
+        if tables.phase.entire <= _HANGING or tables.axes[0, 2] < _PULLED:
+            return None, known
+        stations = np.append(tables.nodes[::-1], tables.arm.length)
+        directors = self._unloaded.frames(gamma, stations).directors[:, ::-1]
+        along = directors[:, :, 2]
+        if tables.one_direction:
+            return along.reshape(len(gamma), -1), known
+        across = np.broadcast_to(tables.axes[1], along.shape)
+        across = across - (along * across).sum(axis=2, keepdims=True) * along
+        size = np.linalg.norm(across, axis=2, keepdims=True)
+        across = np.where(size > 0.1, across / np.maximum(size, 0.1), directors[:, :, 0])
+        return np.concatenate([along, across], axis=2).reshape(len(gamma), -1), known
+
+    @lazy
+    def _unloaded(self) -> FreeRod:
+        return FreeRod(self.solver.tables.arm, 1e-4)
+
+    def by_line(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
+        """Postures at some rows along the straight lines from rest."""
+        followed = self.followed(gamma[rows])
+        self._polish(gamma, rows, followed, equilibria)
+        snaps = followed.has_ended & (followed.shots.margin < _LOST)
+        gone = equilibria.status[rows] == TipStatus.UNDECIDED
+        equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
+        if not self.is_held_at_rest and gone.any():
+            self._unstable(gamma, rows[gone], equilibria)
+
+    def _polish(
+        self, gamma: Array, rows: NDArray[np.intp], followed: Followed, equilibria: Equilibria
+    ) -> None:
+        """Put down the postures of the arm beside those of its twin."""
+        on_twin = followed.shots
+        shots = self.solver.careful(gamma[rows], on_twin.frame)
+        good = on_twin.is_found & shots.is_found & (shots.margin > 0.0)
+        good &= turn_between(shots.frame, on_twin.frame) < _POLISHED
+        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
+
+    def _unstable(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
+        """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
+        shots = self.solver.careful(gamma[rows], None)
+        at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
+        good = shots.is_found & (
+            (shots.margin <= 0.0) | at_rest
+        )  # no stable ones of other branches
+        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
+
+    def followed(self, gamma: Array) -> Followed:
+        """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
+        if self.is_held_at_rest:
+            begin = np.repeat(self.rest_activation, len(gamma), axis=0)
+            start = self.rest.of(np.zeros(len(gamma), np.intp))
+        else:
+            begin, start = self._leaning(gamma)
+        return follow(self.twin, Path.under_all_loads(begin, gamma), start)
+
+    def _leaning(self, gamma: Array) -> tuple[Array, Shots]:
+        """Places on lines where the twin leans that nothing holds at rest, and how it does."""
+        rest, ring = self.rest_activation, self._ring
+        begin = rest + _FIRST_PARTS[0] * (gamma - rest)
+        if ring is None:
+            return begin, self._hung(begin).shots
+        start = ring.near(self.twin, begin)
+        for part in _FIRST_PARTS[1:]:
+            left = np.flatnonzero(~start.is_found)
+            begin[left] = rest + part * (gamma[left] - rest)
+            found = ring.near(self.twin, begin[left])
+            for values, new in zip(start, found, strict=True):
+                values[left] = new
+        return begin, start
+
+    def with_flood(self) -> Postures:
+        """The same, with starts from a grid over the box where that is worth it."""
+        sizes = grid_sizes(self.box)
+        if sizes is None or not self.is_held_at_rest:
+            return self
+        flood = Flood.over(self.twin, self.box, sizes, self.rest_activation[0], self.rest)
+        return FloodedPostures(self.solver, self.box, self.side, flood)
+
+
+@dataclass(frozen=True, eq=False)
+class FloodedPostures(Postures):
+    """The same with starts from a flooded grid."""
+
+    flood: Flood | None = None
+
+    @property
+    def _begins_near(self) -> bool:
+        return True
+
+    def _guesses(self, gamma: Array) -> tuple[Array | None, Mask]:
+        assert self.flood is not None
+        return self.flood.at(gamma)
+
+    def followed(self, gamma: Array) -> Followed:
+        """The same from where the lines meet the first cut: before, they are on one branch."""
+        assert self.flood is not None
+        rest = self.rest_activation
+        begin = rest + self.flood.clear(rest, gamma)[:, None] * (gamma - rest)
+        guesses = self.flood.at(begin)[0]
+        start = self.twin.careful(begin, guesses)
+        good = start.is_found & (start.margin > 0.0)
+        lost = ~good | (turn_between(start.frame, guesses) > _NEAR_GUESS)
+        begin[lost] = rest
+        for values, at_rest in zip(start, self.rest, strict=True):
+            values[lost] = at_rest[0]
+        return follow(self.twin, Path.under_all_loads(begin, gamma), start)
