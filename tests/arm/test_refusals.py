@@ -40,7 +40,6 @@ from softreach.arm.design_file.keys import keys_of
 from softreach.arm.design_file.schema import json_schema
 from softreach.arm.number import fields_of, number, own_fields
 from softreach.arm.parameters import changed, find_parameter, parameters
-from softreach.arm.parameters.draft import Path
 from softreach.arm.tables import tables
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.cable import Cable
@@ -276,12 +275,13 @@ def test_every_declared_number_of_an_arm_is_a_parameter_with_its_range(trunk):
 
 
 def test_a_parameter_knows_its_place_without_its_name(trunk):
-    assert find_parameter(trunk, "left.offset").path == Path(("actuators", "left"), "offset")
-    modulus = find_parameter(trunk, "rings[0].material.young_modulus")
-    assert modulus.path == Path(("rings", 0, "material"), "young_modulus")
-    assert find_parameter(trunk, "left.upper").path == Path(
-        ("actuators", "left"), "activation_bounds", (1,)
-    )
+    def place(name: str) -> tuple[object, ...]:
+        (only,) = find_parameter(trunk, name).places
+        return only
+
+    assert place("left.offset") == (("actuators", "left"), "offset")
+    assert place("rings[0].material.young_modulus") == (("rings", 0, "material"), "young_modulus")
+    assert place("left.upper") == (("actuators", "left"), "upper")
 
 
 def test_a_field_that_a_kind_of_ones_own_gives_another_default_stays_a_number():

@@ -7,26 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon, Tendon
+from softreach.arm.manipulator import Manipulator
 from softreach.arm.rest_shape import STRAIGHT, RestStrains
-from softreach.arm.tables import ends_over, strain_stations, tables
+from softreach.arm.tables import ends_over, range_of_extension, strain_stations, tables
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
 
 __all__ = [
     "Driving",
     "InnerActivations",
     "body_of",
     "cube_corners",
+    "extension_range",
     "inner_arm",
     "pilot",
     "without_dead_zones",
@@ -207,9 +206,17 @@ def without_dead_zones(arm: Manipulator) -> Manipulator:
 def inner_arm(arm: Manipulator) -> Manipulator:
     """The arm as tables and kernels see it, with bounds that hold what activations lead to.
 
+    It is the arm itself where inputs load its sections as they are. A rest shape is a bundle held
+    at 1, and tendons that are driven by length have tensions.
+
     Raises:
         InvalidDesign: Displacements within the bounds shorten the arm to nothing.
     """
+    return arm if arm.is_direct else _inner_arm(arm)
+
+
+@lru_cache(maxsize=64)
+def _inner_arm(arm: Manipulator) -> Manipulator:
     driving, body = Driving(arm), body_of(arm)
     bounds = driving.ranges.copy()
     if not driving.has_length_tendons:
@@ -296,3 +303,9 @@ def _by_tension(body: Manipulator, bounds: Array) -> Iterator[object]:
 def _unused(name: str, taken: Sequence[str]) -> str:
     """The name, with a mark for each time that it is taken."""
     return _unused(name + "'", taken) if name in taken else name
+
+
+def extension_range(arm: Manipulator) -> tuple[float, float]:
+    """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
+    arm = inner_arm(arm)
+    return range_of_extension(arm, tables(arm, strain_stations(arm)).extension)

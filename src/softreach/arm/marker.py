@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from softreach.arm.number import number
 from softreach.arm.stations import Located
@@ -24,8 +23,6 @@ class Marker(Located):
         InvalidDesign: No name, or a station off the arm, given twice, or of no such name.
     """
 
-    _places: ClassVar[tuple[str, ...]] = ("station",)
-
     name: str
     """Name in files and results; unique within an arm."""
     station_over_length: float = number(
@@ -33,7 +30,13 @@ class Marker(Located):
     )
     """Z/L of its section [-]."""
     station: float | str | None = number(
-        "Z", "m", "where its section is", low=0.0, named=True, default=None
+        "Z",
+        "m",
+        "where its section is",
+        low=0.0,
+        named=True,
+        instead_of="station_over_length",
+        default=None,
     )
     """Z [m], or the name of a station of the arm, in place of `station_over_length`."""
     offset: Triple = number(

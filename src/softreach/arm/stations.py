@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from softreach.arm.number import Number, Station, fields_of, is_path_name, number
 from softreach.arm.part import Part
@@ -43,6 +43,16 @@ class Stations(Mapping[str, float]):
             raise InvalidDesign(faults)
         self._places = {str(name): float(z) for name, z in pairs.items()}
 
+    @property
+    def numbers(self) -> dict[str, Number]:
+        """Places by name: what begins, ends or stands there moves with it."""
+        return dict.fromkeys(self, PLACE)
+
+    def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
+        """Z [m]."""
+        del profile, section
+        return (self[name],)
+
     def replace(self, **places: float) -> Stations:
         """Those with some in other places."""
         return Stations(self._places | places)
@@ -79,8 +89,10 @@ class Located(Part):
         InvalidDesign: A place off the arm, or given twice.
     """
 
-    _places: ClassVar[tuple[str, ...]]
-    """Its places: the fields in m or by name, beside each of which one is over L."""
+    @property
+    def _places(self) -> list[str]:
+        """Fields that are places in m or by name, beside each of which one is over L."""
+        return [field for field, declared in fields_of(type(self)).items() if declared.named]
 
     def station_at(self, field: str, length: float) -> float:
         """Z [m] of a place on an arm of a length [m].
@@ -112,35 +124,6 @@ class Located(Part):
             and not isinstance(getattr(self, field), Station)
         ]
 
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number when this part belongs to an arm with this profile and section."""
-        del section
-        if field in self._places:
-            return self.station_at(field, profile.length)
-        if (place := field.removesuffix("_over_length")) in self._places:
-            return self.station_over_length_at(place, profile.length)
-        return getattr(self, field)
-
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed; a new place takes that of the one given otherwise."""
-        for field in self._places:
-            ratio = f"{field}_over_length"
-            if changes.get(field) is not None:
-                changes.setdefault(ratio, _default(type(self), ratio))
-            if changes.get(ratio) is not None:
-                changes.setdefault(field, None)
-        return super().replace(**changes)
-
-    def _faults(self) -> list[Fault]:
-        faults = super()._faults()
-        for field in self._places:
-            ratio = f"{field}_over_length"
-            value = getattr(self, field), getattr(self, ratio)
-            if value[0] is not None and value[1] != _default(type(self), ratio):
-                allowed = f"give exactly one of {field} and {ratio}"
-                faults.append(Fault(f"{field}, {ratio}", value, allowed))
-        return faults
-
 
 @dataclass(frozen=True, kw_only=True)
 class Span(Located):
@@ -149,8 +132,6 @@ class Span(Located):
     Raises:
         InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
     """
-
-    _places: ClassVar[tuple[str, ...]] = ("start", "end")
 
     start_over_length: float = number(
         "Z0/L", "", "where it begins", low=0.0, high=1.0, open_high=True, default=0.0
@@ -161,11 +142,24 @@ class Span(Located):
     )
     """Z1/L, where it ends [-]."""
     start: float | str | None = number(
-        "Z0", "m", "where it begins", low=0.0, named=True, default=None
+        "Z0",
+        "m",
+        "where it begins",
+        low=0.0,
+        named=True,
+        instead_of="start_over_length",
+        default=None,
     )
     """Z0 [m], or the name of a station of the arm, in place of `start_over_length`."""
     end: float | str | None = number(
-        "Z1", "m", "where it ends", low=0.0, open_low=True, named=True, default=None
+        "Z1",
+        "m",
+        "where it ends",
+        low=0.0,
+        open_low=True,
+        named=True,
+        instead_of="end_over_length",
+        default=None,
     )
     """Z1 [m], or the name of a station of the arm, in place of `end_over_length`."""
 
@@ -229,7 +223,3 @@ def _allowed(name: str, stations: Mapping[str, float]) -> str:
     return f"must be Z in m or a station of the arm: {', '.join(stations)}" + (
         f"; {hint}" if hint else ""
     )
-
-
-def _default(kind: type, field: str) -> Any:
-    return getattr(kind, "__dataclass_fields__")[field].default  # noqa: B009

@@ -10,8 +10,7 @@ import numpy as np
 
 from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters.changes import unknown_parameter
-from softreach.arm.parameters.shown import from_written, written_parameters
+from softreach.arm.parameters import from_written, unknown_parameter, written_parameters
 from softreach.atlas.arguments import column
 from softreach.atlas.space import DesignSpace
 from softreach.support.errors import InvalidDesign, InvalidInput

@@ -16,7 +16,7 @@ from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, 
 if TYPE_CHECKING:
     from softreach.arm.loads import Loads
     from softreach.arm.manipulator import Manipulator
-    from softreach.arm.parameters.parameter import Parameter as DesignParameter
+    from softreach.arm.parameters import Parameter as DesignParameter
 
 
 _POSTURES = {"upright": "up", "hanging": "down"}
@@ -117,7 +117,7 @@ class Changes:
             raise InvalidInput(name, value, why)
 
     def _angles(self) -> dict[str, float]:
-        from softreach.arm.parameters.shown import from_written
+        from softreach.arm.parameters import from_written
 
         angles = {"revolution": self.revolution_deg, "taper": self.taper_deg}
         return {name: from_written(x, "rad") for name, x in angles.items() if x is not None}
@@ -275,8 +275,11 @@ def _values(
     arm: Manipulator, texts: Mapping[str, str], angles: Mapping[str, float] = MappingProxyType({})
 ) -> dict[str, float]:
     """Name of a parameter -> value in its unit, from what was written, and from angles."""
-    from softreach.arm.parameters.changes import find_parameter, parameters_by_every_name
-    from softreach.arm.parameters.shown import written_parameters
+    from softreach.arm.parameters import (
+        find_parameter,
+        parameters_by_every_name,
+        written_parameters,
+    )
 
     values = dict(angles)
     if not texts:
@@ -291,7 +294,7 @@ def _values(
 
 
 def _value(parameter: DesignParameter, name: str, text: str, *, unit_in_name: bool) -> float:
-    from softreach.arm.parameters.shown import from_written, written_name
+    from softreach.arm.parameters import from_written, written_name
     from softreach.support.quantity import read_quantity, unit_names
 
     try:

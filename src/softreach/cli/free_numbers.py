@@ -46,8 +46,7 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
 
 class _Names:
     def __init__(self, arm: Manipulator) -> None:
-        from softreach.arm.parameters.changes import parameters_by_every_name
-        from softreach.arm.parameters.shown import written_parameters
+        from softreach.arm.parameters import parameters_by_every_name, written_parameters
 
         self.plain = parameters_by_every_name(arm)
         self.written = written_parameters(arm)
@@ -62,7 +61,7 @@ class _Names:
         return name in self.written and name not in self.plain
 
     def value(self, name: str, text: str) -> float:
-        from softreach.arm.parameters.shown import from_written
+        from softreach.arm.parameters import from_written
         from softreach.support.quantity import read_quantity, unit_names
 
         first = name.split("=")[0].strip()

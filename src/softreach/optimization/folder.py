@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softreach.arm.number import unit_suffix
-from softreach.arm.parameters.shown import with_suffix
+from softreach.arm.parameters import with_suffix
 from softreach.optimization.problem import Candidate
 from softreach.optimization.report import (
     front_rows,

@@ -13,7 +13,6 @@ from softreach.arm.actuators.actuator import (
     Outline,
     PolarActuator,
     Resultants,
-    length_or_ratio_faults,
 )
 from softreach.arm.along import AlongArm, Samples
 from softreach.arm.number import as_numbers, number
@@ -69,7 +68,14 @@ class Tendon(PolarActuator):
     )
     """Ω, rotation from where it begins to its anchor, even along Z [rad]."""
     distance: float | tuple[float, float] | Samples | None = number(
-        "ρt", "m", "distance from the axis", low=0.0, along=Samples, pair=True, default=None
+        "ρt",
+        "m",
+        "distance from the axis",
+        low=0.0,
+        along=Samples,
+        pair=True,
+        instead_of="distance_ratio",
+        default=None,
     )
     """ρt, from the axis [m]; a number, two (where it begins and at its anchor; straight between
     them), or samples along the arm."""
@@ -78,7 +84,13 @@ class Tendon(PolarActuator):
     )
     """ρt over the outer radius R2(Z) [-]."""
     routing: Samples | None = number(
-        "θ", "rad", "angle along the arm", shape="along", along=Samples, default=None
+        "θ",
+        "rad",
+        "angle along the arm",
+        shape="along",
+        along=Samples,
+        instead_of="revolution",
+        default=None,
     )
     """θ(Z) - θ0 along the arm [rad], in place of an even rotation."""
 
@@ -120,50 +132,18 @@ class Tendon(PolarActuator):
         del profile
         return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
 
-    def replace(self, **changes: Any) -> Tendon:
-        """A copy with some fields changed.
-
-        A new distance takes the place of a ratio, and a new revolution that of a routing.
-        """
-        if changes.get("revolution") is not None:
-            changes.setdefault("routing", None)
-        if changes.get("distance") is not None:
-            changes.setdefault("distance_ratio", None)
-        if changes.get("distance_ratio") is not None:
-            changes.setdefault("distance", None)
-        return super().replace(**changes)
-
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number; of distance and ratio, the one not given follows at the base.
-
-        The revolution of a routing is its rotation from where the tendon begins to its anchor.
-        """
-        if field == "revolution" and self.routing is not None:
-            return float(np.diff(self.routing(self.span_over_length(profile.length)))[0])
-        base = float(profile.radius(0.0))
-        if field == "distance" and self.distance is None:
-            return (self.distance_ratio or 0.0) * base
-        if field == "distance_ratio" and isinstance(self.distance, int | float):
-            return self.distance / base
-        return super().value_on(field, profile, section)
+    def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
+        """The revolution of a routing: from where the tendon begins to its anchor."""
+        if field == "revolution":
+            return float(np.diff(other(self.span_over_length(profile.length)))[0])
+        return super()._following(field, other, profile, section)
 
     def _route(self, profile: Profile, z: Array) -> _Route:
         column = z[:, None]
         angle, turning = self._angle(profile, column)
-        return _Route(*self._distance(profile, column), self.start_angles + angle, turning)
-
-    def _distance(self, profile: Profile, z: Array) -> tuple[Array, Array]:
-        """ρt and its slope."""
-        if self.distance_ratio is not None:
-            return self.distance_ratio * profile.radius(z), -self.distance_ratio * profile.slope(z)
-        if isinstance(self.distance, AlongArm):
-            x = z / profile.length
-            return self.distance(x), self.distance.derivative(x) / profile.length
-        if isinstance(self.distance, tuple):
-            (first, last), (start, end) = self.distance, self.span(profile.length)
-            slope = (last - first) / (end - start)
-            return first + slope * (np.clip(z, start, end) - start), np.full(z.shape, slope)
-        return np.full(z.shape, self.distance), np.zeros(z.shape)
+        return _Route(
+            *self.length_and_slope("distance", profile, column), self.start_angles + angle, turning
+        )
 
     def _angle(self, profile: Profile, z: Array) -> tuple[Array, Array]:
         """θ - θ0 and its slope."""
@@ -175,13 +155,9 @@ class Tendon(PolarActuator):
         return rate * (x - start), np.full(z.shape, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
-        faults = super()._faults() + length_or_ratio_faults(vars(self), "distance")
+        faults = super()._faults()
         tensions = as_numbers(self.activation_bounds)
         if tensions.size and tensions.min() < self.least:
             allowed = "must be at least 0 N: a tendon pulls and cannot push"
             faults.append(Fault("activation_bounds", self.activation_bounds, allowed))
-        turns_evenly = all(fault.path != "revolution" for fault in faults) and self.revolution != 0
-        if turns_evenly and isinstance(self.routing, Samples):
-            allowed = "must be left out where routing is given, which says how the tendon turns"
-            faults.append(Fault("revolution", self.revolution, allowed))
         return faults

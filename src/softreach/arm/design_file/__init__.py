@@ -3,9 +3,8 @@
 from softreach.arm.design_file.keys import in_file_terms
 from softreach.arm.design_file.read import (
     LONGEST,
-    Parts,
     document_of,
-    parse,
+    read,
     text_of,
 )
 from softreach.arm.design_file.write import display_text, render
@@ -14,11 +13,10 @@ from softreach.support.files.formats import FileFormat, Formats
 __all__ = [
     "DESIGN_FILE",
     "LONGEST",
-    "Parts",
     "display_text",
     "document_of",
     "in_file_terms",
-    "parse",
+    "read",
     "render",
     "text_of",
 ]
