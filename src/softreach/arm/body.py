@@ -21,9 +21,8 @@ from softreach.arm.loads import Loads
 from softreach.arm.part import faults_under
 from softreach.arm.profile import Profile
 from softreach.arm.rest_shape import STRAIGHT, RestShape
-from softreach.arm.rigid import RigidPiece
 from softreach.arm.section import Section, Stiffness, name_faults
-from softreach.arm.stations import Located, Stations, placed
+from softreach.arm.stations import Located, RigidPiece, Stations, placed
 from softreach.support.arrays import as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
@@ -62,7 +61,6 @@ class Body:
                 raise InvalidDesign(found)
 
     def _faults(self) -> list[Fault]:
-        """Parts of the wrong type."""
         kinds = {
             "profile": (Profile, "must be a Profile, such as LinearTaper"),
             "section": (Section, "must be a Section"),

@@ -182,7 +182,7 @@ class Drive(Part):
         if not is_pair or not all(map(_FINITE.admits, bounds)) or bounds[0] > bounds[1]:
             allowed = f"must be a pair (lower, upper) of numbers up to {MOST:g}, lower <= upper"
             yield Fault("bounds", self.bounds, allowed)
-        bundles = self.gains if isinstance(self.gains, Mapping) else ()
+        bundles = self.gains if isinstance(self.gains, Mapping) else self.offsets
         for field in ("gains", "offsets"):
             numbers = getattr(self, field)
             if not isinstance(numbers, Mapping) or (field == "gains" and not numbers):

@@ -5,7 +5,6 @@ Displacements of tendons become tensions, and the rest shape is a bundle that is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -232,7 +231,13 @@ def _inner_arm(arm: Manipulator) -> Manipulator:
     most = _SAFETY * gamma.max(axis=0) + _against_loads(arm)
     columns = driving.law.columns
     bounds[columns] = np.stack([np.zeros(len(columns)), most[columns]], axis=1)
-    return body.replace(actuators=tuple(_by_tension(body, _fitting(bounds, columns, rates))))
+    ends = np.cumsum([each.bundles for each in body.actuators])
+    shares = zip(body.actuators, np.split(_fitting(bounds, columns, rates), ends), strict=False)
+    actuators = (
+        each.by_tension(own) if isinstance(each, LengthTendon) else each.with_bounds(own)
+        for each, own in shares
+    )
+    return body.replace(actuators=tuple(actuators))
 
 
 def _against_loads(arm: Manipulator) -> float:
@@ -251,8 +256,11 @@ def body_of(arm: Manipulator) -> Manipulator:
     if not arm.drives and arm.rest.is_straight:
         return arm
     if (known := vars(arm).get("_body")) is None:
+        name = "rest shape"
+        while name in arm.bundle_names:
+            name += "'"
         held = RestStrains(
-            name=_unused("rest shape", arm.bundle_names),
+            name=name,
             shape=arm.rest,
             activation_bounds=(1.0, 1.0),
         )
@@ -288,21 +296,6 @@ def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:
     fitting = bounds.copy()
     fitting[columns] *= min(1.0, share)
     return fitting
-
-
-def _by_tension(body: Manipulator, bounds: Array) -> Iterator[object]:
-    first = 0
-    for actuator in body.actuators:
-        last = first + actuator.bundles
-        is_pulled = isinstance(actuator, LengthTendon)
-        own = bounds[first:last]
-        yield actuator.by_tension(own) if is_pulled else actuator.with_bounds(own)
-        first = last
-
-
-def _unused(name: str, taken: Sequence[str]) -> str:
-    """The name, with a mark for each time that it is taken."""
-    return _unused(name + "'", taken) if name in taken else name
 
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:

@@ -11,20 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import design_file
-from softreach.arm.actuators import (
-    Actuator,
-    LengthTendon,
-    SectorActuator,
-)
+from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence
 from softreach.arm.drives import Drive, drive_faults
-from softreach.arm.marker import Marker
+from softreach.arm.load_number import scale_warnings
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
-from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.stations import Marker
 from softreach.support.arguments import (
     as_flag,
     as_given,
@@ -71,7 +67,6 @@ class Manipulator(Body):
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
 
     def _faults(self) -> list[Fault]:
-        """Parts of the wrong type."""
         faults = super()._faults()
         if not isinstance(self.base, Base):
             faults.append(Fault("base", self.base, 'must be a Base, such as Base(points="down")'))
@@ -88,7 +83,6 @@ class Manipulator(Body):
         return faults + self._place("markers", markers)
 
     def _fit_faults(self) -> list[Fault]:
-        """Faults of markers and drives on this body."""
         faults = [*name_faults([each.name for each in self.markers], "markers")]
         faults += super()._fit_faults()
         if faults:
@@ -224,18 +218,7 @@ class Manipulator(Body):
 
     @lazy
     def _toml(self) -> str:
-        return design_file.render(
-            self.profile,
-            self.section,
-            self.actuators,
-            self.loads,
-            self.base,
-            self.rest,
-            self.stations,
-            self.rigid_pieces,
-            self.drives,
-            self.markers,
-        )
+        return design_file.render(vars(self))
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
@@ -250,7 +233,7 @@ class Manipulator(Body):
         """
         source = as_path("path", path)
         arm = cls.from_toml(design_file.text_of(source), source=source)
-        for text in scale_warnings(arm.profile, arm.section):
+        for text in scale_warnings(arm):
             warn(f"{source}: {text}")
         return arm
 
@@ -333,7 +316,7 @@ class Manipulator(Body):
     def _repr_html_(self) -> str:
         from softreach.arm.skin import arm_card
 
-        return arm_card(self)
+        return arm_card(self, self.base)
 
     def _fiber_index(self, fiber: str | int) -> int:
         names = {
@@ -358,7 +341,6 @@ def a_manipulator(name: str, value: object) -> Manipulator:
 
 
 def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Made | None:
-    """A part, or None and its faults added to a list."""
     try:
         return kind(**values)
     except InvalidDesign as error:
@@ -367,7 +349,6 @@ def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Mad
 
 
 def _inner_radius_faults(inner: Any, outer: Any) -> list[Fault]:
-    """Faults of the radius where the ring of fibers begins."""
     allowed = Range(0.0, unit="m")
     if not allowed.admits(inner):
         return [Fault("inner_radius", inner, allowed)]

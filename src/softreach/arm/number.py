@@ -406,7 +406,6 @@ def _plain_number(owner: type, field: dataclasses.Field[Any]) -> Number | None:
 
 
 def _is_ours(owner: type) -> bool:
-    """A class of softreach, which declares every number."""
     return owner.__module__.partition(".")[0] == "softreach"
 
 

@@ -28,16 +28,11 @@ from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.number import Number, alternatives, fields_of, unit_suffix
+from softreach.arm.part import faults_under
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
 from softreach.support.arguments import as_instance, as_text, plain
-from softreach.support.errors import (
-    Fault,
-    InvalidDesign,
-    InvalidInput,
-    Range,
-    did_you_mean,
-)
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean
 
 __all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "parameters"]
 
@@ -153,11 +148,9 @@ class DerivedParameter(Parameter):
     write: Callable[[Manipulator, Rule], dict[Address, float]]
 
     def values(self, arm: Manipulator) -> tuple[float, ...]:
-        """What the law reads from this arm."""
         return self.read(arm)
 
     def edits(self, arm: Manipulator, new: Rule) -> dict[Address, float]:
-        """What the law asks of parts."""
         return self.write(arm, new)
 
 
@@ -275,7 +268,6 @@ def _own(key: PartKey, called: str, number: Number) -> Parameter:
 
 
 def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Parameter]:
-    """Parameters of the arm as a whole, from those of its parts."""
     alone = {each.name: each.number for each in own.values() if not each.owner}
     if any(called == "revolution" and one.unit == "rad" for (_, called), one in own.items()):
         meaning = "revolution of all that is helical, each in its own sense"
@@ -307,7 +299,6 @@ def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Para
 
 
 def _places(own: Iterable[Address], called: str, *kinds: str) -> tuple[Address, ...]:
-    """Those of parts of some kinds that are called alike."""
     return tuple(place for place in own if place[1] == called and place[0][0] in kinds)
 
 
@@ -449,10 +440,12 @@ def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
     """The arm with changed parts; faults under the names and with the values that were asked."""
     new, faults, inside = dict(parts(arm)), [], edits.get(("section",), {})
     for key in (key for key in edits if key != ("section",)):
+        values = {name: edit.value for name, edit in edits[key].items()}
         try:
-            new[key] = new[key].replace(**{name: edit.value for name, edit in edits[key].items()})
+            with faults_under(owner_of(key)):
+                new[key] = new[key].replace(**values)
         except InvalidDesign as error:
-            faults += [_behind(owner_of(key), fault) for fault in error.faults]
+            faults += error.faults
     try:
         if not faults:
             return _assembled(arm, new, {name: edit.value for name, edit in inside.items()})
@@ -462,16 +455,10 @@ def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
     raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in asked}.values()])
 
 
-def _behind(owner: str, fault: Fault) -> Fault:
-    """A fault of a part under its name."""
-    fields = fault.path.split(", ")
-    return fault._replace(path=", ".join(f"{owner}.{field}".lstrip(".") for field in fields))
-
-
 def _assembled(
     arm: Manipulator, new: Mapping[PartKey, Any], inside: Mapping[str, float]
 ) -> Manipulator:
-    """An arm of these parts; other numbers of the section are `inside`."""
+    """Of the section, other numbers than those of its parts are `inside`."""
     rings = tuple(
         new["rings", k].replace(material=new["rings", k, "material"])
         for k in range(len(arm.section.rings))

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["PLACE", "Located", "Span", "Stations", "placed"]
+__all__ = ["PLACE", "Located", "Marker", "RigidPiece", "Span", "Stations", "placed"]
 
-Made = TypeVar("Made", bound=Part)
+Triple = tuple[float, float, float]
 
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
 """Declaration of the place of a named station."""
@@ -38,7 +38,13 @@ class Stations(Mapping[str, float]):
         except (TypeError, ValueError):
             allowed = "must be a mapping from names to Z in m"
             raise InvalidDesign([Fault("", places, allowed)]) from None
-        faults = [Fault(str(name), z, allowed) for name, z, allowed in _wrong(pairs)]
+        faults: list[Fault] = []
+        for name, z in pairs.items():
+            if not isinstance(name, str) or not name or not is_path_name(name):
+                allowed = "must be named by one line without dots and brackets"
+                faults.append(Fault(str(name), z, allowed))
+            elif not PLACE.allowed.admits(z):
+                faults.append(Fault(name, z, PLACE.allowed))
         if faults:
             raise InvalidDesign(faults)
         self._places = {str(name): float(z) for name, z in pairs.items()}
@@ -73,15 +79,6 @@ class Stations(Mapping[str, float]):
         return f"Stations({self._places})"
 
 
-def _wrong(pairs: Mapping[Any, Any]) -> Iterator[tuple[Any, Any, Range | str]]:
-    """Names that paths cannot hold, and places that are none, with what is allowed."""
-    for name, z in pairs.items():
-        if not isinstance(name, str) or not name or not is_path_name(name):
-            yield name, z, "must be named by one line without dots and brackets"
-        elif not PLACE.allowed.admits(z):
-            yield name, z, PLACE.allowed
-
-
 class Located(Part):
     """A part at one place along the arm or more, each given over L, in m, or by a station's name.
 
@@ -90,7 +87,7 @@ class Located(Part):
     """
 
     @property
-    def _places(self) -> list[str]:
+    def places(self) -> list[str]:
         """Fields that are places in m or by name, beside each of which one is over L."""
         return [field for field, declared in fields_of(type(self)).items() if declared.named]
 
@@ -118,7 +115,7 @@ class Located(Part):
         allowed = f"must be on the arm, at most {length:g} m"
         return [
             Fault(field, z, allowed)
-            for field in self._places
+            for field in self.places
             # of a named station, the arm refuses that
             if (z := self.station_at(field, length)) > length
             and not isinstance(getattr(self, field), Station)
@@ -194,17 +191,68 @@ class Span(Located):
         return [*faults, Fault("end_over_length", end, allowed)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class RigidPiece(Span):
+    """A stretch of the arm that neither actuators nor loads deform: a disk, a joint, a hard tip.
+
+    Actuators pass through it and act on what is beyond; its mass is that of the arm there.
+
+    Raises:
+        InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Marker(Located):
+    """A point at r(Z) + x d1 + y d2 + z d3 of one section; it changes nothing about the arm.
+
+    One beyond the tip, at an offset along d3, is the point of a tool that the tip holds.
+
+    Raises:
+        InvalidDesign: No name, or a station off the arm, given twice, or of no such name.
+    """
+
+    name: str
+    """Name in files and results; unique within an arm."""
+    station_over_length: float = number(
+        "Z/L", "", "where its section is", low=0.0, high=1.0, default=1.0
+    )
+    """Z/L of its section [-]."""
+    station: float | str | None = number(
+        "Z",
+        "m",
+        "where its section is",
+        low=0.0,
+        named=True,
+        instead_of="station_over_length",
+        default=None,
+    )
+    """Z [m], or the name of a station of the arm, in place of `station_over_length`."""
+    offset: Triple = number(
+        "a", "m", "from the center of its section", default=(0.0, 0.0, 0.0), shape="triple"
+    )
+    """(x, y, z) from the center of its section, in the directors [m]."""
+
+    def _faults(self) -> list[Fault]:
+        unnamed = [] if self.name else [Fault("name", self.name, "must be given")]
+        return super()._faults() + unnamed
+
+
+Made = TypeVar("Made", bound=Located)
+
+
 def placed(part: Made, stations: Mapping[str, float]) -> Made:
     """The part where the stations that it names are.
 
     Raises:
         InvalidDesign: It names a station that is none of these.
     """
-    names: dict[str, str] = {}
-    for field, declared in fields_of(type(part)).items():
-        place = getattr(part, field) if declared.named else None
-        if isinstance(place, str | Station):
-            names[field] = place.name if isinstance(place, Station) else place
+    given = {field: getattr(part, field) for field in part.places}
+    names = {
+        field: place.name if isinstance(place, Station) else place
+        for field, place in given.items()
+        if isinstance(place, str | Station)
+    }
     if faults := [
         Fault(field, name, _allowed(name, stations))
         for field, name in names.items()

@@ -284,6 +284,5 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
 
 
 def _plain_bounds(bounds: ArrayLike) -> Bounds:
-    """One pair where all bundles share it, else one for each."""
     pairs = [(low, high) for low, high in np.atleast_2d(np.asarray(bounds, float)).tolist()]
     return pairs[0] if all(pair == pairs[0] for pair in pairs) else tuple(pairs)

@@ -8,11 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators.actuator import (
-    Outline,
-    PolarActuator,
-    Resultants,
-)
+from softreach.arm.actuators.actuator import Outline, PolarActuator, Resultants
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
@@ -88,7 +84,6 @@ class Chamber(PolarActuator):
         return Resultants(area[:, None] + along, np.stack(moment, axis=1))
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        """Round lumens."""
         del section
         each, outer = np.ones(self.bundles), profile.radius(z)
         distance, radius = (
@@ -106,6 +101,5 @@ class Chamber(PolarActuator):
         )
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        """Moduli that its forces need."""
         del profile
         return section.modulus_faults(f"for chamber {self.name!r}, whose activation is in Pa")

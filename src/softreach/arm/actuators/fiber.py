@@ -62,7 +62,6 @@ class FiberArchitecture(SectorActuator):
     """α, from the axis, at the outer radius of the ring [rad]; |α| < π/2; may change along Z."""
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        """Stations where it begins, ends, or its angle is not smooth [m]."""
         angle = self.helical_angle
         breaks = angle.breaks if isinstance(angle, AlongArm) else ()
         return (*super().breakpoints(profile), *(profile.length * x for x in breaks))

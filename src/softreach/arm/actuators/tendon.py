@@ -1,26 +1,25 @@
-"""Tendons: cables that pull between where they enter and where they are anchored."""
+"""Tendons: cables that pull between where they enter and where they are anchored.
+
+They are driven by their tension, or by a winch or servo that decides how much is pulled in.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators.actuator import (
-    MOST_TURN,
-    Outline,
-    PolarActuator,
-    Resultants,
-)
+from softreach.arm.actuators.actuator import MOST_TURN, Outline, PolarActuator, Resultants
 from softreach.arm.along import AlongArm, Samples
 from softreach.arm.number import as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.support.errors import Fault
 
-__all__ = ["Tendon"]
+__all__ = ["LengthTendon", "Tendon"]
 
 Array = NDArray[np.float64]
 
@@ -108,7 +107,6 @@ class Tendon(PolarActuator):
         return Resultants(-t3, moment)
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        """Lines along the arm."""
         del section
         route = self._route(profile, z)
         ratio = route.distance / profile.radius(z)[:, None] * np.ones(self.bundles)
@@ -122,13 +120,11 @@ class Tendon(PolarActuator):
         )
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        """Stations where it begins, ends, or its route is not smooth [m]."""
         bent = [along for along in (self.distance, self.routing) if isinstance(along, AlongArm)]
         breaks = [profile.length * x for along in bent for x in along.breaks]
         return (*super().breakpoints(profile), *breaks)
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        """Moduli that its forces need."""
         del profile
         return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
 
@@ -160,4 +156,56 @@ class Tendon(PolarActuator):
         if tensions.size and tensions.min() < self.least:
             allowed = "must be at least 0 N: a tendon pulls and cannot push"
             faults.append(Fault("activation_bounds", self.activation_bounds, allowed))
+        return faults
+
+
+@dataclass(frozen=True, kw_only=True)
+class LengthTendon(Tendon):
+    """A tendon without friction whose activation is how much of it is pulled in, q [m].
+
+    Its tension τ follows, and loads the arm as that of a `Tendon` does: τ = k (q - slack - s) +
+    pretension where that is positive, with s the shortening of its path, else it is slack. Without
+    a stiffness k it does not stretch: s = q - slack, unless it is slack.
+
+    Raises:
+        InvalidDesign: A field is out of its range, both or neither of `distance` and
+            `distance_ratio` are given, or a pretension without `tendon_stiffness`.
+    """
+
+    unit: ClassVar[str] = "m"
+    symbol: ClassVar[str] = "q"
+    activation: ClassVar[str] = "displacement"
+    least: ClassVar[float] = -math.inf
+
+    slack: float = number("q0", "m", "pulled in by so much before it is taut", default=0.0)
+    """q0, pulled in by so much before it is taut [m]; negative where it is pretensioned."""
+    tendon_stiffness: float | None = number(
+        "k", "N/m", "stiffness of tendon and drive in series", low=0.0, open_low=True, default=None
+    )
+    """k, stiffness of tendon and drive in series [N/m]; None for one that does not stretch."""
+    pretension: float = number("τ0", "N", "tension at q0 of the straight arm", low=0.0, default=0.0)
+    """τ0, tension at q = q0 while the arm keeps its shape [N]."""
+
+    @property
+    def compliance(self) -> float:
+        """1/k [m/N]."""
+        return 0.0 if self.tendon_stiffness is None else 1.0 / self.tendon_stiffness
+
+    @property
+    def taut_from(self) -> float:
+        """Displacement at which it becomes taut while the arm keeps its shape [m]."""
+        return self.slack - self.pretension * self.compliance
+
+    def by_tension(self, bounds: Array) -> Tendon:
+        """The same tendon driven by its tension within bounds [N], shape (bundles, 2)."""
+        same = {field.name: getattr(self, field.name) for field in fields(Tendon)}
+        return Tendon(**same | {"activation_bounds": bounds.tolist()})
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        blamed = {fault.path for fault in faults}
+        is_doubtful = blamed & {"pretension", "tendon_stiffness"}
+        if not is_doubtful and self.pretension and self.tendon_stiffness is None:
+            allowed = "must be 0 without tendon_stiffness: such a tendon takes a slack below 0"
+            faults.append(Fault("pretension", self.pretension, allowed))
         return faults

@@ -27,15 +27,13 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
-from softreach.arm.marker import Marker
 from softreach.arm.material import Material
-from softreach.arm.measured import Measured
 from softreach.arm.number import Number, fields_of, unit_suffix
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.rest_shape import RestShape
-from softreach.arm.rigid import RigidPiece
-from softreach.arm.section import Ring, Section
+from softreach.arm.section import Measured, Ring, Section
+from softreach.arm.stations import Marker, RigidPiece
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean, warn
 

@@ -35,16 +35,13 @@ from softreach.arm.design_file.keys import (
 )
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
-from softreach.arm.marker import Marker
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
-from softreach.arm.measured import Measured
 from softreach.arm.number import Number
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.rest_shape import RestShape
-from softreach.arm.rigid import RigidPiece
-from softreach.arm.section import Ring, Section
-from softreach.arm.stations import Stations
+from softreach.arm.section import Measured, Ring, Section
+from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 from softreach.support.files.text import read_text, tables_of
 
@@ -370,7 +367,6 @@ class _Reader:
         return value if isinstance(value, dict) else {}
 
     def _tables(self, key: str) -> list[tuple[int, dict[str, Any]]]:
-        """Index and content of those under a key."""
         raw = self._document.get(key)
         tables = [*enumerate(raw)] if isinstance(raw, list) else []
         for k, table in tables:
@@ -415,7 +411,6 @@ def _materials_text(name: str, own: list[str]) -> str:
 
 
 def _kinds_text(of: type[Kind], kind: Any) -> str:
-    """Kinds of actuators or profiles that are allowed."""
     known = KINDS[of]
     if kind is None:
         return f"required key is missing: one of {', '.join(known)}"
