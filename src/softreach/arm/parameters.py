@@ -440,10 +440,12 @@ def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
     """The arm with changed parts; faults under the names and with the values that were asked."""
     new, faults, inside = dict(parts(arm)), [], edits.get(("section",), {})
     for key in (key for key in edits if key != ("section",)):
-        values = {name: edit.value for name, edit in edits[key].items()}
+        part, values = new[key], {name: edit.value for name, edit in edits[key].items()}
+        if "bundles" in values and values["bundles"] != part.bundles:  # all have the first's bounds
+            values = dict(zip(("lower", "upper"), part.bounds[0].tolist(), strict=True)) | values
         try:
             with faults_under(owner_of(key)):
-                new[key] = new[key].replace(**values)
+                new[key] = part.replace(**values)
         except InvalidDesign as error:
             faults += error.faults
     try:

@@ -153,7 +153,7 @@ class Actuator(Span, ABC):
         return tuple(each) if bound[2] is None else (each[int(bound[2])],)
 
     def replace(self, **changes: Any) -> Self:
-        """With bounds: each bundle keeps its own; if their number changes, all have the first's.
+        """With bounds: others keep their own; if the number of bundles changes, all the first's.
 
         Raises:
             InvalidDesign: A bound of a bundle that there is none of, or a field is not what it
@@ -161,9 +161,7 @@ class Actuator(Span, ABC):
         """
         new = {name: changes.pop(name) for name in sorted(changes) if _BOUND.fullmatch(name)}
         bundles = changes.get("bundles", self.bundles)
-        if "activation_bounds" in changes or not (new or bundles != self.bundles):
-            return super().replace(**changes)
-        if isinstance(bundles, int) and bundles > 0:
+        if new and isinstance(bundles, int) and bundles > 0:
             same = bundles == self.bundles
             bounds = self.bounds.copy() if same else self.bounds[:1].repeat(bundles, axis=0)
             for name, value in new.items():  # `lower` before `lower[1]`
