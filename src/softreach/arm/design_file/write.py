@@ -24,6 +24,7 @@ from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["display_text", "render"]
 
+_NAMES = {kind: name for kinds in KINDS.values() for name, kind in kinds.items()}
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 
@@ -86,9 +87,8 @@ def _lines(part: Part, without: tuple[str, ...] = ("point_loads",)) -> list[str]
     """What a table says; of a class outside softreach the fields as they are in Python."""
     if not isinstance(part, tuple(KINDS)):
         return [f"{key} = {text}" for key, text in _pairs(part, without)]
-    known = {kind: name for kinds in KINDS.values() for name, kind in kinds.items()}
-    kind = known.get(type(part), type(part).__name__)
-    pairs = _pairs(part) if type(part) in known else _plain_pairs(part)
+    kind = _NAMES.get(type(part), type(part).__name__)
+    pairs = _pairs(part) if type(part) in _NAMES else _plain_pairs(part)
     return [f"kind = {value_text(kind)}", *(f"{key} = {text}" for key, text in pairs)]
 
 
