@@ -65,14 +65,13 @@ class Body:
             "profile": (Profile, "must be a Profile, such as LinearTaper"),
             "section": (Section, "must be a Section"),
             "rest": (RestShape, "must be a RestShape, such as RestShape(curvature_x=2.0)"),
+            "loads": (Loads | None, "must be Loads or None"),
         }
         wrong = [
             Fault(field, value, allowed)
             for field, (kind, allowed) in kinds.items()
             if not isinstance(value := getattr(self, field), kind)
         ]
-        if not isinstance(self.loads, Loads | None):
-            wrong.append(Fault("loads", self.loads, "must be Loads or None"))
         return [
             *wrong,
             *kinds_in_a_sequence("rigid_pieces", self.rigid_pieces, RigidPiece),

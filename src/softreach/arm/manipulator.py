@@ -131,7 +131,11 @@ class Manipulator(Body):
         """
         faults = list(kind_faults(actuators))
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
-        faults += _inner_radius_faults(plain(inner_radius), plain(outer_radius))
+        inner, outer, allowed = plain(inner_radius), plain(outer_radius), Range(0.0, unit="m")
+        if not allowed.admits(inner):
+            faults.append(Fault("inner_radius", inner, allowed))
+        elif allowed.admits(outer) and inner >= outer:
+            faults.append(Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m"))
         cone = {"length": length, "outer_radius": outer_radius, "taper": taper}
         profile = _part_or_faults(faults, LinearTaper, **cone, tip_radius=tip_radius)
         matter = {
@@ -346,12 +350,3 @@ def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Mad
     except InvalidDesign as error:
         faults += error.faults
         return None
-
-
-def _inner_radius_faults(inner: Any, outer: Any) -> list[Fault]:
-    allowed = Range(0.0, unit="m")
-    if not allowed.admits(inner):
-        return [Fault("inner_radius", inner, allowed)]
-    if not allowed.admits(outer) or inner < outer:
-        return []
-    return [Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m")]

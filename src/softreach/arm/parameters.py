@@ -252,19 +252,15 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
     their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
     """
     arm = a_manipulator("arm", arm)
-    own = {
-        (key, called): _own(key, called, number)
-        for key, part in parts(arm).items()
-        for called, number in part.numbers.items()
-    }
+    own: dict[Address, Parameter] = {}
+    for key, part in parts(arm).items():
+        for called, number in part.numbers.items():
+            owner = "profile" if key == ("profile",) and "[" in called else owner_of(key)
+            name = f"{owner}.{called}" if owner else called
+            places = ((key, called),)
+            own[key, called] = Parameter(name=name, owner=owner, number=number, places=places)
     every = [*_of_arm(arm, own), *(each for each in own.values() if each.owner)]
     return {each.name: each for each in every}
-
-
-def _own(key: PartKey, called: str, number: Number) -> Parameter:
-    owner = "profile" if key == ("profile",) and "[" in called else owner_of(key)
-    name = f"{owner}.{called}" if owner else called
-    return Parameter(name=name, owner=owner, number=number, places=((key, called),))
 
 
 def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Parameter]:
@@ -287,11 +283,9 @@ def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Para
             name="outer_radius", number=number, read=_outer_radius, write=_scaled
         )
     yield from (each for each in own.values() if each.name in alone)
-    matter, ratio = (
-        _places(own, "poisson_ratio", "rings", "core"),
-        fields_of(Material)["poisson_ratio"],
-    )
-    yield Parameter(name="poisson_ratio", number=ratio, places=matter)
+    ratio, matter = fields_of(Material)["poisson_ratio"], ("rings", "core")
+    places = _places(own, "poisson_ratio", *matter)
+    yield Parameter(name="poisson_ratio", number=ratio, places=places)
     for called in ("extent", "lower", "upper"):
         shared = _places(own, called, "actuators")
         if len({own[place].unit for place in shared}) == 1:

@@ -179,7 +179,11 @@ class Section(Part):
         if not faults and self.bore_ratio > self.inner_ratio:
             allowed = f"must be at most the smallest inner_ratio of the rings, {self.inner_ratio:g}"
             faults.append(Fault("bore_ratio", self.bore_ratio, allowed))
-        return faults or list(_modulus_faults(self))
+        if faults or self.has_measured_stiffness:
+            return faults or self.modulus_faults("where not all stiffnesses are measured")
+        first, *others = (layer.material for layer in self.layers)
+        same = all(first.same_matter(other) for other in others)
+        return [] if same else self.modulus_faults("where materials differ")
 
     def ring(self, which: int | str) -> Ring:
         """A ring by its index or name.
@@ -326,14 +330,6 @@ class Section(Part):
 
 def _modulus(material: Material) -> float:
     return 1.0 if material.young_modulus is None else material.young_modulus
-
-
-def _modulus_faults(section: Section) -> Iterator[Fault]:
-    first, *others = (layer.material for layer in section.layers)
-    if section.has_measured_stiffness:
-        yield from section.modulus_faults("where not all stiffnesses are measured")
-    elif not all(first.same_matter(other) for other in others):
-        yield from section.modulus_faults("where materials differ")
 
 
 def _missing(section: Section, field: str, unit: str, why: str) -> Iterator[Fault]:

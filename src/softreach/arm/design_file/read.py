@@ -196,7 +196,10 @@ class _Reader:
         values = {
             key: self._plain(value, f"{path}.{key}") for key, value in raw.items() if key != "kind"
         }
-        return self._made(own, Place(path), values)
+        try:
+            return self._made(own, Place(path), values)
+        except TypeError as error:
+            return self._refuse(path, own.__name__, f"has other fields: {error}", None)
 
     def _part(
         self, kind: type[Part], raw: Any, path: str, without: tuple[str, ...] = (), **others: Any
@@ -258,8 +261,6 @@ class _Reader:
             sure = [f for f in error.faults if wrong.isdisjoint(f.path.split(", "))]
             self.faults += in_file_terms(InvalidDesign(sure), "", {**self.places, "": place}).faults
             return None
-        except TypeError as error:  # of a class outside softreach
-            return self._refuse(place.path, kind.__name__, f"has other fields: {error}", None)
         return None if wrong else part
 
     def _value(self, kind: type[Part], key: Key, raw: Any, path: str) -> Any:
