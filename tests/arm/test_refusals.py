@@ -296,6 +296,16 @@ def test_gains_that_are_no_mapping_are_refused_alone(gains):
     assert [fault.path for fault in caught.value.faults] == ["gains"]
 
 
+def test_a_gain_of_one_bundle_wins_over_the_size_of_all():
+    gains = {"left": 1.0, "right": -1.0, "third": 1.0}
+    knob = Drive(name="knob", bounds=(0.0, 1.0), gains=gains)
+    for name in gains:
+        made = knob.replace(**{f"gains[{name}]": 0.5, "gain": 2.0}).gains
+        assert {each: abs(gain) for each, gain in made.items()} == dict.fromkeys(gains, 2.0) | {
+            name: 0.5
+        }
+
+
 def test_another_number_of_bundles_has_the_bounds_of_the_first_by_its_parameter_alone(trunk):
     left = trunk.actuators[0].replace(bundles=2, activation_bounds=((-1.0, 0.0), (-0.5, 0.0)))
     arm = trunk.replace(actuators=(left,))

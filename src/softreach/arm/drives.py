@@ -153,8 +153,8 @@ class Drive(Part):
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, or with numbers by the names in `numbers`."""
-        own = self.numbers.keys() - {"dead_zone"}
-        named = {field: changes.pop(field) for field in own if field in changes}
+        own = [name for name in self.numbers if name != "dead_zone" and name in changes]
+        named = {name: changes.pop(name) for name in own}  # the size of all gains before one
         for field, value in named.items():
             if field == "gain":
                 gains = changes.get("gains", self.gains).items()

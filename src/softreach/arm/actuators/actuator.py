@@ -153,7 +153,7 @@ class Actuator(Span, ABC):
         return tuple(each) if bound[2] is None else (each[int(bound[2])],)
 
     def replace(self, **changes: Any) -> Self:
-        """With bounds: others keep their own; if the number of bundles changes, all the first's.
+        """With bounds: other bundles keep theirs, or have the first's if their number changes.
 
         Raises:
             InvalidDesign: A bound of a bundle that there is none of, or a field is not what it
@@ -165,7 +165,7 @@ class Actuator(Span, ABC):
             same = bundles == self.bundles
             bounds = self.bounds.copy() if same else self.bounds[:1].repeat(bundles, axis=0)
             for name, value in new.items():  # `lower` before `lower[1]`
-                _, end, k = (name, *_BOUND.fullmatch(name).groups())  # pyright: ignore
+                end, k = _BOUND.fullmatch(name).groups()  # pyright: ignore
                 if k is not None and int(k) >= bundles:
                     allowed = f"has no bundle, as their number becomes {bundles}"
                     raise InvalidDesign([Fault(name, value, allowed)])
