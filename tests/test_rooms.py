@@ -5,7 +5,6 @@ from __future__ import annotations
 import grimp
 
 CIRCLES = [
-    "arm.driving arm.fitting arm.manipulator arm.tables arm.tensions",
     "calibration.calibration calibration.report",
     "optimization.folder optimization.report optimization.result",
     "requirements.requirements requirements.requirements_file",

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach import export, plot
-from softreach.arm.scale import scale_warnings
+from softreach.arm.load_number import scale_warnings
 from softreach.cli.app import run
 from softreach.rod.summary import design_warnings
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
@@ -291,7 +291,7 @@ def straight(length, radius):
 def test_sizes_that_arms_have_are_not_warned_of():
     for name in sr.designs.__all__:
         arm = getattr(sr.designs, name)()
-        assert scale_warnings(arm.profile, arm.section) == ()
+        assert scale_warnings(arm) == ()
     assert not any("slender" in line for line in design_warnings(straight(0.3, 0.06)))
 
 

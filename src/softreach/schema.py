@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import as_numbers
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
@@ -126,7 +127,7 @@ def configuration_dataset(
     table = _CONFIGURATION | others
     variables = _variables(table, arm, {**arrays, "activation": activation}, names)
     if "bundle_activation" in variables:
-        units = arm.inner.bundle_units
+        units = inner_arm(arm).bundle_units
         listed = units[0] if len(set(units)) == 1 else ", ".join(units)
         variables["bundle_activation"][2]["units"] = listed
     coordinates = {

@@ -408,5 +408,5 @@ def test_all_faults_of_places_in_a_file_are_told_at_once():
     said = str(caught.value)
     assert "actuators[0].end_m = 0.3: give exactly one of end (a name) and end_m" in said
     assert said.count("= 'lwo': must be Z in m or a station of the arm: low, high") == 3
-    with pytest.raises(InvalidDesign, match=r"stations.high = 'x': must be a valid number"):
+    with pytest.raises(InvalidDesign, match=r"stations.high = 'x': must be a finite number"):
         sr.Manipulator.from_toml(text.replace("high = 0.3", 'high = "x"'))

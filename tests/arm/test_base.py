@@ -13,8 +13,7 @@ import softreach as sr
 from softreach.arm import PointLoad
 from softreach.arm.base import POINTS
 from softreach.arm.design_file.keys import keys_of
-from softreach.arm.parameters import changed, find_parameter
-from softreach.arm.parameters.shown import written_parameters
+from softreach.arm.parameters import changed, find_parameter, written_parameters
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber
@@ -129,7 +128,7 @@ class TestFiles:
             ("points = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "base.points = .*left-handed"),
             ("position = [0, 0, 1]", r"base.position = .*did you mean .position_m."),
             ("position_m = 1", "base.position_m = 1: must be three finite numbers"),
-            ('turn_deg = "x"', "base.turn_deg = 'x': must be a valid number"),
+            ('turn_deg = "x"', "base.turn_deg = 'x': must be a finite number"),
         ],
     )
     def test_faults_are_told_in_the_terms_of_the_file(self, trunk, lines, message):

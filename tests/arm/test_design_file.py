@@ -231,13 +231,12 @@ revolution_deg = 10
 helical_angle_deg = 3.0
 [[actuators]]
 kind = "fiber"
-name = "a"
 extent_deg = 3
 helical_angle_deg = { stations_over_length = [0, 0.5, 1], values = [1, 2, 3, 4] }
 [[actuators]]
 kind = "fiber"
 extent_deg = 3
-helical_angle_deg = { stations = [0, 0.5, 1], values = [1, 2, 95] }
+helical_angle_deg = { stations = [0, 0.5, 1], values = [1, 2, 3] }
 [[actuators]]
 kind = "Tendon"
 [[actuators]]
@@ -265,7 +264,7 @@ kind = "fibre"
 
 FAULTS = """
 length_m = 3: unknown key; it belongs in [profile]
-profile.length_m = '1': must be a valid number
+profile.length_m = '1': must be a finite number
 profile.tapper_deg = 3: unknown key; did you mean "taper_deg"?
 materials.lce.young_modulus = 3: unknown key; did you mean "young_modulus_pa"?
 materials."a b".poisson_ratio = 0.7: must be a finite number >= 0 and <= 0.5
@@ -275,7 +274,7 @@ rings[1].material.poisson = 0.3: unknown key; did you mean "poisson_ratio"?
 rings[2].inner_ratio: required key is missing
 rings[2].material = 'nothing': must be a material of this file (lce, a b), or of the library;
 section.core = 'ecoflex_00_31': must be a material of this file (lce, a b), or of the library;
-actuators[0].bundles = 1.5: must be a valid integer
+actuators[0].bundles = 1.5: must be a whole number >= 1 and <= 100
 actuators[0].offset_deg = nan: must be a finite number in deg
 actuators[0].extent_deg = 400: must be a finite number > 0 and <= 360 deg
 actuators[0].helical_angle_deg = 95: must be a finite number > -90 and < 90 deg
@@ -284,7 +283,6 @@ actuators[1].extent = 3: unknown key; did you mean "extent_deg"?
 actuators[1].helical_angle_deg, actuators[1].revolution_deg = (3.0, 10): give exactly one of
 actuators[2].helical_angle_deg.values = [1, 2, 3, 4]: must be 3 finite numbers
 actuators[3].helical_angle_deg.stations_over_length: required key is missing
-actuators[3].helical_angle_deg.values[2] = 95: must be a finite number > -90 and < 90 deg
 actuators[3].helical_angle_deg.stations = [0, 0.5, 1]: unknown key
 actuators[4].kind = 'Tendon': must be the kind of a file; did you mean "tendon"?
 actuators[5].tension_bounds_n: required key is missing
@@ -297,7 +295,6 @@ actuators[7].pressure_bounds_pa = [0, '1 bar']: must be a pair (lower, upper)
 actuators[7].end_over_length = 0.4: must be above start_over_length = 0.5
 actuators[8].kind: required key is missing: one of fiber
 actuators[9].kind = 'fibre': must be one of fiber, oblique_muscle, radial_muscle, tendon, length_tendon, chamber
-actuators[2].name = 'a': must differ from actuators[1].name
 """  # noqa: E501
 
 

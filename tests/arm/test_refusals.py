@@ -17,6 +17,7 @@ from softreach.arm import (
     Actuator,
     AlongArm,
     Chamber,
+    Drive,
     FiberArchitecture,
     LinearTaper,
     Loads,
@@ -40,7 +41,6 @@ from softreach.arm.design_file.keys import keys_of
 from softreach.arm.design_file.schema import json_schema
 from softreach.arm.number import fields_of, number, own_fields
 from softreach.arm.parameters import changed, find_parameter, parameters
-from softreach.arm.parameters.draft import Path
 from softreach.arm.tables import tables
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.cable import Cable
@@ -275,13 +275,54 @@ def test_every_declared_number_of_an_arm_is_a_parameter_with_its_range(trunk):
     assert {f"left.{one.field}" for one in left} <= parameters(trunk).keys()
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        "[base]\nposition_m = [true, 0.0, 0.3]",
+        "[loads]\ntip_force_n = [0.0, 0.0, true]",
+        "[rest]\ncurvature_x_per_m = { stations_over_length = [0.0, 1.0], values = [0.5, true] }",
+    ],
+)
+def test_a_truth_value_is_no_number_in_a_list_either(trunk, table):
+    key = table.split("\n")[1].split(" =")[0]
+    with pytest.raises(InvalidDesign, match=key):
+        sr.Manipulator.from_toml(f"{trunk.to_toml()}\n{table}\n")
+
+
+@pytest.mark.parametrize("gains", [2, None, "left", ()])
+def test_gains_that_are_no_mapping_are_refused_alone(gains):
+    with pytest.raises(InvalidDesign) as caught:
+        Drive(name="knob", bounds=(0.0, 1.0), gains=gains, offsets={"left": 0.1})
+    assert [fault.path for fault in caught.value.faults] == ["gains"]
+
+
+def test_a_gain_of_one_bundle_wins_over_the_size_of_all():
+    gains = {"left": 1.0, "right": -1.0, "third": 1.0}
+    knob = Drive(name="knob", bounds=(0.0, 1.0), gains=gains)
+    for name in gains:
+        made = knob.replace(**{f"gains[{name}]": 0.5, "gain": 2.0}).gains
+        assert {each: abs(gain) for each, gain in made.items()} == dict.fromkeys(gains, 2.0) | {
+            name: 0.5
+        }
+
+
+def test_another_number_of_bundles_has_the_bounds_of_the_first_by_its_parameter_alone(trunk):
+    left = trunk.actuators[0].replace(bundles=2, activation_bounds=((-1.0, 0.0), (-0.5, 0.0)))
+    arm = trunk.replace(actuators=(left,))
+    made = changed(arm, {"left.bundles": 3, "left.upper[1]": 0.2}).actuators[0]
+    np.testing.assert_array_equal(made.bounds, [(-1.0, 0.0), (-1.0, 0.2), (-1.0, 0.0)])
+    with pytest.raises(InvalidDesign, match="one pair"):
+        left.replace(bundles=3)
+
+
 def test_a_parameter_knows_its_place_without_its_name(trunk):
-    assert find_parameter(trunk, "left.offset").path == Path(("actuators", "left"), "offset")
-    modulus = find_parameter(trunk, "rings[0].material.young_modulus")
-    assert modulus.path == Path(("rings", 0, "material"), "young_modulus")
-    assert find_parameter(trunk, "left.upper").path == Path(
-        ("actuators", "left"), "activation_bounds", (1,)
-    )
+    def place(name: str) -> tuple[object, ...]:
+        (only,) = find_parameter(trunk, name).places
+        return only
+
+    assert place("left.offset") == (("actuators", "left"), "offset")
+    assert place("rings[0].material.young_modulus") == (("rings", 0, "material"), "young_modulus")
+    assert place("left.upper") == (("actuators", "left"), "upper")
 
 
 def test_a_field_that_a_kind_of_ones_own_gives_another_default_stays_a_number():

@@ -32,7 +32,8 @@ from softreach.arm.bending import (
     sharpest_bending,
     smallest_bending,
 )
-from softreach.arm.tables import check_extension, extension_range, tables
+from softreach.arm.driving import extension_range
+from softreach.arm.tables import check_extension, tables
 from softreach.requirements import Limits, Requirements
 from softreach.rod.bending import bending_over_bounds
 from softreach.rod.rods import tip_map

@@ -293,7 +293,7 @@ def test_tendons_break_the_arm_where_they_start_end_and_turn():
         ),
         (
             {"routing": Samples(stations_over_length=(0, 1), values=(0, 1)), "revolution": 1.0},
-            "revolution = 1: must be left out where routing is given",
+            "give exactly one of routing and revolution",
         ),
         ({"activation_bounds": (-1, 5)}, "must be at least 0 N: a tendon pulls and cannot push"),
         ({"activation_bounds": ((0, 5), (0, 6))}, "must be one pair"),

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from softreach import designs
 from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.driving import extension_range
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import extension_range
 from softreach.inverse.cells import activation_cells
 from softreach.inverse.seeds import Seeds
 from softreach.kernels.box.simplices import (

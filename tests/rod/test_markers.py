@@ -119,7 +119,7 @@ def test_faults_of_markers_in_files_are_told_in_their_terms():
     with pytest.raises(InvalidDesign) as caught:
         sr.Manipulator.from_toml(text)
     assert "markers[3].name: required key is missing" in str(caught.value)
-    assert "markers[1].station = 3: must be on the arm, at most 1 m" in str(caught.value)
+    assert "markers[1].station_m = 3: must be on the arm, at most 1 m" in str(caught.value)
 
 
 # Laws of rigid pieces: what is beyond goes on as a stiff body, and nothing else changes

@@ -20,13 +20,11 @@ from softreach.arm.drives import Drive
 from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.marker import Marker
 from softreach.arm.material import Material, material_names, named_material
-from softreach.arm.measured import Measured
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.rest_shape import RestShape
-from softreach.arm.rigid import RigidPiece
-from softreach.arm.section import Layer, Ring, Section, Stiffness
+from softreach.arm.section import Layer, Measured, Ring, Section, Stiffness
+from softreach.arm.stations import Marker, RigidPiece
 
 __all__ = [
     "Actuator",

@@ -64,12 +64,10 @@ class Pieces(AlongArm):
     """
 
     def __call__(self, x: ArrayLike) -> Array:
-        """The value of the piece that holds x."""
         piece = np.searchsorted(self.stations_over_length[1:-1], np.asarray(x, float), "right")
         return np.asarray(self.values)[piece]
 
     def derivative(self, x: ArrayLike) -> Array:
-        """Zero."""
         return np.zeros(np.shape(x))
 
     def _faults(self) -> list[Fault]:
@@ -89,7 +87,6 @@ class Samples(AlongArm):
     """The monotone cubic (PCHIP) overshoots no sample and has a continuous slope."""
 
     def __call__(self, x: ArrayLike) -> Array:
-        """The value between the samples."""
         if self.interpolation == "linear":
             return np.interp(np.asarray(x, float), self.stations_over_length, self.values)
         return self._curve(np.asarray(x, float))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,18 +67,18 @@ class Base(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.points, str):
-            rows = tuple(map(tuple, _as_rotation(self.points).matrix.tolist()))
+            rows = tuple(map(tuple, np.asarray(_as_rotation(self.points)).tolist()))
             object.__setattr__(self, "points", rows)
 
     def _faults(self) -> list[Fault]:
-        wrong = _as_rotation(self.points).wrong
-        faults = [Fault("points", self.points, wrong)] if wrong else []
+        read = _as_rotation(self.points)
+        faults = [Fault("points", self.points, read)] if isinstance(read, str) else []
         return super()._faults() + faults
 
     @lazy
     def rotation(self) -> Array:
         """The axes of the base in the world as columns, shape (3, 3), read-only."""
-        turned = np.array(_as_rotation(self.points).matrix)
+        turned = np.array(_as_rotation(self.points), float)
         if np.abs(turned @ turned.T - np.eye(3)).max() > 1e-15:  # typed with fewer digits
             left, _, right = np.linalg.svd(turned)
             turned = left @ right
@@ -118,48 +118,42 @@ class Base(Part):
         return f"points {way}{turn}{place}"
 
 
-class _Reading(NamedTuple):
-    matrix: Array
-    wrong: str = ""
-    """Fault of `points`; empty if there is none."""
-
-
-def _as_rotation(points: Any) -> _Reading:
+def _as_rotation(points: Any) -> Array | str:
+    """The matrix, or what is allowed instead."""
     if isinstance(points, str):
-        rows = POINTS.get(points)
-        return _Reading(np.array(rows or POINTS["up"]), "" if rows else _ALLOWED)
+        return np.array(POINTS[points]) if points in POINTS else _ALLOWED
     numbers = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)
     if not np.isfinite(numbers).all():
-        return _Reading(np.eye(3), _ALLOWED)
+        return _ALLOWED
     if numbers.shape == (3,):
         return _of_vector(numbers)
     if numbers.shape == (4,):
         return _of_quaternion(numbers)
-    return _of_matrix(numbers) if numbers.shape == (3, 3) else _Reading(np.eye(3), _ALLOWED)
+    return _of_matrix(numbers) if numbers.shape == (3, 3) else _ALLOWED
 
 
-def _of_matrix(matrix: Array) -> _Reading:
+def _of_matrix(matrix: Array) -> Array | str:
     off = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
     if off > _NEAR:
         columns = f"its columns are not of length 1 and at right angles, by {off:.2g}"
-        return _Reading(np.eye(3), f"must be a rotation; {columns}")
+        return f"must be a rotation; {columns}"
     if np.linalg.det(matrix) < 0:
-        return _Reading(np.eye(3), "must be a rotation; these axes are left-handed")
-    return _Reading(matrix)
+        return "must be a rotation; these axes are left-handed"
+    return matrix
 
 
-def _of_quaternion(quaternion: Array) -> _Reading:
+def _of_quaternion(quaternion: Array) -> Array | str:
     size = float(np.linalg.norm(quaternion))
     if abs(size - 1.0) > _NEAR:
-        return _Reading(np.eye(3), f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}")
-    return _Reading(rotation_matrices(quaternion / size))
+        return f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}"
+    return rotation_matrices(quaternion / size)
 
 
-def _of_vector(vector: Array) -> _Reading:
+def _of_vector(vector: Array) -> Array | str:
     angle = float(np.linalg.norm(vector))
     if abs(angle - 1.0) < _NEAR:  # (0, 0, -1) is meant to be down, and would be up, turned by 1 rad
         why = "three numbers are a rotation vector [rad], and these look like a direction"
-        return _Reading(np.eye(3), f"must be a word or a rotation; {why}: say it by a matrix")
+        return f"must be a word or a rotation; {why}: say it by a matrix"
     x, y, z = (np.sinc(0.5 * angle / np.pi) * 0.5 * vector).tolist()
     return _of_quaternion(np.array([np.cos(0.5 * angle), x, y, z]))
 

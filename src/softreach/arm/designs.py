@@ -75,10 +75,12 @@ def minimal_trunk(
             name="right", revolution=revolution, offset=math.radians(114), extent=_PAPER_EXTENT
         ),
     )
-    arm = _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, matter)
-    if tip_radius is None:
-        return arm
-    return arm.replace(profile=arm.profile.replace(tip_radius=tip_radius))
+    profile = LinearTaper(length=length, outer_radius=length / 16, taper=taper)
+    if tip_radius is not None:
+        profile = profile.replace(tip_radius=tip_radius)
+    ring = Ring(inner_ratio=radius_ratio, material=Material() if matter is None else matter)
+    actuators = (*helices, _longitudinal(270))
+    return Manipulator(profile=profile, section=Section(rings=(ring,)), actuators=actuators)
 
 
 def redundant_trunk(
@@ -111,28 +113,6 @@ def _longitudinal(offset_deg: float, name: str = "longitudinal") -> FiberArchite
     return FiberArchitecture(name=name, helical_angle=0.0, offset=offset, extent=_PAPER_EXTENT)
 
 
-def _trunk(
-    fibers: tuple[FiberArchitecture, ...],
-    taper: float,
-    length: float,
-    radius_ratio: float,
-    material: Material | None,
-) -> Manipulator:
-    radius = length / 16
-    arm = Manipulator.tapered(
-        length=length,
-        outer_radius=radius,
-        inner_radius=radius_ratio * radius,
-        taper=taper,
-        poisson_ratio=0.5,
-        actuators=fibers,
-    )
-    if material is None:
-        return arm
-    (ring,) = arm.section.rings
-    return arm.replace(section=Section(rings=(ring.replace(material=material),)))
-
-
 _LCE_LENGTH = 0.09  # m
 _LCE_EXTENT = math.radians(48)
 _LCE_FAMILIES = (("left", -108, 66), ("right", 108, 114), ("longitudinal", 0, 270))  # Ω, θ0 [deg]
@@ -161,18 +141,17 @@ def lce_arm() -> Manipulator:
     return Manipulator(
         profile=LinearTaper(length=_LCE_LENGTH, outer_radius=_LCE_LENGTH / 20),
         section=Section(rings=rings, core=core),
-        actuators=tuple(_lce_fiber(*family) for family in _LCE_FAMILIES),
-    )
-
-
-def _lce_fiber(name: str, revolution_deg: float, offset_deg: float) -> FiberArchitecture:
-    return FiberArchitecture(
-        name=name,
-        ring=name,
-        revolution=math.radians(revolution_deg),
-        offset=math.radians(offset_deg),
-        extent=_LCE_EXTENT,
-        activation_bounds=(-5.0, 0.0),
+        actuators=tuple(
+            FiberArchitecture(
+                name=name,
+                ring=name,
+                revolution=math.radians(revolution),
+                offset=math.radians(offset),
+                extent=_LCE_EXTENT,
+                activation_bounds=(-5.0, 0.0),
+            )
+            for name, revolution, offset in _LCE_FAMILIES
+        ),
     )
 
 
@@ -283,8 +262,14 @@ def three_chamber_arm() -> Manipulator:
 _TRUNK_LENGTH, _TRUNK_BASE, _TRUNK_TIP = 1.8, 0.18, 0.05  # m
 _TRUNK_RINGS = (("inner", 0.2, 0.4), ("middle", 0.4, 0.7), ("outer", 0.7, 1.0))  # radii over R2
 _TRUNK_DORSAL, _TRUNK_VENTRAL = (270.0, 342.0), (20.0, 90.0)  # where muscles of the right lie [deg]
-_TRUNK_OBLIQUE = 30.0  # deg
-_TRUNK_BOUNDS = (-0.5, 0.0)
+_TRUNK_GROUPS = (
+    ("dorsal longitudinal", "outer", _TRUNK_DORSAL, 0),
+    ("outer oblique", "outer", _TRUNK_VENTRAL, -30),
+    ("inner oblique", "middle", _TRUNK_VENTRAL, 30),
+    ("dorsal radial", "inner", _TRUNK_DORSAL, None),
+    ("ventral radial", "inner", _TRUNK_VENTRAL, None),
+)
+"""Name, ring, sector, and angle of the fibers of muscles on the right [deg]."""
 
 
 def elephant_trunk() -> Manipulator:
@@ -312,41 +297,17 @@ def elephant_trunk() -> Manipulator:
 
 def _muscles() -> Iterator[Actuator]:
     """Each group on the right and, mirrored at x = 0, on the left."""
-    for side in (1, -1):
-        yield _oblique("dorsal longitudinal", "outer", _TRUNK_DORSAL, side, 0.0)
-    for side in (1, -1):
-        yield _oblique("outer oblique", "outer", _TRUNK_VENTRAL, side, -side * _TRUNK_OBLIQUE)
-    for side in (1, -1):
-        yield _oblique("inner oblique", "middle", _TRUNK_VENTRAL, side, side * _TRUNK_OBLIQUE)
-    for group, sector in (("dorsal radial", _TRUNK_DORSAL), ("ventral radial", _TRUNK_VENTRAL)):
-        for side in (1, -1):
-            yield RadialMuscle(
-                name=_name_of_side(group, side), ring="inner", **_sector_of_side(sector, side)
-            )
-
-
-def _oblique(
-    group: str, ring: str, sector: tuple[float, float], side: int, angle_deg: float
-) -> ObliqueMuscle:
-    angle = math.radians(angle_deg)
-    return ObliqueMuscle(
-        name=_name_of_side(group, side),
-        ring=ring,
-        helical_angle=angle,
-        **_sector_of_side(sector, side),
-    )
-
-
-def _name_of_side(group: str, side: int) -> str:
-    return f"{group} {'right' if side > 0 else 'left'}"
-
-
-def _sector_of_side(sector: tuple[float, float], side: int) -> dict[str, Any]:
-    """Sector of a muscle on the right (1), or mirrored on the left (-1), and its bounds."""
-    start, end = sector
-    middle = (start + end) / 2
-    return {
-        "offset": math.radians(middle if side > 0 else (180.0 - middle) % 360.0),
-        "extent": math.radians(end - start),
-        "activation_bounds": _TRUNK_BOUNDS,
-    }
+    for group, ring, (start, end), angle in _TRUNK_GROUPS:
+        middle = (start + end) / 2
+        for side, offset, hand in (("right", middle, 1), ("left", (180.0 - middle) % 360.0, -1)):
+            sector: dict[str, Any] = {
+                "name": f"{group} {side}",
+                "ring": ring,
+                "offset": math.radians(offset),
+                "extent": math.radians(end - start),
+                "activation_bounds": (-0.5, 0.0),
+            }
+            if angle is None:
+                yield RadialMuscle(**sector)
+            else:
+                yield ObliqueMuscle(helical_angle=math.radians(hand * angle), **sector)

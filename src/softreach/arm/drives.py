@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,10 @@ from softreach.arm.number import MOST, Number, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import as_given, plain
 from softreach.support.errors import Fault, InvalidInput, Range
+
+if TYPE_CHECKING:
+    from softreach.arm.profile import Profile
+    from softreach.arm.section import Section
 
 __all__ = ["BundleNumbers", "Drive", "drive_faults"]
 
@@ -121,7 +125,7 @@ class Drive(Part):
 
     @property
     def numbers(self) -> dict[str, Number]:
-        """Names of the numbers that can be varied: see `value_of`."""
+        """With its bounds, and gains and offsets for each of its bundles."""
         declared = {
             "lower": ("min u", "lowest input"),
             "upper": ("max u", "highest input"),
@@ -129,25 +133,28 @@ class Drive(Part):
             **{f"gains[{name}]": ("g", f"gain of {name}") for name in self.gains},
             **{f"offsets[{name}]": ("o", f"offset of {name}") for name in self.offsets},
         }
-        return {
+        own = {
             name: Number(field=name, symbol=symbol, meaning=meaning, allowed=_FINITE)
             for name, (symbol, meaning) in declared.items()
         }
+        return own | super().numbers
 
-    def value_of(self, field: str) -> float:
-        """A number by its name; NaN for a gain that its bundles do not share."""
-        if field == "gain":
+    def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
+        """NaN for a gain that its bundles do not share."""
+        if name == "gain":
             sizes = {abs(gain) for gain in self.gains.values()}
-            return sizes.pop() if len(sizes) == 1 else math.nan
-        if field in ("lower", "upper"):
-            return self.bounds[field == "upper"]
-        owner, _, bundle = field.partition("[")
-        numbers = getattr(self, owner)
-        return float(numbers[bundle.removesuffix("]")] if bundle else numbers)
+            return (sizes.pop() if len(sizes) == 1 else math.nan,)
+        if name in ("lower", "upper"):
+            return (self.bounds[name == "upper"],)
+        owner, _, bundle = name.partition("[")
+        if not bundle:
+            return super().values_of(name, profile, section)
+        return (float(getattr(self, owner)[bundle.removesuffix("]")]),)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, or with numbers by the names in `numbers`."""
-        named = {field: changes.pop(field) for field in self.numbers if field in changes}
+        own = [name for name in self.numbers if name != "dead_zone" and name in changes]
+        named = {name: changes.pop(name) for name in own}  # the size of all gains before one
         for field, value in named.items():
             if field == "gain":
                 gains = changes.get("gains", self.gains).items()
@@ -175,6 +182,7 @@ class Drive(Part):
         if not is_pair or not all(map(_FINITE.admits, bounds)) or bounds[0] > bounds[1]:
             allowed = f"must be a pair (lower, upper) of numbers up to {MOST:g}, lower <= upper"
             yield Fault("bounds", self.bounds, allowed)
+        bundles = self.gains if isinstance(self.gains, Mapping) else self.offsets
         for field in ("gains", "offsets"):
             numbers = getattr(self, field)
             if not isinstance(numbers, Mapping) or (field == "gains" and not numbers):
@@ -183,7 +191,7 @@ class Drive(Part):
             for name, value in numbers.items():
                 if not _FINITE.admits(plain(value)):
                     yield Fault(f"{field}[{name}]", value, _FINITE)
-                elif name not in self.gains:
+                elif name not in bundles:
                     yield Fault(f"offsets[{name}]", value, "must be that of a bundle in gains")
 
 

@@ -5,28 +5,26 @@ Displacements of tendons become tensions, and the rest shape is a bundle that is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon, Tendon
+from softreach.arm.manipulator import Manipulator
 from softreach.arm.rest_shape import STRAIGHT, RestStrains
-from softreach.arm.tables import ends_over, strain_stations, tables
+from softreach.arm.tables import ends_over, range_of_extension, strain_stations, tables
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
 
 __all__ = [
     "Driving",
     "InnerActivations",
     "body_of",
     "cube_corners",
+    "extension_range",
     "inner_arm",
     "pilot",
     "without_dead_zones",
@@ -207,9 +205,17 @@ def without_dead_zones(arm: Manipulator) -> Manipulator:
 def inner_arm(arm: Manipulator) -> Manipulator:
     """The arm as tables and kernels see it, with bounds that hold what activations lead to.
 
+    It is the arm itself where inputs load its sections as they are. A rest shape is a bundle held
+    at 1, and tendons that are driven by length have tensions.
+
     Raises:
         InvalidDesign: Displacements within the bounds shorten the arm to nothing.
     """
+    return arm if arm.is_direct else _inner_arm(arm)
+
+
+@lru_cache(maxsize=64)
+def _inner_arm(arm: Manipulator) -> Manipulator:
     driving, body = Driving(arm), body_of(arm)
     bounds = driving.ranges.copy()
     if not driving.has_length_tendons:
@@ -225,7 +231,13 @@ def inner_arm(arm: Manipulator) -> Manipulator:
     most = _SAFETY * gamma.max(axis=0) + _against_loads(arm)
     columns = driving.law.columns
     bounds[columns] = np.stack([np.zeros(len(columns)), most[columns]], axis=1)
-    return body.replace(actuators=tuple(_by_tension(body, _fitting(bounds, columns, rates))))
+    ends = np.cumsum([each.bundles for each in body.actuators])
+    shares = zip(body.actuators, np.split(_fitting(bounds, columns, rates), ends), strict=False)
+    actuators = (
+        each.by_tension(own) if isinstance(each, LengthTendon) else each.with_bounds(own)
+        for each, own in shares
+    )
+    return body.replace(actuators=tuple(actuators))
 
 
 def _against_loads(arm: Manipulator) -> float:
@@ -244,8 +256,11 @@ def body_of(arm: Manipulator) -> Manipulator:
     if not arm.drives and arm.rest.is_straight:
         return arm
     if (known := vars(arm).get("_body")) is None:
+        name = "rest shape"
+        while name in arm.bundle_names:
+            name += "'"
         held = RestStrains(
-            name=_unused("rest shape", arm.bundle_names),
+            name=name,
             shape=arm.rest,
             activation_bounds=(1.0, 1.0),
         )
@@ -283,16 +298,7 @@ def _fitting(bounds: Array, columns: NDArray[np.intp], rates: Array) -> Array:
     return fitting
 
 
-def _by_tension(body: Manipulator, bounds: Array) -> Iterator[object]:
-    first = 0
-    for actuator in body.actuators:
-        last = first + actuator.bundles
-        is_pulled = isinstance(actuator, LengthTendon)
-        own = bounds[first:last]
-        yield actuator.by_tension(own) if is_pulled else actuator.with_bounds(own)
-        first = last
-
-
-def _unused(name: str, taken: Sequence[str]) -> str:
-    """The name, with a mark for each time that it is taken."""
-    return _unused(name + "'", taken) if name in taken else name
+def extension_range(arm: Manipulator) -> tuple[float, float]:
+    """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
+    arm = inner_arm(arm)
+    return range_of_extension(arm, tables(arm, strain_stations(arm)).extension)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,8 @@ __all__ = [
     "without_ring",
 ]
 
+ACTUATOR_KINDS = ("fiber", "oblique muscle", "radial muscle", "tendon", "chamber")
+
 _EXTENT = np.radians(40)
 _TURN = 2.0  # bending of a new actuator at its bound, over the arm [rad]
 
@@ -52,8 +54,27 @@ def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
         InvalidDesign: A tendon or a chamber in an arm without Young's modulus.
     """
     name = _new_name(kind, [actuator.name for actuator in arm.actuators])
-    actuator = ACTUATOR_KINDS[kind](arm, name, _widest_gap(arm))
+    where: dict[str, Any] = {"name": name, "offset": _widest_gap(arm)}
+    radius, bending = float(arm.profile.radius(0.0)), arm.section.stiffness_at(arm.profile, 0.0)
+    moment = _TURN * float(bending.bending) / arm.length  # which turns the arm by that in all
+    if kind == "fiber":
+        actuator = FiberArchitecture(helical_angle=0.0, extent=_EXTENT, **where)
+    elif kind == "oblique muscle":
+        actuator = ObliqueMuscle(helical_angle=np.radians(30), extent=_EXTENT, **where)
+    elif kind == "radial muscle":
+        actuator = RadialMuscle(name=name, extent=2 * np.pi, activation_bounds=(-1.0, 0.0))
+    elif kind == "tendon":
+        bounds = (0.0, _rounded(moment / (0.8 * radius)))
+        actuator = Tendon(distance_ratio=0.8, activation_bounds=bounds, **where)
+    else:
+        bounds = (0.0, _rounded(moment / (0.5 * radius * np.pi * (0.25 * radius) ** 2)))
+        ratios = {"distance_ratio": 0.5, "radius_ratio": 0.25}
+        actuator = Chamber(activation_bounds=bounds, **ratios, **where)
     return arm.replace(actuators=(*arm.actuators, actuator))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.2g}")
 
 
 def without_actuator(arm: Manipulator, name: str) -> Manipulator:
@@ -176,54 +197,6 @@ def ring_label(arm: Manipulator, index: int) -> str:
     """Label of a ring: its index, and its name if it has one."""
     name = arm.section.rings[index].name
     return f"ring {index} ({name})" if name else f"ring {index}"
-
-
-def _fiber(arm: Manipulator, name: str, offset: float) -> Actuator:
-    del arm
-    return FiberArchitecture(name=name, helical_angle=0.0, offset=offset, extent=_EXTENT)
-
-
-def _oblique_muscle(arm: Manipulator, name: str, offset: float) -> Actuator:
-    del arm
-    return ObliqueMuscle(name=name, helical_angle=np.radians(30), offset=offset, extent=_EXTENT)
-
-
-def _radial_muscle(arm: Manipulator, name: str, offset: float) -> Actuator:
-    del arm, offset
-    return RadialMuscle(name=name, extent=2 * np.pi, activation_bounds=(-1.0, 0.0))
-
-
-def _tendon(arm: Manipulator, name: str, offset: float) -> Actuator:
-    most = _rounded(_moment(arm) / (0.8 * float(arm.profile.radius(0.0))))
-    return Tendon(name=name, distance_ratio=0.8, offset=offset, activation_bounds=(0.0, most))
-
-
-def _chamber(arm: Manipulator, name: str, offset: float) -> Actuator:
-    radius = float(arm.profile.radius(0.0))
-    most = _rounded(_moment(arm) / (0.5 * radius * np.pi * (0.25 * radius) ** 2))
-    bounds = (0.0, most)
-    return Chamber(
-        name=name, distance_ratio=0.5, radius_ratio=0.25, offset=offset, activation_bounds=bounds
-    )
-
-
-ACTUATOR_KINDS: Mapping[str, Callable[[Manipulator, str, float], Actuator]] = {
-    "fiber": _fiber,
-    "oblique muscle": _oblique_muscle,
-    "radial muscle": _radial_muscle,
-    "tendon": _tendon,
-    "chamber": _chamber,
-}
-
-
-def _moment(arm: Manipulator) -> float:
-    """The moment that bends the base as if the arm were to turn in all by `_TURN` [N m]."""
-    stiffness = float(arm.section.stiffness_at(arm.profile, 0.0).bending)
-    return _TURN * stiffness / arm.length
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.2g}")
 
 
 def _widest_gap(arm: Manipulator) -> float:

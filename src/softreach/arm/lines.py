@@ -12,13 +12,7 @@ from softreach.support.arguments import as_number
 from softreach.support.arrays import as_rows
 from softreach.support.errors import Range
 
-__all__ = [
-    "lengths_of_strains",
-    "limit_shortening",
-    "line_lengths",
-    "line_strains",
-    "places",
-]
+__all__ = ["lengths_of_strains", "limit_shortening", "line_lengths", "line_strains", "places"]
 
 Array = NDArray[np.float64]
 

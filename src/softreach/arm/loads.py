@@ -94,11 +94,9 @@ class Loads(Part):
 
     def _faults(self) -> list[Fault]:
         points = self.point_loads
-        are_loads = isinstance(points, tuple | list) and all(
-            isinstance(load, PointLoad) for load in points
-        )
-        wrong = [] if are_loads else [Fault("point_loads", points, "must be PointLoads")]
-        return super()._faults() + wrong
+        if isinstance(points, tuple | list) and all(isinstance(x, PointLoad) for x in points):
+            return super()._faults()
+        return [*super()._faults(), Fault("point_loads", points, "must be PointLoads")]
 
     def section_faults(self, section: Section, length: float) -> list[Fault]:
         """Faults that keep them from acting on an arm: moduli, densities, places off the arm."""

@@ -2,45 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from os import PathLike
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import design_file
-from softreach.arm.actuators import (
-    Actuator,
-    FiberArchitecture,
-    LengthTendon,
-    Outline,
-    SectorActuator,
-)
+from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
+from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence
 from softreach.arm.drives import Drive, drive_faults
-from softreach.arm.fitting import (
-    fit_faults,
-    inner_radius_faults,
-    kind_faults,
-    named_actuators,
-    named_stations,
-    part_faults,
-    part_or_faults,
-    placed_parts,
-    shared_names,
-)
-from softreach.arm.loads import Loads
-from softreach.arm.marker import Marker
+from softreach.arm.load_number import scale_warnings
 from softreach.arm.material import Material
-from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.rest_shape import STRAIGHT, RestShape
-from softreach.arm.rigid import RigidPiece
-from softreach.arm.scale import scale_warnings
-from softreach.arm.section import Ring, Section, Stiffness
-from softreach.arm.stations import Stations
+from softreach.arm.profile import LinearTaper
+from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.stations import Marker
 from softreach.support.arguments import (
     as_flag,
     as_given,
@@ -50,11 +30,13 @@ from softreach.support.arguments import (
     as_text,
     plain,
 )
-from softreach.support.arrays import as_stations, read_only
-from softreach.support.errors import InvalidDesign, InvalidInput, warn
+from softreach.support.arrays import read_only
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.text import write_text
 from softreach.support.lazy import lazy
-from softreach.support.units import LengthUnit, as_unit, handy_unit
+from softreach.support.units import UNITS, LengthUnit, as_unit, handy_unit
+
+Made = TypeVar("Made")
 
 __all__ = ["Manipulator", "a_manipulator"]
 
@@ -64,7 +46,7 @@ _NAMES = 6  # of bundles that `repr` lists
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Manipulator:
+class Manipulator(Body):
     """A slender arm with actuators, clamped at Z = 0 where its tangent is the base's z (section 2).
 
     Values are frozen; `replace` makes a changed copy, which is checked again. What a design does is
@@ -74,48 +56,43 @@ class Manipulator:
         InvalidDesign: The arm cannot exist; the error names every fault.
     """
 
-    profile: Profile
-    """R2(Z), the outer radius along the arm, and its length."""
-    section: Section
-    """The core and the ring of actuators, in proportion to R2(Z)."""
-    actuators: tuple[Actuator, ...]
-    """In the order of the activations, bundle by bundle; empty for a passive rod."""
-    loads: Loads | None = None
-    """Loads beside them; None for nothing, not even its weight."""
     base: Base = UPRIGHT
     """Pose of its clamped end in the world; upright at the origin."""
-    rest: RestShape = STRAIGHT
-    """Curvature and twist of the arm that nothing drives; straight."""
     drives: tuple[Drive, ...] = ()
     """Inputs that activate bundles; bundles that none of them names are inputs themselves."""
-    stations: Mapping[str, float] = Stations()
-    """Z [m] of stations by name, at which actuators, rigid pieces and markers may be."""
-    rigid_pieces: tuple[RigidPiece, ...] = ()
-    """Rigid pieces, which neither bend nor twist nor change their length."""
     markers: tuple[Marker, ...] = ()
     """Points that go with its sections; they change nothing about the arm."""
     display_unit: str | None = field(default=None, compare=False)
     """Unit that it is shown in, "m", "cm", "mm" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
 
-    def __post_init__(self) -> None:
-        if faults := list(part_faults(self)):
-            raise InvalidDesign(faults)
-        object.__setattr__(self, "stations", named_stations(self.stations))
-        actuators = tuple(named_actuators(self.actuators))
-        owners = [actuator.name for actuator in actuators]
-        object.__setattr__(self, "actuators", placed_parts(actuators, self.stations, owners))
-        owners = [f"rigid_pieces[{k}]" for k in range(len(self.rigid_pieces))]
-        object.__setattr__(
-            self, "rigid_pieces", placed_parts(self.rigid_pieces, self.stations, owners)
-        )
-        owners = [f"markers.{marker.name}" for marker in self.markers]
-        object.__setattr__(self, "markers", placed_parts(self.markers, self.stations, owners))
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        if not isinstance(self.base, Base):
+            faults.append(Fault("base", self.base, 'must be a Base, such as Base(points="down")'))
+        unit = self.display_unit
+        if unit is not None and not (isinstance(unit, str) and unit in UNITS):
+            faults.append(Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}"))
+        return faults + [*kinds_in_a_sequence("markers", self.markers, Marker)]
+
+    def _settle(self) -> list[Fault]:
+        faults = super()._settle()
+        if isinstance(self.drives, list):
+            object.__setattr__(self, "drives", tuple(self.drives))
+        markers = [(f"markers.{marker.name}", marker) for marker in self.markers]
+        return faults + self._place("markers", markers)
+
+    def _fit_faults(self) -> list[Fault]:
+        faults = [*name_faults([each.name for each in self.markers], "markers")]
+        faults += super()._fit_faults()
+        if faults:
+            return faults
+        for marker in self.markers:
+            owner = f"markers.{marker.name}"
+            own = marker.place_faults(self.length)
+            faults += [fault._replace(path=f"{owner}.{fault.path}") for fault in own]
         names = [actuator.name for actuator in self.actuators], self.bundle_names
-        faults = list(shared_names(self)) or list(fit_faults(self))
-        if faults := faults or list(drive_faults(self.drives, *names)):
-            raise InvalidDesign(faults)
-        object.__setattr__(self, "drives", tuple(self.drives))
+        return faults or [*drive_faults(self.drives, *names)]
 
     @classmethod
     def tapered(
@@ -154,15 +131,19 @@ class Manipulator:
         """
         faults = list(kind_faults(actuators))
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
-        faults += inner_radius_faults(plain(inner_radius), plain(outer_radius))
+        inner, outer, allowed = plain(inner_radius), plain(outer_radius), Range(0.0, unit="m")
+        if not allowed.admits(inner):
+            faults.append(Fault("inner_radius", inner, allowed))
+        elif allowed.admits(outer) and inner >= outer:
+            faults.append(Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m"))
         cone = {"length": length, "outer_radius": outer_radius, "taper": taper}
-        profile = part_or_faults(faults, LinearTaper, **cone, tip_radius=tip_radius)
+        profile = _part_or_faults(faults, LinearTaper, **cone, tip_radius=tip_radius)
         matter = {
             "young_modulus": young_modulus,
             "poisson_ratio": poisson_ratio,
             "density": density,
         }
-        material = part_or_faults(faults, Material, **matter)
+        material = _part_or_faults(faults, Material, **matter)
         if activation_bounds is not None:
             faults += bounds_faults(activation_bounds, bundles)
         if faults or profile is None or material is None:
@@ -171,10 +152,6 @@ class Manipulator:
         section = Section(rings=(ring,))
         arm = cls(profile=profile, section=section, actuators=tuple(actuators))
         return arm if activation_bounds is None else arm.with_bounds(activation_bounds)
-
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new design."""
-        return replace(self, **changes)
 
     def with_bounds(self, activation_bounds: ArrayLike) -> Self:
         """A copy with other activation bounds.
@@ -231,11 +208,7 @@ class Manipulator:
         Raises:
             InvalidDesign: The text's faults, all of them, in the file's own names and units.
         """
-        parts = design_file.parse(as_text("text", text), as_text("source", source))
-        try:
-            return cls(**parts._asdict())
-        except InvalidDesign as error:
-            raise design_file.in_file_terms(error, source) from None
+        return design_file.read(as_text("text", text), as_text("source", source), cls)
 
     def to_toml(self) -> str:
         """The design as the text of a file, from which `from_toml` makes an equal one.
@@ -249,18 +222,7 @@ class Manipulator:
 
     @lazy
     def _toml(self) -> str:
-        return design_file.render(
-            self.profile,
-            self.section,
-            self.actuators,
-            self.loads,
-            self.base,
-            self.rest,
-            self.stations,
-            self.rigid_pieces,
-            self.drives,
-            self.markers,
-        )
+        return design_file.render(vars(self))
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
@@ -275,7 +237,7 @@ class Manipulator:
         """
         source = as_path("path", path)
         arm = cls.from_toml(design_file.text_of(source), source=source)
-        for text in scale_warnings(arm.profile, arm.section):
+        for text in scale_warnings(arm):
             warn(f"{source}: {text}")
         return arm
 
@@ -299,45 +261,9 @@ class Manipulator:
         return self.to_toml() + design_file.display_text(self.display_unit)
 
     @property
-    def length(self) -> float:
-        """L, from base to tip before activation [m]."""
-        return self.profile.length
-
-    @property
     def length_unit(self) -> LengthUnit:
         """Unit of lengths that it is shown in: `display_unit`, or one that is handy."""
         return as_unit(self.display_unit or handy_unit(self.length), self.length)
-
-    @property
-    def fibers(self) -> tuple[FiberArchitecture, ...]:
-        """Those actuators that are fiber architectures."""
-        return tuple(each for each in self.actuators if isinstance(each, FiberArchitecture))
-
-    @property
-    def bundles(self) -> int:
-        """m, number of independent activations."""
-        return sum(actuator.bundles for actuator in self.actuators)
-
-    @lazy
-    def bundle_names(self) -> tuple[str, ...]:
-        """A readable name for each bundle."""
-        return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
-
-    @lazy
-    def bundle_actuators(self) -> tuple[Actuator, ...]:
-        """The actuator of each bundle."""
-        return tuple(actuator for actuator in self.actuators for _ in range(actuator.bundles))
-
-    @lazy
-    def bundle_units(self) -> tuple[str, ...]:
-        """The unit of the activation of each bundle."""
-        return tuple(actuator.unit for actuator in self.bundle_actuators)
-
-    @lazy
-    def bounds(self) -> Array:
-        """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
-        bounds = (actuator.bounds for actuator in self.actuators)
-        return read_only(np.concatenate([np.empty((0, 2)), *bounds]))
 
     @lazy
     def undriven(self) -> tuple[int, ...]:
@@ -373,67 +299,11 @@ class Manipulator:
         of_drives = np.array([drive.bounds for drive in self.drives])
         return read_only(np.concatenate([of_drives, self.bounds[list(self.undriven)]]))
 
-    @lazy
-    def breakpoints(self) -> tuple[float, ...]:
-        """Stations inside (0, L) where profile, section or actuators are not smooth [m]."""
-        places = {0.0, self.length, *self.profile.breakpoints}
-        places.update(self.length * x for x in self.section.breaks)
-        places.update(z for actuator in self.actuators for z in actuator.breakpoints(self.profile))
-        places.update(z for piece in self.rigid_pieces for z in piece.span(self.length))
-        ascending = np.array(sorted(places))
-        # Two that differ by rounding alone are one.
-        apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
-        inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
-        return tuple(inside.tolist())
-
-    def stiffness_at(self, z: ArrayLike) -> Stiffness:
-        """K0, K1 and K3 at stations Z [m]: those of its section, infinite in rigid pieces."""
-        stations = np.asarray(z, float)
-        stiffness = self.section.stiffness_at(self.profile, stations)
-        if not self.rigid_pieces:
-            return stiffness
-        spans = [piece.span(self.length) for piece in self.rigid_pieces]
-        inside = [
-            (stations >= start) & ((stations < end) | (end >= self.length)) for start, end in spans
-        ]
-        rigid = np.any(inside, axis=0)
-        return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
-
-    @lazy
-    def inner(self) -> Manipulator:
-        """The arm as tables and kernels see it; itself where activations load its sections.
-
-        A rest shape is a bundle held at 1, and tendons that are driven by length have tensions.
-        `arm.driving` maps activations of the arm to those of this one.
-
-        Raises:
-            InvalidDesign: Displacements within the bounds shorten the arm to nothing.
-        """
-        by_length = any(isinstance(actuator, LengthTendon) for actuator in self.actuators)
-        if self.rest.is_straight and not self.drives and not by_length:
-            return self
-        from softreach.arm.driving import inner_arm
-
-        return inner_arm(self)
-
     @property
-    def bundle_courses(self) -> tuple[str, ...]:
-        """Direction of contraction within each bundle; see `Actuator.course`."""
-        return tuple(actuator.course for actuator in self.bundle_actuators)
-
-    def outline(self, z: ArrayLike) -> Outline:
-        """Places of all bundles in the sections at stations Z [m], shape (station,)."""
-        stations = as_stations("z", z)
-        each = [part.outline(self.profile, self.section, stations) for part in self.actuators]
-        each = each or [Outline.empty(len(stations))]
-        return Outline(
-            center=np.concatenate([part.center for part in each], axis=1),
-            extent=np.concatenate([part.extent for part in each]),
-            inner_ratio=np.concatenate([part.inner_ratio for part in each], axis=1),
-            outer_ratio=np.concatenate([part.outer_ratio for part in each], axis=1),
-            shape=tuple(shape for part in each for shape in part.shape),
-            acts=np.concatenate([part.acts for part in each], axis=1),
-        )
+    def is_direct(self) -> bool:
+        """True if its inputs load its sections as they are: see `arm.driving`."""
+        by_length = any(isinstance(actuator, LengthTendon) for actuator in self.actuators)
+        return self.rest.is_straight and not self.drives and not by_length
 
     def __repr__(self) -> str:
         base, tip = self.profile.radius([0.0, self.length])
@@ -448,7 +318,7 @@ class Manipulator:
     def _repr_html_(self) -> str:
         from softreach.arm.skin import arm_card
 
-        return arm_card(self)
+        return arm_card(self, self.base)
 
     def _fiber_index(self, fiber: str | int) -> int:
         names = {
@@ -470,3 +340,11 @@ class Manipulator:
 def a_manipulator(name: str, value: object) -> Manipulator:
     """An argument that is a design."""
     return as_instance(name, value, Manipulator, "a Manipulator")
+
+
+def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Made | None:
+    try:
+        return kind(**values)
+    except InvalidDesign as error:
+        faults += error.faults
+        return None

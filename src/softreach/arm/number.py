@@ -29,7 +29,9 @@ __all__ = [
     "Number",
     "Shape",
     "Station",
+    "alternatives",
     "as_numbers",
+    "default_of",
     "fields_of",
     "is_path_name",
     "number",
@@ -132,6 +134,10 @@ class Number:
     """The name of a station of the arm may take its place."""
     pair: bool = False
     """Two values, where the part begins and where it ends, may take its place."""
+    instead_of: str = ""
+    """Field of the part that says the same in another way: one of the two is given."""
+    hint: str = ""
+    """Ends the sentence "give exactly one of ..."."""
 
     @property
     def unit(self) -> str:
@@ -159,7 +165,8 @@ class Number:
         if self.shape == "stations" or (value is None and self.optional) or self._is_name(value):
             return []
         if self.shape == "series":
-            elements = enumerate(as_numbers(value).ravel().tolist())
+            each = as_numbers(value)
+            elements = enumerate(each.ravel().tolist() if each.ndim else ())
             return self._refused((k, each) for k, each in elements if math.isfinite(each))
         if self.shape == "several":
             elements = as_numbers(value)
@@ -180,6 +187,28 @@ class Number:
         if self.shape == "single" and limits is None:
             return []
         return [Fault(self.field, single, self._allowed_instead_of(single, limits))]
+
+    def elements(self, value: Any) -> dict[str, Number]:
+        """Numbers in a series or a function along the arm; the ends of stations stay."""
+        if self.along is not None and isinstance(value, self.along):
+            places = fields_of(type(value))["stations_over_length"]
+            inner = places.elements(value.stations_over_length)  # pyright: ignore
+            values = {f"values[{k}]": self._element(k) for k in range(len(value.values))}  # pyright: ignore
+            return {f"{self.field}.{name}": each for name, each in (inner | values).items()}
+        if not isinstance(value, tuple):
+            return {}
+        first = 1 if self.shape == "stations" else 0
+        return {f"{self.field}[{k}]": self._element(k) for k in range(first, len(value) - first)}
+
+    def _element(self, k: int) -> Number:
+        return dataclasses.replace(
+            self,
+            symbol=f"{self.symbol}[{k}]",
+            meaning=f"{self.meaning}, number {k}",
+            shape="single",
+            along=None,
+            pair=False,
+        )
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
@@ -237,6 +266,8 @@ def number(
     along: type | None = None,
     named: bool = False,
     pair: bool = False,
+    instead_of: str = "",
+    hint: str = "",
     default: Any = MISSING,
 ) -> Any:
     """Field of a dataclass that is a number of a design.
@@ -255,6 +286,8 @@ def number(
         along: Class of functions along the arm that may take its place.
         named: The name of a station may take its place.
         pair: Two values, where the part begins and where it ends, may take its place.
+        instead_of: Field that says the same in another way.
+        hint: Ends the sentence "give exactly one of ...".
         default: Default of the field; without one it is required, None makes it optional.
     """
     allowed = Range(low, high, unit, open_low, open_high, integer)
@@ -266,6 +299,8 @@ def number(
         along=along,
         named=named,
         pair=pair,
+        instead_of=instead_of,
+        hint=hint,
     )
     return dataclasses.field(default=default, metadata={"number": declared})
 
@@ -285,6 +320,18 @@ def fields_of(kind: type) -> Mapping[str, Number]:
             optional = declared.optional or inherited[field.name].default is None
             numbers[field.name] = dataclasses.replace(declared, field=field.name, optional=optional)
     return MappingProxyType(numbers)
+
+
+@cache
+def alternatives(kind: type) -> Mapping[str, str]:
+    """Fields of a kind of part that say the same in two ways, each to the other."""
+    pairs = [(each.field, each.instead_of) for each in fields_of(kind).values() if each.instead_of]
+    return MappingProxyType(dict(pairs) | {other: field for field, other in pairs})
+
+
+def default_of(kind: type, field: str) -> Any:
+    """Default of a field of a dataclass."""
+    return getattr(kind, "__dataclass_fields__")[field].default  # noqa: B009
 
 
 def own_fields(kind: type) -> frozenset[str]:
@@ -325,6 +372,8 @@ def is_path_name(text: str) -> bool:
 
 def as_numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Numbers as an array; empty for text, booleans and anything else that is not a number."""
+    if isinstance(values, list | tuple) and any(isinstance(each, bool) for each in values):
+        return np.empty(0)  # NumPy takes them for 0 and 1
     try:
         return as_floats("values", values)
     except InvalidInput:

@@ -245,7 +245,6 @@ class _RadiiAtStations(Profile):
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
-        """The stations between base and tip [m]."""
         return tuple(self.length * x for x in self.stations_over_length[1:-1])
 
     def _faults(self) -> list[Fault]:

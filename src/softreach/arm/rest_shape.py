@@ -76,7 +76,6 @@ class RestStrains(Actuator):
     shape: RestShape
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
-        """None: it is no load."""
         del profile, section
         return Resultants(np.zeros((len(z), 1)), np.zeros((len(z), 3, 1)))
 
@@ -85,7 +84,6 @@ class RestStrains(Actuator):
         return self.shape.curvature(z / profile.length)
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        """A line along the axis."""
         del section
         zero = np.zeros((len(z), 1))
         return Outline(
@@ -98,5 +96,4 @@ class RestStrains(Actuator):
         )
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        """Stations where the rest shape is not smooth [m]."""
         return tuple(profile.length * x for x in self.shape.breaks)

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.along import values_along
+from softreach.arm.along import AlongArm, values_along
 from softreach.arm.material import Material, as_material, material_faults
-from softreach.arm.measured import Measured
 from softreach.arm.number import is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault, InvalidDesign
@@ -23,9 +22,48 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
 
-__all__ = ["Layer", "Ring", "Section", "Stiffness", "name_faults"]
+__all__ = ["Layer", "Measured", "Ring", "Section", "Stiffness", "name_faults"]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured(Part):
+    """Measured numbers of the sections of an arm, in place of what follows from its materials.
+
+    Each is a number for all of the arm, or a function along it; None follows from the materials.
+
+    Raises:
+        InvalidDesign: A number out of its range.
+    """
+
+    axial_stiffness: float | AlongArm | None = number(
+        "K0", "N", "axial stiffness", low=0.0, open_low=True, along=AlongArm, default=None
+    )
+    """K0 [N]."""
+    bending_stiffness: float | AlongArm | None = number(
+        "K1", "N m²", "bending stiffness", low=0.0, open_low=True, along=AlongArm, default=None
+    )
+    """K1 = K2 [N m²]."""
+    torsion_stiffness: float | AlongArm | None = number(
+        "K3", "N m²", "torsional stiffness", low=0.0, open_low=True, along=AlongArm, default=None
+    )
+    """K3 [N m²]."""
+    mass_per_length: float | AlongArm | None = number(
+        "μ", "kg/m", "mass per length", low=0.0, along=AlongArm, default=None
+    )
+    """μ, before activation [kg/m]."""
+
+    @property
+    def stiffnesses(self) -> tuple[float | AlongArm | None, ...]:
+        """K0, K1 and K3, each None where it was not measured."""
+        return self.axial_stiffness, self.bending_stiffness, self.torsion_stiffness
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Z/L inside (0, 1) where one of them is not smooth."""
+        values = (*self.stiffnesses, self.mass_per_length)
+        return tuple(x for value in values if isinstance(value, AlongArm) for x in value.breaks)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +179,11 @@ class Section(Part):
         if not faults and self.bore_ratio > self.inner_ratio:
             allowed = f"must be at most the smallest inner_ratio of the rings, {self.inner_ratio:g}"
             faults.append(Fault("bore_ratio", self.bore_ratio, allowed))
-        return faults or list(_modulus_faults(self))
+        if faults or self.has_measured_stiffness:
+            return faults or self.modulus_faults("where not all stiffnesses are measured")
+        first, *others = (layer.material for layer in self.layers)
+        same = all(first.same_matter(other) for other in others)
+        return [] if same else self.modulus_faults("where materials differ")
 
     def ring(self, which: int | str) -> Ring:
         """A ring by its index or name.
@@ -288,14 +330,6 @@ class Section(Part):
 
 def _modulus(material: Material) -> float:
     return 1.0 if material.young_modulus is None else material.young_modulus
-
-
-def _modulus_faults(section: Section) -> Iterator[Fault]:
-    first, *others = (layer.material for layer in section.layers)
-    if section.has_measured_stiffness:
-        yield from section.modulus_faults("where not all stiffnesses are measured")
-    elif not all(first.same_matter(other) for other in others):
-        yield from section.modulus_faults("where materials differ")
 
 
 def _missing(section: Section, field: str, unit: str, why: str) -> Iterator[Fault]:

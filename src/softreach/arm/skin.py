@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.actuators import Outline
 from softreach.arm.base import Base
-from softreach.arm.profile import Profile
+from softreach.arm.body import Body
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
@@ -37,39 +36,6 @@ _LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
 _SAME = 1e-9  # of the length, or of R2
 _CARD_STATIONS, _CARD_STEP = 41, np.pi / 27
-
-
-class Body(Protocol):
-    """An arm as far as it can be seen."""
-
-    @property
-    def profile(self) -> Profile:
-        """Outer radius along the arm."""
-        ...
-
-    @property
-    def base(self) -> Base:
-        """Pose in the world."""
-        ...
-
-    @property
-    def length(self) -> float:
-        """L [m]."""
-        ...
-
-    @property
-    def bundles(self) -> int:
-        """Number of bundles."""
-        ...
-
-    @property
-    def breakpoints(self) -> Any:
-        """Stations where profile or actuators are not smooth [m]: a tuple, also if cached."""
-        ...
-
-    def outline(self, z: ArrayLike) -> Outline:
-        """Outline of all bundles at stations Z [m]."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -234,9 +200,9 @@ def inside(arm: Body) -> tuple[bool, ...]:
     return tuple(bool(hidden[:, k].any()) for k in range(arm.bundles))
 
 
-def arm_card(arm: Body) -> str:
+def arm_card(arm: Body, base: Base) -> str:
     """HTML with a small picture of the unactivated arm above its numbers, for notebooks."""
-    line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS), arm.base)
+    line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS), base)
     line = line.with_stations(arm.breakpoints)
     body = body_skin(arm, line)
     bundles = bundle_skins(arm, line, lift=0.01, step=_CARD_STEP)

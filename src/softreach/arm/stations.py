@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from softreach.arm.number import Number, Station, fields_of, is_path_name, number
 from softreach.arm.part import Part
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["PLACE", "Located", "Span", "Stations", "placed"]
+__all__ = ["PLACE", "Located", "Marker", "RigidPiece", "Span", "Stations", "placed"]
 
-Made = TypeVar("Made", bound=Part)
+Triple = tuple[float, float, float]
 
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
 """Declaration of the place of a named station."""
@@ -38,10 +38,26 @@ class Stations(Mapping[str, float]):
         except (TypeError, ValueError):
             allowed = "must be a mapping from names to Z in m"
             raise InvalidDesign([Fault("", places, allowed)]) from None
-        faults = [Fault(str(name), z, allowed) for name, z, allowed in _wrong(pairs)]
+        faults: list[Fault] = []
+        for name, z in pairs.items():
+            if not isinstance(name, str) or not name or not is_path_name(name):
+                allowed = "must be named by one line without dots and brackets"
+                faults.append(Fault(str(name), z, allowed))
+            elif not PLACE.allowed.admits(z):
+                faults.append(Fault(name, z, PLACE.allowed))
         if faults:
             raise InvalidDesign(faults)
         self._places = {str(name): float(z) for name, z in pairs.items()}
+
+    @property
+    def numbers(self) -> dict[str, Number]:
+        """Places by name: what begins, ends or stands there moves with it."""
+        return dict.fromkeys(self, PLACE)
+
+    def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
+        """Z [m]."""
+        del profile, section
+        return (self[name],)
 
     def replace(self, **places: float) -> Stations:
         """Those with some in other places."""
@@ -63,15 +79,6 @@ class Stations(Mapping[str, float]):
         return f"Stations({self._places})"
 
 
-def _wrong(pairs: Mapping[Any, Any]) -> Iterator[tuple[Any, Any, Range | str]]:
-    """Names that paths cannot hold, and places that are none, with what is allowed."""
-    for name, z in pairs.items():
-        if not isinstance(name, str) or not name or not is_path_name(name):
-            yield name, z, "must be named by one line without dots and brackets"
-        elif not PLACE.allowed.admits(z):
-            yield name, z, PLACE.allowed
-
-
 class Located(Part):
     """A part at one place along the arm or more, each given over L, in m, or by a station's name.
 
@@ -79,8 +86,10 @@ class Located(Part):
         InvalidDesign: A place off the arm, or given twice.
     """
 
-    _places: ClassVar[tuple[str, ...]]
-    """Its places: the fields in m or by name, beside each of which one is over L."""
+    @property
+    def places(self) -> list[str]:
+        """Fields that are places in m or by name, beside each of which one is over L."""
+        return [field for field, declared in fields_of(type(self)).items() if declared.named]
 
     def station_at(self, field: str, length: float) -> float:
         """Z [m] of a place on an arm of a length [m].
@@ -106,40 +115,11 @@ class Located(Part):
         allowed = f"must be on the arm, at most {length:g} m"
         return [
             Fault(field, z, allowed)
-            for field in self._places
+            for field in self.places
             # of a named station, the arm refuses that
             if (z := self.station_at(field, length)) > length
             and not isinstance(getattr(self, field), Station)
         ]
-
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number when this part belongs to an arm with this profile and section."""
-        del section
-        if field in self._places:
-            return self.station_at(field, profile.length)
-        if (place := field.removesuffix("_over_length")) in self._places:
-            return self.station_over_length_at(place, profile.length)
-        return getattr(self, field)
-
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed; a new place takes that of the one given otherwise."""
-        for field in self._places:
-            ratio = f"{field}_over_length"
-            if changes.get(field) is not None:
-                changes.setdefault(ratio, _default(type(self), ratio))
-            if changes.get(ratio) is not None:
-                changes.setdefault(field, None)
-        return super().replace(**changes)
-
-    def _faults(self) -> list[Fault]:
-        faults = super()._faults()
-        for field in self._places:
-            ratio = f"{field}_over_length"
-            value = getattr(self, field), getattr(self, ratio)
-            if value[0] is not None and value[1] != _default(type(self), ratio):
-                allowed = f"give exactly one of {field} and {ratio}"
-                faults.append(Fault(f"{field}, {ratio}", value, allowed))
-        return faults
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,8 +130,6 @@ class Span(Located):
         InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
     """
 
-    _places: ClassVar[tuple[str, ...]] = ("start", "end")
-
     start_over_length: float = number(
         "Z0/L", "", "where it begins", low=0.0, high=1.0, open_high=True, default=0.0
     )
@@ -161,11 +139,24 @@ class Span(Located):
     )
     """Z1/L, where it ends [-]."""
     start: float | str | None = number(
-        "Z0", "m", "where it begins", low=0.0, named=True, default=None
+        "Z0",
+        "m",
+        "where it begins",
+        low=0.0,
+        named=True,
+        instead_of="start_over_length",
+        default=None,
     )
     """Z0 [m], or the name of a station of the arm, in place of `start_over_length`."""
     end: float | str | None = number(
-        "Z1", "m", "where it ends", low=0.0, open_low=True, named=True, default=None
+        "Z1",
+        "m",
+        "where it ends",
+        low=0.0,
+        open_low=True,
+        named=True,
+        instead_of="end_over_length",
+        default=None,
     )
     """Z1 [m], or the name of a station of the arm, in place of `end_over_length`."""
 
@@ -200,17 +191,68 @@ class Span(Located):
         return [*faults, Fault("end_over_length", end, allowed)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class RigidPiece(Span):
+    """A stretch of the arm that neither actuators nor loads deform: a disk, a joint, a hard tip.
+
+    Actuators pass through it and act on what is beyond; its mass is that of the arm there.
+
+    Raises:
+        InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Marker(Located):
+    """A point at r(Z) + x d1 + y d2 + z d3 of one section; it changes nothing about the arm.
+
+    One beyond the tip, at an offset along d3, is the point of a tool that the tip holds.
+
+    Raises:
+        InvalidDesign: No name, or a station off the arm, given twice, or of no such name.
+    """
+
+    name: str
+    """Name in files and results; unique within an arm."""
+    station_over_length: float = number(
+        "Z/L", "", "where its section is", low=0.0, high=1.0, default=1.0
+    )
+    """Z/L of its section [-]."""
+    station: float | str | None = number(
+        "Z",
+        "m",
+        "where its section is",
+        low=0.0,
+        named=True,
+        instead_of="station_over_length",
+        default=None,
+    )
+    """Z [m], or the name of a station of the arm, in place of `station_over_length`."""
+    offset: Triple = number(
+        "a", "m", "from the center of its section", default=(0.0, 0.0, 0.0), shape="triple"
+    )
+    """(x, y, z) from the center of its section, in the directors [m]."""
+
+    def _faults(self) -> list[Fault]:
+        unnamed = [] if self.name else [Fault("name", self.name, "must be given")]
+        return super()._faults() + unnamed
+
+
+Made = TypeVar("Made", bound=Located)
+
+
 def placed(part: Made, stations: Mapping[str, float]) -> Made:
     """The part where the stations that it names are.
 
     Raises:
         InvalidDesign: It names a station that is none of these.
     """
-    names: dict[str, str] = {}
-    for field, declared in fields_of(type(part)).items():
-        place = getattr(part, field) if declared.named else None
-        if isinstance(place, str | Station):
-            names[field] = place.name if isinstance(place, Station) else place
+    given = {field: getattr(part, field) for field in part.places}
+    names = {
+        field: place.name if isinstance(place, Station) else place
+        for field, place in given.items()
+        if isinstance(place, str | Station)
+    }
     if faults := [
         Fault(field, name, _allowed(name, stations))
         for field, name in names.items()
@@ -229,7 +271,3 @@ def _allowed(name: str, stations: Mapping[str, float]) -> str:
     return f"must be Z in m or a station of the arm: {', '.join(stations)}" + (
         f"; {hint}" if hint else ""
     )
-
-
-def _default(kind: type, field: str) -> Any:
-    return getattr(kind, "__dataclass_fields__")[field].default  # noqa: B009

@@ -11,19 +11,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
+from softreach.arm.body import Body
 from softreach.arm.number import fields_of
 from softreach.arm.rest_shape import RestStrains
 from softreach.support.errors import Fault, InvalidDesign
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
 
 __all__ = [
     "Compliance",
@@ -32,7 +30,6 @@ __all__ = [
     "check_extension",
     "compliance",
     "ends_over",
-    "extension_range",
     "jumps",
     "quadrature",
     "strain_stations",
@@ -62,7 +59,7 @@ class Tables:
     shape (station, bundle). Of fibers and muscles alone it is `extension` itself."""
 
 
-def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
+def tables(arm: Body, stations: ArrayLike) -> Tables:
     """z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
 
     U of a rest shape is its curvature; what an arm is at rest, its `inner` arm has.
@@ -89,7 +86,7 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     return Tables(z, extension, curvature, growth)
 
 
-def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:
+def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
     """Load of an actuator on the sections: nothing where it does not act."""
     load, acts = actuator.resultants(arm.profile, arm.section, z), actuator.acts(arm.profile, z)
     shapes = np.shape(load.force), np.shape(load.moment)
@@ -114,7 +111,7 @@ class Compliance(NamedTuple):
     """1/K3 [1/(N m²)]."""
 
 
-def compliance(arm: Manipulator, stations: ArrayLike) -> Compliance:
+def compliance(arm: Body, stations: ArrayLike) -> Compliance:
     """1/K0, 1/K1 and 1/K3 at stations Z [m]; 0 in rigid pieces.
 
     Raises:
@@ -127,7 +124,7 @@ def compliance(arm: Manipulator, stations: ArrayLike) -> Compliance:
 
 
 @lru_cache(maxsize=64)
-def check_extension(arm: Manipulator) -> None:
+def check_extension(arm: Body) -> None:
     """The theory ends where an activation would shorten the arm to nothing.
 
     Args:
@@ -146,7 +143,7 @@ def check_extension(arm: Manipulator) -> None:
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
     for rates, of in ((table.extension, ""), (table.growth, " of matter itself, without forces")):
-        smallest, _ = _extension_range(arm, rates)
+        smallest, _ = range_of_extension(arm, rates)
         if smallest <= 0:
             allowed = (
                 f"reaches extension ζ = {smallest:.4g}{of}; must keep ζ > 0: narrow the bounds"
@@ -154,7 +151,7 @@ def check_extension(arm: Manipulator) -> None:
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
 
 
-def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
+def _winding_faults(arm: Body) -> Iterator[Fault]:
     """Fibers and tendons that wind so often about the arm that no steps follow them."""
     for actuator in arm.actuators:
         if "revolution" in fields_of(type(actuator)):
@@ -165,13 +162,8 @@ def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
                 yield Fault(f"turns of {actuator.name}", float(turns), allowed)
 
 
-def extension_range(arm: Manipulator) -> tuple[float, float]:
-    """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
-    arm = arm.inner
-    return _extension_range(arm, tables(arm, strain_stations(arm)).extension)
-
-
-def _extension_range(arm: Manipulator, extension: Array) -> tuple[float, float]:
+def range_of_extension(arm: Body, extension: Array) -> tuple[float, float]:
+    """Smallest and largest 1 + Σ zγ anywhere in the activation box and along the arm [-]."""
     least, most = ends_over(extension, arm.bounds).T
     return 1.0 + float(least.min()), 1.0 + float(most.max())
 
@@ -187,7 +179,7 @@ def ends_over(rates: Array, bounds: Array) -> Array:
     return np.stack([ends.min(-1).sum(-1), ends.max(-1).sum(-1)], axis=1)
 
 
-def both_sides(arm: Manipulator, stations: Array) -> Array:
+def both_sides(arm: Body, stations: Array) -> Array:
     """The stations [m], and both sides of every breakpoint of the arm, ascending."""
     if not arm.breakpoints:
         return stations
@@ -196,7 +188,7 @@ def both_sides(arm: Manipulator, stations: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def jumps(arm: Manipulator) -> tuple[float, ...]:
+def jumps(arm: Body) -> tuple[float, ...]:
     """Breakpoints [m] at which strains or stiffnesses jump by over a thousandth of their largest.
 
     At the others it is their slopes that jump, as at the samples of a measured profile.
@@ -212,12 +204,12 @@ def jumps(arm: Manipulator) -> tuple[float, ...]:
     return tuple(breaks[jumping].tolist())
 
 
-def strain_stations(arm: Manipulator) -> Array:
+def strain_stations(arm: Body) -> Array:
     """Stations Z [m] at which it is seen how far strains go."""
     return both_sides(arm, np.linspace(0.0, arm.length, _STATIONS))
 
 
-def quadrature(arm: Manipulator, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
+def quadrature(arm: Body, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
     """Gauss nodes between all stations where something begins, ends or acts.
 
     Returns:

@@ -11,18 +11,16 @@ solution for all displacements.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon
+from softreach.arm.body import Body
 from softreach.arm.rest_shape import RestStrains
 from softreach.arm.tables import quadrature, tables
 from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["LengthLaw", "Tensions"]
 
@@ -46,7 +44,7 @@ class LengthLaw:
     displacements [m].
     """
 
-    arm: Manipulator
+    arm: Body
     """With its rest shape as a bundle: see `body_of`."""
 
     @lazy

@@ -10,8 +10,7 @@ import numpy as np
 
 from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters.changes import unknown_parameter
-from softreach.arm.parameters.shown import Written, from_written
+from softreach.arm.parameters import Written, from_written, unknown_parameter
 from softreach.atlas.arguments import column
 from softreach.atlas.space import DesignSpace
 from softreach.support.errors import InvalidDesign, InvalidInput

@@ -15,9 +15,13 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import Base, rotation_matrices
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Parameter, find_parameters, parameters
-from softreach.arm.parameters.draft import Draft, part_of
-from softreach.arm.parameters.parameter import OwnParameter
+from softreach.arm.parameters import (
+    Parameter,
+    find_parameters,
+    parameters,
+    parts,
+    with_values,
+)
 from softreach.arm.rest_shape import RestShape
 from softreach.support.arguments import as_mapping, as_names, plain
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
@@ -103,10 +107,7 @@ class FreeNumbers:
                 pose[number.name] = value
             else:
                 paths |= dict.fromkeys(_tied(number.name), value)
-        draft = Draft(self.arm)
-        for name, parameter in self._parameters.items():
-            parameter.change(draft, paths[name])
-        arm = draft.made() if paths else self.arm
+        arm = with_values(self.arm, {each: paths[x] for x, each in self._parameters.items()})
         return arm.replace(base=_moved(arm.base, pose)) if pose else arm
 
     @cached_property
@@ -202,11 +203,12 @@ def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
 def _once(arm: Manipulator, known: Mapping[str, Parameter], names: Sequence[str]) -> list[str]:
     """Names of numbers that a fit may change, one of each number."""
     kept = [name for name in names if not known[name].whole and not _UNFIT.fullmatch(name)]
-    own = {name: each for name in kept if isinstance(each := known[name], OwnParameter)}
+    own = {name: each for name in kept if (each := known[name]).part}
     twins = {name.partition(".values[")[0] for name in own if ".values[" in name}
     twins |= {name for name in own if f"{name}_over_length" in own}
     for name, parameter in own.items():
-        given = getattr(part_of(arm, parameter.path.part), parameter.path.field, 0.0) is not None
+        part = parts(arm).get(parameter.part or ())
+        given = getattr(part, parameter.number.field, 0.0) is not None
         others = f"{name}_ratio", name.replace("revolution", "helical_angle")
         twins |= {(other if given else name) for other in others if other != name and other in own}
     return [name for name in own or kept if name not in twins]

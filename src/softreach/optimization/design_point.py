@@ -9,8 +9,7 @@ import numpy as np
 
 from softreach.arm.load_number import load_number, mass
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import find_parameters
-from softreach.arm.parameters.changes import parameters_by_every_name
+from softreach.arm.parameters import find_parameters, parameters_by_every_name
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.objectives import SETS, DesignCase
 from softreach.optimization.problem import Problem

@@ -10,8 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.parameters import Parameter, find_parameters
-from softreach.arm.parameters.draft import Draft
+from softreach.arm.parameters import Parameter, find_parameters, shifted
 from softreach.arm.tables import check_extension
 from softreach.support.arguments import as_mapping, as_number
 from softreach.support.arrays import Array
@@ -57,9 +56,7 @@ class Deviations:
         for parameter, amount in zip(self.parameters, change.tolist(), strict=True):
             if amount:
                 # One after the other: what follows from a parameter deviates with it.
-                draft = Draft(made)
-                parameter.shift(draft, amount)
-                made = draft.made()
+                made = shifted(made, parameter, amount)
         check_extension(made)
         return made
 

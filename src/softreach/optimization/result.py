@@ -271,7 +271,7 @@ class Search:
         from softreach.arm.skin import arm_card
 
         try:
-            card = arm_card(self.arm)
+            card = arm_card(self.arm, self.arm.base)
         except SoftreachError:  # no arm can exist
             card = ""
         return f"{card}<pre>{escape(repr(self))}</pre>"

@@ -8,11 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from softreach.arm.design_file.keys import key_text
-from softreach.arm.design_file.tables import unknown_key
+from softreach.arm.design_file.keys import key_text, unknown_key
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters.changes import unknown_parameter
-from softreach.arm.parameters.shown import Written
+from softreach.arm.parameters import Written, unknown_parameter
 from softreach.atlas.space_file import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.objectives import goals, known_objective

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from softreach.arm.driving import inner_arm
 from softreach.arm.load_number import load_number, mass
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import ends_over, quadrature, tables
@@ -102,7 +103,7 @@ def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding,
 
 def longest_reach(arm: Manipulator) -> float:
     """No tip of the arm without loads is farther from its base than this [m]."""
-    inner = arm.inner
+    inner = inner_arm(arm)
     z, weights, _ = quadrature(inner, _PIECES)
     most = ends_over(tables(inner, z).extension, inner.bounds)[:, 1]
     return float(weights @ (1.0 + most)) * (1.0 + 1e-6)  # more than the error of the quadrature

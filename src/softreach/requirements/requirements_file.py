@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.arm.design_file.keys import inline_table, key_text, value_text
-from softreach.arm.design_file.tables import unknown_key
+from softreach.arm.design_file.keys import inline_table, key_text, unknown_key, value_text
 from softreach.atlas.metrics import known_metric
 from softreach.inverse.request import positions_in
 from softreach.requirements.parts import LIMIT_UNITS, LONGEST, Keep, Limits, Target

@@ -112,7 +112,7 @@ def worst_inputs(
         row = np.arange(len(gamma))
         for _ in range(_ROUNDS):
             tried = box.clip(gamma + rng.normal(size=(around, *gamma.shape)) * width * box.widths)
-            found = of(tried.reshape(-1, box.bundles))[:, column].reshape(around, -1)
+            found = of(tried.reshape(around * len(gamma), -1))[:, column].reshape(around, -1)
             top = found.argmax(axis=0)
             better = found[top, row] > value
             gamma = np.where(better[:, None], tried[top, row], gamma)

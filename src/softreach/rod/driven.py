@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.driving import Driving, InnerActivations, pilot, without_dead_zones
+from softreach.arm.driving import Driving, InnerActivations, inner_arm, pilot, without_dead_zones
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.arm_rod import ArmRod
@@ -97,7 +97,7 @@ class DrivenRod(DerivedMap):
 
         # A tip moves by far more than the length by which a tendon near the axis is off.
         tol = max(_OF_LENGTHS * self.tol, 1e-12)
-        return LoadedLengths(self.driving.law, LoadedRod(self.outer.inner, tol))
+        return LoadedLengths(self.driving.law, LoadedRod(inner_arm(self.outer), tol))
 
     def prepare(self) -> None:
         super().prepare()

@@ -211,7 +211,7 @@ def _lines(rod: TipMap, gamma: Array) -> dict[str, Array]:
         strains = strains_at(gamma[block])
         turn = strains.curvature * strains.extension[..., None]
         length[block] = lengths_of_strains(arm, turn, strains.extension)
-    if arm.inner is arm:
+    if arm.is_direct:
         return {"line_length": length}
     while isinstance(rod, View | DrivenRod):
         rod, gamma = rod.base, rod.activations(gamma)

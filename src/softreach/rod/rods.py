@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache, partial
 
+from softreach.arm.driving import inner_arm
 from softreach.arm.load_number import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.arm_rod import ArmRod
@@ -113,8 +114,8 @@ def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> TipMap:
 
 def _new(arm: Manipulator, tol: float, frame: Frame, steps: int | None = None) -> TipMap:
     inside = _of_arm if steps is None else partial(_new, steps=steps)
-    if arm.inner is not arm:
-        inner = inside(arm.inner, tol, frame)
+    if not arm.is_direct:
+        inner = inside(inner_arm(arm), tol, frame)
         assert isinstance(inner, ArmRod | PlacedRod)
         return DrivenRod(inner, arm)
     if frame == "world" and not arm.base.is_identity:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import Extreme
+from softreach.arm.driving import extension_range
 from softreach.arm.linear_law import law_warning
 from softreach.arm.lines import line_strains
 from softreach.arm.load_number import (
@@ -21,11 +22,11 @@ from softreach.arm.load_number import (
     load_number,
     load_number_faults,
     mass,
+    scale_warnings,
 )
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Stiffness
-from softreach.arm.tables import both_sides, check_extension, extension_range
+from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, bending_over_bounds
 from softreach.support.errors import Fault, InvalidInput
 
@@ -150,7 +151,7 @@ def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
     return (
-        *scale_warnings(arm.profile, arm.section),
+        *scale_warnings(arm),
         *_overlaps(arm),
         *_chambers_outside(arm),
         *_sharp_bending(arm),

@@ -13,8 +13,7 @@ from softreach.arm.edits import ring_label
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, changed, parameters
-from softreach.arm.parameters.draft import part_of
-from softreach.arm.parameters.parameter import OwnParameter
+from softreach.arm.parameters import parts as parts_of
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 
 
@@ -147,9 +146,9 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
 
 def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
     """True if a kind of part outside softreach declares it."""
-    if not isinstance(parameter, OwnParameter):
+    if parameter.part is None:
         return False
-    return parameter.path.field in own_fields(type(part_of(arm, parameter.path.part)))
+    return parameter.number.field in own_fields(type(parts_of(arm)[parameter.part]))
 
 
 def _own_slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:

@@ -10,8 +10,7 @@ from functools import partial
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Parameter
-from softreach.arm.parameters.draft import Draft
+from softreach.arm.parameters import Parameter, shifted
 from softreach.arm.tables import check_extension
 from softreach.rod.rods import in_steps
 from softreach.rod.tip_map import TipMap
@@ -171,9 +170,7 @@ def _scale(arm: Manipulator, parameter: Parameter) -> float:
 
 
 def _shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
-    draft = Draft(arm)
-    parameter.shift(draft, float(amount))
-    made = draft.made()
+    made = shifted(arm, parameter, float(amount))
     check_extension(made)
     free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.input_bounds, arm.input_bounds))
     if not np.array_equal(free, before):

@@ -1,12 +1,11 @@
-"""Actuators of an arm: one file for each kind."""
+"""Actuators of an arm: a file for each family."""
 
 from softreach.arm.actuators.actuator import Actuator, Outline, Resultants
 from softreach.arm.actuators.chamber import Chamber
 from softreach.arm.actuators.fiber import FiberArchitecture
-from softreach.arm.actuators.length_tendon import LengthTendon
 from softreach.arm.actuators.muscle import ObliqueMuscle, RadialMuscle
 from softreach.arm.actuators.sector import SectorActuator
-from softreach.arm.actuators.tendon import Tendon
+from softreach.arm.actuators.tendon import LengthTendon, Tendon
 
 __all__ = [
     "Actuator",

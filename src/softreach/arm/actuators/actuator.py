@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.number import MOST, as_numbers, number
+from softreach.arm.along import AlongArm
+from softreach.arm.number import MOST, Number, as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span
-from softreach.support.errors import Fault
+from softreach.support.errors import Fault, InvalidDesign, Range
 
 __all__ = [
     "MOST_BUNDLES",
@@ -26,7 +27,6 @@ __all__ = [
     "PolarActuator",
     "Resultants",
     "bounds_faults",
-    "length_or_ratio_faults",
 ]
 
 Array = NDArray[np.float64]
@@ -38,6 +38,9 @@ met."""
 
 MOST_BUNDLES = 100
 """Of an arm in all: the time to bound its bending grows with their square."""
+
+
+_BOUND = re.compile(r"(lower|upper)(?:\[(\d+)\])?")
 
 
 class Resultants(NamedTuple):
@@ -128,6 +131,48 @@ class Actuator(Span, ABC):
         super().__post_init__()
         object.__setattr__(self, "activation_bounds", _plain_bounds(self.activation_bounds))
 
+    @property
+    def numbers(self) -> dict[str, Number]:
+        """With the bounds, `lower` and `upper` of all bundles, `lower[1]` of one of several."""
+        unit = "" if self.unit == "1" else self.unit
+        bundles = ["", *(f"[{k}]" for k in range(self.bundles))] if self.bundles > 1 else [""]
+        ends = ("lower", "min", "lowest activation"), ("upper", "max", "highest activation")
+        return super().numbers | {
+            f"{end}{k}": Number(
+                symbol=f"{short} {self.symbol}{k}", meaning=meaning, allowed=Range(unit=unit)
+            )
+            for end, short, meaning in ends
+            for k in bundles
+        }
+
+    def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
+        """A bound of all bundles in each."""
+        if not (bound := _BOUND.fullmatch(name)):
+            return super().values_of(name, profile, section)
+        each = self.bounds[:, int(bound[1] == "upper")].tolist()
+        return tuple(each) if bound[2] is None else (each[int(bound[2])],)
+
+    def replace(self, **changes: Any) -> Self:
+        """With bounds: other bundles keep theirs, or have the first's if their number changes.
+
+        Raises:
+            InvalidDesign: A bound of a bundle that there is none of, or a field is not what it
+                must be.
+        """
+        new = {name: changes.pop(name) for name in sorted(changes) if _BOUND.fullmatch(name)}
+        bundles = changes.get("bundles", self.bundles)
+        if new and isinstance(bundles, int) and bundles > 0:
+            same = bundles == self.bundles
+            bounds = self.bounds.copy() if same else self.bounds[:1].repeat(bundles, axis=0)
+            for name, value in new.items():  # `lower` before `lower[1]`
+                end, k = _BOUND.fullmatch(name).groups()  # pyright: ignore
+                if k is not None and int(k) >= bundles:
+                    allowed = f"has no bundle, as their number becomes {bundles}"
+                    raise InvalidDesign([Fault(name, value, allowed)])
+                bounds[slice(None) if k is None else int(k), int(end == "upper")] = value
+            changes["activation_bounds"] = tuple(map(tuple, bounds.tolist()))
+        return super().replace(**changes)
+
     @abstractmethod
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """Axial force and moment on sections at stations Z [m] where it acts, per activation."""
@@ -197,6 +242,24 @@ class PolarActuator(Actuator):
         """θ0 + 2πj/n, polar angle of each bundle where it begins [rad], shape (bundle,)."""
         return self.offset + 2.0 * np.pi * np.arange(self.bundles) / self.bundles
 
+    def length_at(self, field: str, profile: Profile, z: Array) -> Array:
+        """A length that is given in m, or over R2(Z) under `FIELD_ratio` [m], of the shape of z."""
+        return self.length_and_slope(field, profile, z)[0]
+
+    def length_and_slope(self, field: str, profile: Profile, z: Array) -> tuple[Array, Array]:
+        """The same [m], and its slope along Z [-]; in m it may be two, or samples along the arm."""
+        length, ratio = getattr(self, field), getattr(self, f"{field}_ratio")
+        if ratio is not None:
+            return ratio * profile.radius(z), -ratio * profile.slope(z)
+        if isinstance(length, AlongArm):
+            x = z / profile.length
+            return length(x), length.derivative(x) / profile.length
+        if isinstance(length, tuple):
+            (first, last), (start, end) = length, self.span(profile.length)
+            slope = (last - first) / (end - start)
+            return first + slope * (np.clip(z, start, end) - start), np.full(z.shape, slope)
+        return np.full(z.shape, length), np.zeros(z.shape)
+
 
 def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
     """Everything wrong with a pair (lower, upper), or one such pair for each bundle.
@@ -218,17 +281,6 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
     return [Fault("activation_bounds", bounds, allowed)] if allowed else []
 
 
-def length_or_ratio_faults(values: Mapping[str, Any], field: str) -> list[Fault]:
-    """Faults of a length that is given in m, or as a ratio to R2(Z): neither, or both."""
-    ratio = f"{field}_ratio"
-    pair = values[field], values[ratio]
-    if (pair[0] is None) != (pair[1] is None):
-        return []
-    both = None if pair[0] is None else pair
-    return [Fault(f"{field}, {ratio}", both, f"give exactly one of {field} and {ratio}")]
-
-
 def _plain_bounds(bounds: ArrayLike) -> Bounds:
-    """One pair where all bundles share it, else one for each."""
     pairs = [(low, high) for low, high in np.atleast_2d(np.asarray(bounds, float)).tolist()]
     return pairs[0] if all(pair == pairs[0] for pair in pairs) else tuple(pairs)

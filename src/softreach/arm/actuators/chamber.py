@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators.actuator import (
-    Outline,
-    PolarActuator,
-    Resultants,
-    length_or_ratio_faults,
-)
+from softreach.arm.actuators.actuator import Outline, PolarActuator, Resultants
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
@@ -47,7 +42,12 @@ class Chamber(PolarActuator):
     )
 
     distance: float | None = number(
-        "ρc", "m", "distance of its center from the axis", low=0.0, default=None
+        "ρc",
+        "m",
+        "distance of its center from the axis",
+        low=0.0,
+        instead_of="distance_ratio",
+        default=None,
     )
     """ρc, of the center from the axis [m]."""
     distance_ratio: float | None = number(
@@ -55,7 +55,13 @@ class Chamber(PolarActuator):
     )
     """ρc over the outer radius R2(Z) [-]."""
     radius: float | None = number(
-        "a", "m", "radius of the channel", low=0.0, open_low=True, default=None
+        "a",
+        "m",
+        "radius of the channel",
+        low=0.0,
+        open_low=True,
+        instead_of="radius_ratio",
+        default=None,
     )
     """a, radius of the channel [m]."""
     radius_ratio: float | None = number(
@@ -70,18 +76,20 @@ class Chamber(PolarActuator):
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = A and M = p × A e3 with the effective area A and the center p: theory (53)."""
         del section
-        area = np.pi * self.area_factor * self._size("radius", profile, z) ** 2
-        arm = area * self._size("distance", profile, z)
+        area = np.pi * self.area_factor * self.length_at("radius", profile, z) ** 2
+        arm = area * self.length_at("distance", profile, z)
         angle = self.start_angles
         along = np.zeros((len(z), self.bundles))
         moment = [arm[:, None] * np.sin(angle), -arm[:, None] * np.cos(angle), along]
         return Resultants(area[:, None] + along, np.stack(moment, axis=1))
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        """Round lumens."""
         del section
         each, outer = np.ones(self.bundles), profile.radius(z)
-        distance, radius = (self._size(name, profile, z) for name in ("distance", "radius"))
+        distance, radius = (
+            self.length_at("distance", profile, z),
+            self.length_at("radius", profile, z),
+        )
         share = float(np.max(radius / np.maximum(distance, radius)))
         return Outline(
             center=np.broadcast_to(self.start_angles, (len(z), self.bundles)),
@@ -93,32 +101,5 @@ class Chamber(PolarActuator):
         )
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        """Moduli that its forces need."""
         del profile
         return section.modulus_faults(f"for chamber {self.name!r}, whose activation is in Pa")
-
-    def replace(self, **changes: Any) -> Chamber:
-        """A copy with some fields changed; a new length takes the place of its ratio."""
-        for length, ratio in (("distance", "distance_ratio"), ("radius", "radius_ratio")):
-            if changes.get(length) is not None:
-                changes.setdefault(ratio, None)
-            if changes.get(ratio) is not None:
-                changes.setdefault(length, None)
-        return super().replace(**changes)
-
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number; of a length and its ratio, the one not given follows at the base."""
-        name = field.removesuffix("_ratio")
-        if name not in ("distance", "radius"):
-            return super().value_on(field, profile, section)
-        length = float(self._size(name, profile, np.array([0.0]))[0])
-        return length if name == field else length / float(profile.radius(0.0))
-
-    def _size(self, name: str, profile: Profile, z: Array) -> Array:
-        """Distance or radius [m], constant or in proportion to R2(Z)."""
-        length, ratio = getattr(self, name), getattr(self, f"{name}_ratio")
-        return np.full(len(z), length) if ratio is None else ratio * profile.radius(z)
-
-    def _faults(self) -> list[Fault]:
-        sizes = (length_or_ratio_faults(vars(self), field) for field in ("distance", "radius"))
-        return [*super()._faults(), *(fault for size in sizes for fault in size)]

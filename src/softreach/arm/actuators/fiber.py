@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,6 @@ from softreach.arm.along import AlongArm, Pieces
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.support.errors import Fault
 
 __all__ = ["FiberArchitecture", "helical_rotation"]
 
@@ -56,20 +55,13 @@ class FiberArchitecture(SectorActuator):
         open_low=True,
         open_high=True,
         along=AlongArm,
+        instead_of="revolution",
+        hint=" (0 for a longitudinal fiber)",
         default=None,
     )
     """α, from the axis, at the outer radius of the ring [rad]; |α| < π/2; may change along Z."""
 
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed; a new angle takes the place of a revolution."""
-        if changes.get("helical_angle") is not None:
-            changes.setdefault("revolution", None)
-        if changes.get("revolution") is not None:
-            changes.setdefault("helical_angle", None)
-        return super().replace(**changes)
-
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        """Stations where it begins, ends, or its angle is not smooth [m]."""
         angle = self.helical_angle
         breaks = angle.breaks if isinstance(angle, AlongArm) else ()
         return (*super().breakpoints(profile), *(profile.length * x for x in breaks))
@@ -89,13 +81,13 @@ class FiberArchitecture(SectorActuator):
         end = np.asarray(self.span(profile.length)[1:])
         return float(self.rotation(profile, section, end)[0])
 
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number on an arm; of Ω and α, the one not given follows from the other."""
-        if field == "revolution" and self.revolution is None:
+    def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
+        """Of Ω and α, the one not given follows from the other."""
+        if field == "revolution":
             return self.revolution_on(profile, section)
         if field == "helical_angle":
             return self.helical_angle_on(profile, section)
-        return super().value_on(field, profile, section)
+        return super()._following(field, other, profile, section)
 
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0, I1, I3 for the local taper and helical angle: theory (3)."""
@@ -108,13 +100,6 @@ class FiberArchitecture(SectorActuator):
         angle = self.helical_angle_on(profile, section)
         start, _ = self.span(profile.length)
         return helical_rotation(profile, section.ring(self.ring).outer_ratio, angle, start, z)
-
-    def _faults(self) -> list[Fault]:
-        if (self.helical_angle is None) != (self.revolution is None):
-            return super()._faults()
-        allowed = "give exactly one of helical_angle and revolution (0 for a longitudinal fiber)"
-        both = None if self.revolution is None else (self.helical_angle, self.revolution)
-        return [*super()._faults(), Fault("helical_angle, revolution", both, allowed)]
 
 
 def helical_rotation(

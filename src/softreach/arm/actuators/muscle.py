@@ -53,7 +53,6 @@ class ObliqueMuscle(SectorActuator):
 
     @property
     def course(self) -> str:
-        """Direction in which its fibers cross it."""
         if self.helical_angle == 0:
             return "along"
         return "right-handed" if self.helical_angle > 0 else "left-handed"
@@ -64,7 +63,6 @@ class ObliqueMuscle(SectorActuator):
         return cone_integrals(section.ring(self.ring), profile.slope(z), angle)
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        """Zero: the sector stays in its place."""
         del profile, section
         return np.zeros(len(z))
 
@@ -86,7 +84,6 @@ class RadialMuscle(SectorActuator):
 
     @property
     def course(self) -> str:
-        """Along the radius."""
         return "radial"
 
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
@@ -99,6 +96,5 @@ class RadialMuscle(SectorActuator):
         )
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        """Zero: the sector stays in its place."""
         del profile, section
         return np.zeros(len(z))

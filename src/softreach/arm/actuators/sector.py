@@ -60,7 +60,6 @@ class SectorActuator(PolarActuator):
         return Resultants(np.broadcast_to(force, theta.shape), np.stack(moment, axis=1))
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        """The sectors of the bundles."""
         ring, each = section.ring(self.ring), np.ones(self.bundles)
         center = self.angles(profile, section, z)
         return Outline(

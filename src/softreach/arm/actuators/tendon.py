@@ -1,27 +1,25 @@
-"""Tendons: cables that pull between where they enter and where they are anchored."""
+"""Tendons: cables that pull between where they enter and where they are anchored.
+
+They are driven by their tension, or by a winch or servo that decides how much is pulled in.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators.actuator import (
-    MOST_TURN,
-    Outline,
-    PolarActuator,
-    Resultants,
-    length_or_ratio_faults,
-)
+from softreach.arm.actuators.actuator import MOST_TURN, Outline, PolarActuator, Resultants
 from softreach.arm.along import AlongArm, Samples
 from softreach.arm.number import as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.support.errors import Fault
 
-__all__ = ["Tendon"]
+__all__ = ["LengthTendon", "Tendon"]
 
 Array = NDArray[np.float64]
 
@@ -69,7 +67,14 @@ class Tendon(PolarActuator):
     )
     """Ω, rotation from where it begins to its anchor, even along Z [rad]."""
     distance: float | tuple[float, float] | Samples | None = number(
-        "ρt", "m", "distance from the axis", low=0.0, along=Samples, pair=True, default=None
+        "ρt",
+        "m",
+        "distance from the axis",
+        low=0.0,
+        along=Samples,
+        pair=True,
+        instead_of="distance_ratio",
+        default=None,
     )
     """ρt, from the axis [m]; a number, two (where it begins and at its anchor; straight between
     them), or samples along the arm."""
@@ -78,7 +83,13 @@ class Tendon(PolarActuator):
     )
     """ρt over the outer radius R2(Z) [-]."""
     routing: Samples | None = number(
-        "θ", "rad", "angle along the arm", shape="along", along=Samples, default=None
+        "θ",
+        "rad",
+        "angle along the arm",
+        shape="along",
+        along=Samples,
+        instead_of="revolution",
+        default=None,
     )
     """θ(Z) - θ0 along the arm [rad], in place of an even rotation."""
 
@@ -96,7 +107,6 @@ class Tendon(PolarActuator):
         return Resultants(-t3, moment)
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        """Lines along the arm."""
         del section
         route = self._route(profile, z)
         ratio = route.distance / profile.radius(z)[:, None] * np.ones(self.bundles)
@@ -110,60 +120,26 @@ class Tendon(PolarActuator):
         )
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        """Stations where it begins, ends, or its route is not smooth [m]."""
         bent = [along for along in (self.distance, self.routing) if isinstance(along, AlongArm)]
         breaks = [profile.length * x for along in bent for x in along.breaks]
         return (*super().breakpoints(profile), *breaks)
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        """Moduli that its forces need."""
         del profile
         return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
 
-    def replace(self, **changes: Any) -> Tendon:
-        """A copy with some fields changed.
-
-        A new distance takes the place of a ratio, and a new revolution that of a routing.
-        """
-        if changes.get("revolution") is not None:
-            changes.setdefault("routing", None)
-        if changes.get("distance") is not None:
-            changes.setdefault("distance_ratio", None)
-        if changes.get("distance_ratio") is not None:
-            changes.setdefault("distance", None)
-        return super().replace(**changes)
-
-    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a number; of distance and ratio, the one not given follows at the base.
-
-        The revolution of a routing is its rotation from where the tendon begins to its anchor.
-        """
-        if field == "revolution" and self.routing is not None:
-            return float(np.diff(self.routing(self.span_over_length(profile.length)))[0])
-        base = float(profile.radius(0.0))
-        if field == "distance" and self.distance is None:
-            return (self.distance_ratio or 0.0) * base
-        if field == "distance_ratio" and isinstance(self.distance, int | float):
-            return self.distance / base
-        return super().value_on(field, profile, section)
+    def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
+        """The revolution of a routing: from where the tendon begins to its anchor."""
+        if field == "revolution":
+            return float(np.diff(other(self.span_over_length(profile.length)))[0])
+        return super()._following(field, other, profile, section)
 
     def _route(self, profile: Profile, z: Array) -> _Route:
         column = z[:, None]
         angle, turning = self._angle(profile, column)
-        return _Route(*self._distance(profile, column), self.start_angles + angle, turning)
-
-    def _distance(self, profile: Profile, z: Array) -> tuple[Array, Array]:
-        """ρt and its slope."""
-        if self.distance_ratio is not None:
-            return self.distance_ratio * profile.radius(z), -self.distance_ratio * profile.slope(z)
-        if isinstance(self.distance, AlongArm):
-            x = z / profile.length
-            return self.distance(x), self.distance.derivative(x) / profile.length
-        if isinstance(self.distance, tuple):
-            (first, last), (start, end) = self.distance, self.span(profile.length)
-            slope = (last - first) / (end - start)
-            return first + slope * (np.clip(z, start, end) - start), np.full(z.shape, slope)
-        return np.full(z.shape, self.distance), np.zeros(z.shape)
+        return _Route(
+            *self.length_and_slope("distance", profile, column), self.start_angles + angle, turning
+        )
 
     def _angle(self, profile: Profile, z: Array) -> tuple[Array, Array]:
         """θ - θ0 and its slope."""
@@ -175,13 +151,61 @@ class Tendon(PolarActuator):
         return rate * (x - start), np.full(z.shape, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
-        faults = super()._faults() + length_or_ratio_faults(vars(self), "distance")
+        faults = super()._faults()
         tensions = as_numbers(self.activation_bounds)
         if tensions.size and tensions.min() < self.least:
             allowed = "must be at least 0 N: a tendon pulls and cannot push"
             faults.append(Fault("activation_bounds", self.activation_bounds, allowed))
-        turns_evenly = all(fault.path != "revolution" for fault in faults) and self.revolution != 0
-        if turns_evenly and isinstance(self.routing, Samples):
-            allowed = "must be left out where routing is given, which says how the tendon turns"
-            faults.append(Fault("revolution", self.revolution, allowed))
+        return faults
+
+
+@dataclass(frozen=True, kw_only=True)
+class LengthTendon(Tendon):
+    """A tendon without friction whose activation is how much of it is pulled in, q [m].
+
+    Its tension τ follows, and loads the arm as that of a `Tendon` does: τ = k (q - slack - s) +
+    pretension where that is positive, with s the shortening of its path, else it is slack. Without
+    a stiffness k it does not stretch: s = q - slack, unless it is slack.
+
+    Raises:
+        InvalidDesign: A field is out of its range, both or neither of `distance` and
+            `distance_ratio` are given, or a pretension without `tendon_stiffness`.
+    """
+
+    unit: ClassVar[str] = "m"
+    symbol: ClassVar[str] = "q"
+    activation: ClassVar[str] = "displacement"
+    least: ClassVar[float] = -math.inf
+
+    slack: float = number("q0", "m", "pulled in by so much before it is taut", default=0.0)
+    """q0, pulled in by so much before it is taut [m]; negative where it is pretensioned."""
+    tendon_stiffness: float | None = number(
+        "k", "N/m", "stiffness of tendon and drive in series", low=0.0, open_low=True, default=None
+    )
+    """k, stiffness of tendon and drive in series [N/m]; None for one that does not stretch."""
+    pretension: float = number("τ0", "N", "tension at q0 of the straight arm", low=0.0, default=0.0)
+    """τ0, tension at q = q0 while the arm keeps its shape [N]."""
+
+    @property
+    def compliance(self) -> float:
+        """1/k [m/N]."""
+        return 0.0 if self.tendon_stiffness is None else 1.0 / self.tendon_stiffness
+
+    @property
+    def taut_from(self) -> float:
+        """Displacement at which it becomes taut while the arm keeps its shape [m]."""
+        return self.slack - self.pretension * self.compliance
+
+    def by_tension(self, bounds: Array) -> Tendon:
+        """The same tendon driven by its tension within bounds [N], shape (bundles, 2)."""
+        same = {field.name: getattr(self, field.name) for field in fields(Tendon)}
+        return Tendon(**same | {"activation_bounds": bounds.tolist()})
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        blamed = {fault.path for fault in faults}
+        is_doubtful = blamed & {"pretension", "tendon_stiffness"}
+        if not is_doubtful and self.pretension and self.tendon_stiffness is None:
+            allowed = "must be 0 without tendon_stiffness: such a tendon takes a slack below 0"
+            faults.append(Fault("pretension", self.pretension, allowed))
         return faults

@@ -1,24 +1,17 @@
 """Designs as TOML files: lengths in meters, angles in degrees, the unit in every key."""
 
 from softreach.arm.design_file.keys import in_file_terms
-from softreach.arm.design_file.read import (
-    LONGEST,
-    Parts,
-    document_of,
-    parse,
-    text_of,
-)
+from softreach.arm.design_file.read import LONGEST, document_of, read, text_of
 from softreach.arm.design_file.write import display_text, render
 from softreach.support.files.formats import FileFormat, Formats
 
 __all__ = [
     "DESIGN_FILE",
     "LONGEST",
-    "Parts",
     "display_text",
     "document_of",
     "in_file_terms",
-    "parse",
+    "read",
     "render",
     "text_of",
 ]

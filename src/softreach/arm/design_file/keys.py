@@ -27,17 +27,15 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
-from softreach.arm.marker import Marker
 from softreach.arm.material import Material
-from softreach.arm.measured import Measured
 from softreach.arm.number import Number, fields_of, unit_suffix
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.rest_shape import RestShape
-from softreach.arm.rigid import RigidPiece
-from softreach.arm.section import Ring, Section
+from softreach.arm.section import Measured, Ring, Section
+from softreach.arm.stations import Marker, RigidPiece
 from softreach.support import plugins
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean, warn
 
 __all__ = [
     "ACTUATORS",
@@ -45,6 +43,7 @@ __all__ = [
     "PROFILES",
     "Key",
     "Kind",
+    "Place",
     "WrittenFloat",
     "degrees_text",
     "every_kind",
@@ -55,9 +54,11 @@ __all__ = [
     "key_text",
     "keys_of",
     "known_kinds",
+    "one_a_path",
     "own_kind",
     "own_kinds",
     "radians",
+    "unknown_key",
     "value_text",
 ]
 
@@ -134,6 +135,17 @@ def field_keys(kind: type) -> dict[str, str]:
     return {key.field: name for name, key in keys_of(kind).items()}
 
 
+def unknown_key(name: str, keys: Mapping[str, str]) -> str:
+    """Message for a key that a table does not have.
+
+    Args:
+        name: The key.
+        keys: Field -> key of the table.
+    """
+    hint = did_you_mean(keys.get(name, name), keys.values())
+    return f"unknown key; {hint or 'known keys: ' + ', '.join(keys.values())}"
+
+
 def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
     """Imported kinds of actuators or profiles that are not softreach's, by their classes' names."""
     return {
@@ -184,16 +196,72 @@ def _every_key() -> Mapping[str, str]:
     return MappingProxyType({**keys, "inner_radius": "inner_radius_m", "activation_bounds": ""})
 
 
-def in_file_terms(error: InvalidDesign, source: str) -> InvalidDesign:
-    """The same faults under the file's keys and in its units; `source` is what the error names."""
-    return InvalidDesign([_in_file_terms(fault) for fault in error.faults], source)
+class Place(NamedTuple):
+    """Where in a file a part stands."""
+
+    path: str
+    """`actuators[0]`."""
+    keys: Mapping[str, str] = MappingProxyType({})
+    """Field -> key of its table; without those that are the same."""
+    table: Mapping[str, Any] = MappingProxyType({})
+    """What the file says there."""
 
 
-def _in_file_terms(fault: Fault) -> Fault:
-    names = ", ".join(map(_key_of_path, fault.path.split(", ")))
-    allowed = in_file_units(fault.allowed)
-    in_degrees = allowed != fault.allowed or names.endswith("_deg")
-    return Fault(names, _shown_degrees(fault.value) if in_degrees else fault.value, allowed)
+def in_file_terms(
+    error: InvalidDesign, source: str = "", places: Mapping[str, Place] = MappingProxyType({})
+) -> InvalidDesign:
+    """The same faults under a file's keys and in its units.
+
+    Args:
+        error: Faults under the fields of parts.
+        source: Name of the file in the error.
+        places: Places of the parts in the file by their paths in the arm; without them, paths stay
+            but for the field at their end.
+    """
+    return InvalidDesign(
+        one_a_path([_in_file_terms(fault, places) for fault in error.faults]), source
+    )
+
+
+def one_a_path(faults: Iterable[Fault]) -> list[Fault]:
+    """The first fault of each path."""
+    first: dict[str, Fault] = {}
+    for fault in faults:
+        first.setdefault(fault.path, fault)
+    return [*first.values()]
+
+
+def _in_file_terms(fault: Fault, places: Mapping[str, Place]) -> Fault:
+    written = [_written(path, places) for path in fault.path.split(", ")]
+    names, values = [name for name, _ in written], [value for _, value in written]
+    allowed, value = in_file_units(fault.allowed), fault.value
+    if any(one is not MISSING for one in values):
+        values = [None if one is MISSING else one for one in values]
+        value = values[0] if len(values) == 1 else tuple(values)
+    elif allowed != fault.allowed or names[0].endswith("_deg"):
+        value = _shown_degrees(value)
+    if isinstance(allowed, str) and places:  # which calls other fields by their names
+        said = [path.rpartition(".")[2] for path in fault.path.split(", ")]
+        others = {
+            field: key for field, key in _every_key().items() if "_" in field or field in said
+        }
+        allowed = re.sub(r"\w+", lambda word: others.get(word[0]) or word[0], allowed)
+        allowed = re.sub("(Samples|AlongArm) along the arm(, or None)?", "a table", allowed)
+    return Fault(", ".join(names), value, allowed)
+
+
+def _written(path: str, places: Mapping[str, Place]) -> tuple[str, Any]:
+    """The path in a file of the path of a field, or of an element of one, and what is there."""
+    owners = [owner for owner in places if not owner or f"{path}.".startswith(f"{owner}.")]
+    if not owners:
+        head, dot, field = path.rpartition(".")
+        return head + dot + (_every_key().get(field) or field), MISSING
+    place = places[max(owners, key=len)]
+    field, rest = re.fullmatch(r"(\w*)(.*)", path[len(max(owners, key=len)) :].lstrip(".")).groups()  # pyright: ignore
+    key = field if field in place.table else place.keys.get(field, field)
+    return f"{place.path}.{key}{rest}".rstrip("."), MISSING if rest else place.table.get(
+        key, MISSING
+    )
 
 
 def in_file_units(allowed: Range | str) -> Range | str:
@@ -201,12 +269,6 @@ def in_file_units(allowed: Range | str) -> Range | str:
     if isinstance(allowed, Range) and allowed.unit == "rad":
         return allowed.in_degrees()
     return allowed
-
-
-def _key_of_path(path: str) -> str:
-    """The key of a field, behind the name of the part that it belongs to, if any."""
-    owner, dot, field = path.rpartition(".")
-    return owner + dot + (_every_key().get(field) or field)
 
 
 def _shown_degrees(value: object) -> object:

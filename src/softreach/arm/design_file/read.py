@@ -1,81 +1,77 @@
-"""From the text of a design file to the parts of an arm, or every fault of it at once."""
+"""From the text of a design file to the fields of an arm.
+
+The reader knows how a file says things: keys, units, tables inside tables. What may be said, the
+parts judge themselves when they are made, and the arm when they are put together; their faults
+come back under the keys of the file (`keys.in_file_terms`), as the reader remembers where in the
+file each part stands.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Set
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.actuators.actuator import MOST_BUNDLES
-from softreach.arm.along import AlongArm
+from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
+from softreach.arm.body import named_actuators
 from softreach.arm.design_file.keys import (
-    ACTUATORS,
     KINDS,
-    PROFILES,
+    Key,
     Kind,
+    Place,
     WrittenFloat,
     field_keys,
+    in_file_terms,
     key_text,
     keys_of,
     known_kinds,
+    one_a_path,
     own_kind,
+    radians,
+    unknown_key,
 )
-from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
-from softreach.arm.marker import Marker
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
+from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.rest_shape import STRAIGHT, RestShape
-from softreach.arm.rigid import RigidPiece
-from softreach.arm.section import Ring, Section, name_faults
-from softreach.arm.stations import PLACE, Located, Stations, placed
+from softreach.arm.rest_shape import RestShape
+from softreach.arm.section import Measured, Ring, Section
+from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 from softreach.support.files.text import read_text, tables_of
-from softreach.support.units import UNITS
 
-__all__ = ["LONGEST", "Parts", "document_of", "parse", "text_of"]
+__all__ = ["LONGEST", "document_of", "read", "text_of"]
 
 LONGEST = 250_000
 """Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
 
-LAYOUT: Mapping[str, tuple[type, bool]] = {
-    "version": (int, True),
-    "profile": (dict, True),
-    "materials": (dict, False),
-    "section": (dict, False),
-    "rings": (list, True),
-    "stations": (dict, False),
-    "actuators": (list, True),
-    "rigid_pieces": (list, False),
-    "drives": (list, False),
-    "markers": (list, False),
-    "loads": (dict, False),
-    "base": (dict, False),
-    "rest": (dict, False),
-    "display": (dict, False),
+LAYOUT: Mapping[str, tuple[type, Any, bool]] = {
+    "version": (int, None, True),
+    "profile": (dict, Profile, True),
+    "materials": (dict, Material, False),
+    "section": (dict, Section, False),
+    "rings": (list, Ring, True),
+    "stations": (dict, Stations, False),
+    "actuators": (list, Actuator, True),
+    "rigid_pieces": (list, RigidPiece, False),
+    "drives": (list, Drive, False),
+    "markers": (list, Marker, False),
+    "loads": (dict, Loads, False),
+    "base": (dict, Base, False),
+    "rest": (dict, RestShape, False),
+    "display": (dict, None, False),
 }
-"""Keys at the top of a file, their types, and whether they are required."""
+"""Keys at the top of a file: one table or a list of them, of what, and whether it is required."""
 
+Arm = TypeVar("Arm")
 
-class Parts(NamedTuple):
-    """Parts of an arm that a file describes."""
-
-    profile: Profile
-    section: Section
-    actuators: tuple[Actuator, ...]
-    loads: Loads | None
-    base: Base
-    rest: RestShape
-    stations: Mapping[str, float]
-    rigid_pieces: tuple[RigidPiece, ...]
-    drives: tuple[Drive, ...]
-    markers: tuple[Marker, ...]
-    display_unit: str | None
+_WRONG: Any = object()
+"""In place of a value that has faults."""
 
 
 def text_of(path: str | PathLike[str]) -> str:
@@ -109,295 +105,294 @@ def document_of(
         raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
 
 
-def parse(text: str, source: str) -> Parts:
-    """The parts of an arm from TOML text.
+def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
+    """The arm of a TOML text.
 
     Args:
         text: The text of a design file.
         source: Its name in errors.
+        make: Makes the arm of its fields.
 
     Raises:
-        InvalidDesign: Every fault of the text, with its key, value and what is allowed.
+        InvalidDesign: Every fault of the tables, and of the arm that the sound ones make, with
+            key, value and what is allowed.
     """
     document = document_of(text, source)
     version = document.get("version", 2)
     if isinstance(version, bool) or version != 2:
         raise InvalidDesign([Fault("version", version, "must be 2")], source)
-    reader = _DesignReader(document)
-    parts = reader.parts()
-    if parts is None or reader.faults:
-        raise InvalidDesign(reader.faults, source)
-    return parts
+    reader = _Reader(document)
+    fields, faults, arm = reader.fields(), reader.faults, None
+    if fields.keys() >= {"profile", "section", "stations"}:
+        try:
+            arm = make(**fields)
+        except InvalidDesign as error:
+            faults += in_file_terms(error, "", reader.places).faults
+    if arm is None or faults:
+        raise InvalidDesign(one_a_path(faults), source)
+    return arm
 
 
-class _DesignReader(TableReader):
+class _Reader:
+    """Makes the parts of an arm of tables, and gathers the faults."""
+
     def __init__(self, document: dict[str, Any]) -> None:
-        super().__init__()
+        self.faults: list[Fault] = []
+        self.places: dict[str, Place] = {}
         self._document = document
         self._materials: dict[str, Material | None] = {}
-        self._unknown_material = False
-        self._unknown_kinds: list[Any] = []
 
-    def parts(self) -> Parts | None:
+    def fields(self) -> dict[str, Any]:
+        """Fields of the arm, without what is faulty, nor drives of actuators that may be."""
         self._check_layout()
-        profile = self._profile()
-        self._materials = {
-            name: self.part(Material, raw, f"materials.{key_text(name)}", ("name",), name=name)
-            for name, raw in (self._table("materials") or {}).items()
-        }
-        rings = [self.part(Ring, raw, f"rings[{k}]") for k, raw in self._tables("rings")]
-        section = self._section(rings)
-        tables = self._document.get("actuators")
-        if isinstance(tables, list) and len(tables) > MOST_BUNDLES:
-            self.refused("actuators", f"{len(tables):,} tables", f"must be at most {MOST_BUNDLES}")
-            return None
-        actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
-        drives = [self.part(Drive, raw, f"drives[{k}]") for k, raw in self._tables("drives")]
-        raw = self._table("loads")
-        loads = None if raw is None else self.part(Loads, raw, "loads")
-        raw = self._table("base")
-        base = Base() if raw is None else self.part(Base, raw, "base")
-        raw = self._table("rest")
-        rest = STRAIGHT if raw is None else self.part(RestShape, raw, "rest")
-        stations = self._stations()
-        others = {
-            key: [(k, self.part(kind, raw, f"{key}[{k}]")) for k, raw in self._tables(key)]
-            for key, kind in (("rigid_pieces", RigidPiece), ("markers", Marker))
-        }
-        unit = self._display_unit()
-        names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
-        self.faults += name_faults(names, "actuators")
-        if profile is None or section is None or stations is None:
-            return None
-        sound = [(k, actuator) for k, actuator in actuators if actuator is not None]
-        self._check_fit(profile, section, stations, sound)
-        made = {key: [(k, part) for k, part in each if part] for key, each in others.items()}
-        for path, part in ((f"{key}[{k}]", part) for key, each in made.items() for k, part in each):
-            faults = _place_faults(part, profile, stations)
-            self.faults += [fault._replace(path=f"{path}.{fault.path}") for fault in faults]
-        if loads is not None:
-            self.faults += self._of_section(loads.section_faults(section, profile.length))
-        actuators = tuple(actuator for _, actuator in sound)
-        rigid, markers = (tuple(part for _, part in each) for each in made.values())
-        return Parts(
-            profile=profile,
-            section=section,
-            actuators=actuators,
-            loads=loads,
-            base=base,
-            rest=rest,
-            stations=stations,
-            rigid_pieces=rigid,
-            drives=tuple(drive for drive in drives if drive is not None),
-            markers=markers,
-            display_unit=unit,
-        )
+        listed = self._document.get("actuators")
+        if isinstance(listed, list) and len(listed) > MOST_BUNDLES:
+            self._refuse("actuators", f"{len(listed):,} tables", f"must be at most {MOST_BUNDLES}")
+            return {}
+        fields: dict[str, Any] = {"profile": self._alone("profile", Profile)}
+        for name, raw in self._table("materials").items():
+            path = f"materials.{key_text(name)}"
+            self._materials[name] = self._part(Material, raw, path, ("name",), name=name)
+        fields["section"] = self._section()
+        places = {"places": self._table("stations")}
+        fields["stations"] = self._made(Stations, Place("stations"), places)
+        for name in ("actuators", "rigid_pieces", "drives", "markers"):
+            fields[name] = self._several(name, LAYOUT[name][1])
+        if not isinstance(listed, list) or len(fields["actuators"]) < len(listed):
+            del fields["drives"]
+        for name in ("loads", "base", "rest"):
+            fields[name] = self._alone(name, LAYOUT[name][1])
+        fields["display_unit"] = self._display_unit()
+        return {name: value for name, value in fields.items() if value is not None}
 
-    def _stations(self) -> Stations | None:
-        before = len(self.faults)
-        places = {
-            name: self.number(PLACE, raw, f"stations.{key_text(name)}")
-            for name, raw in (self._table("stations") or {}).items()
+    def _alone(self, name: str, kind: type[Part]) -> Any:
+        """The part of a table at the top, if there is one."""
+        is_there = isinstance(self._document.get(name), dict)
+        return self._any(kind, self._table(name), name) if is_there else None
+
+    def _several(self, name: str, kind: type[Part]) -> tuple[Any, ...]:
+        """The sound parts of a list of tables, and where they stand by their paths in the arm."""
+        paths = [(f"{name}[{k}]", raw) for k, raw in self._tables(name)]
+        each = [(path, self._any(kind, raw, path)) for path, raw in paths]
+        sound = [(self.places[path], part) for path, part in each if part is not None]
+        parts = [part for _, part in sound]
+        names = [each.name for each in named_actuators(parts)] if kind is Actuator else []
+        names += [f"markers.{each.name}" for each in parts] if kind is Marker else []
+        self.places |= {f"{name}[{k}]": place for k, (place, _) in enumerate(sound)}
+        self.places |= dict(zip(names, (place for place, _ in sound), strict=False))
+        return tuple(parts)
+
+    def _any(self, kind: type[Part], raw: dict[str, Any], path: str) -> Any:
+        """The part of a table, whose kind the table says where there are several."""
+        if kind not in KINDS:
+            return self._part(kind, raw, path)
+        named = raw.get("kind", "linear" if kind is Profile else None)
+        if isinstance(named, str) and named in KINDS[kind]:
+            return self._part(KINDS[kind][named], raw, path)
+        own = own_kind(kind, named) if isinstance(named, str) else None
+        if own is None:
+            return self._refuse(f"{path}.kind", named, _kinds_text(kind, named), None)
+        # A class outside softreach: fields as they are in Python, in SI units.
+        values = {
+            key: self._plain(value, f"{path}.{key}") for key, value in raw.items() if key != "kind"
         }
         try:
-            stations = Stations({name: z for name, z in places.items() if z is not WRONG})
-        except InvalidDesign as error:
-            for fault in error.faults:
-                self.refused(f"stations.{key_text(fault.path)}", fault.value, fault.allowed)
-            return None
-        return stations if len(self.faults) == before else None
+            return self._made(own, Place(path), values)
+        except TypeError as error:
+            return self._refuse(path, own.__name__, f"has other fields: {error}", None)
 
-    def _display_unit(self) -> str | None:
-        raw = self._table("display") or {}
-        for key in raw:
-            if key != "unit":
-                said = unknown_key(key, {"unit": "unit"})
-                self.refused(f"display.{key_text(key)}", raw[key], said)
-        unit = raw.get("unit")
-        if unit is not None and unit not in UNITS:
-            self.refused("display.unit", unit, f"must be one of {', '.join(UNITS)}")
-        return unit
+    def _part(
+        self, kind: type[Part], raw: Any, path: str, without: tuple[str, ...] = (), **others: Any
+    ) -> Any:
+        """The part that a table describes; None where it has faults.
+
+        Args:
+            kind: Its class.
+            raw: Table as the file holds it.
+            path: Its path in the file.
+            without: Keys that the table does not have here.
+            others: Further fields of the part.
+        """
+        values, wrong = self._values(kind, raw, path, without)
+        return self._made(kind, Place(path, field_keys(kind), raw), values | others, wrong)
+
+    def _values(
+        self, kind: type[Part], raw: Any, path: str, without: tuple[str, ...] = ()
+    ) -> tuple[dict[str, Any], set[str]]:
+        """Field -> value in SI units, and the fields that no value can be given."""
+        if not isinstance(raw, dict):
+            self._refuse(path, raw, "must be a table")
+            return {}, {""}
+        keys = {name: key for name, key in keys_of(kind).items() if name not in without}
+        values: dict[str, Any] = {}
+        for name, key in keys.items():
+            if name in raw and key.field in values:
+                allowed = f"give exactly one of {key.field} (a name) and {name}"
+                values[key.field] = self._refuse(f"{path}.{name}", raw[name], allowed) or _WRONG
+            elif name in raw:
+                values[key.field] = self._value(kind, key, raw[name], f"{path}.{name}")
+            elif key.required and key.field not in values:
+                values[key.field] = self._refuse(f"{path}.{name}", None, "required key is missing")
+        known = {key.field: name for name, key in keys.items()}
+        allowed = {*keys, "kind"} if issubclass(kind, tuple(KINDS)) else {*keys}
+        for name in (name for name in raw if name not in allowed):
+            self._refuse(f"{path}.{name}", raw[name], unknown_key(name, known))
+        wrong = {field for field, value in values.items() if value is _WRONG}
+        return {field: value for field, value in values.items() if field not in wrong}, wrong
+
+    def _made(
+        self,
+        kind: type[Any],
+        place: Place,
+        values: Mapping[str, Any],
+        wrong: Set[str] = frozenset(),
+    ) -> Any:
+        """A part, which judges its values; None, and its faults, where they are wrong.
+
+        Fields that no value can be given are None, so that the part can judge the others.
+        """
+        self.places[place.path] = place
+        if "" in wrong:
+            return None
+        required = {key.field for key in keys_of(kind).values() if key.required} if wrong else set()
+        try:
+            part = kind(**{**dict.fromkeys(wrong & required), **values})
+        except InvalidDesign as error:
+            sure = [f for f in error.faults if wrong.isdisjoint(f.path.split(", "))]
+            self.faults += in_file_terms(InvalidDesign(sure), "", {**self.places, "": place}).faults
+            return None
+        return None if wrong else part
+
+    def _value(self, kind: type[Part], key: Key, raw: Any, path: str) -> Any:
+        """Value of a field in SI units; what it may be is for the part to judge."""
+        if key.number is not None:
+            return self._number(key.number, raw, path)
+        if key.field in ("material", "core"):
+            made = self._material(raw, path, of="core" if key.field == "core" else path)
+        elif key.field == "measured":
+            made = self._part(Measured, raw, path)
+        elif key.of_names and not isinstance(raw, str):
+            return self._refuse(path, raw, "must be text")
+        elif key.field == "point_loads":
+            if not isinstance(raw, list):
+                return self._refuse(path, raw, "must be a list")
+            each = [self._part(PointLoad, one, f"{path}[{k}]") for k, one in enumerate(raw)]
+            made = None if None in each else tuple(each)
+        else:
+            return raw
+        return _WRONG if made is None else made
+
+    def _number(self, number: Number, raw: Any, path: str) -> Any:
+        if isinstance(raw, str) and number.named:  # which for the part is the name of a station
+            return self._refuse(path, raw, "must be a number")
+        if isinstance(raw, dict) and number.along is not None:
+            return self._along(number, raw, path)
+        if number.unit != "rad":
+            return raw
+        angles = [
+            radians(each) if Range().admits(each) else each
+            for each in (raw if isinstance(raw, list) else [raw])
+        ]
+        return tuple(angles) if isinstance(raw, list) else angles[0]
+
+    def _along(self, number: Number, raw: dict[str, Any], path: str) -> Any:
+        """A function along the arm, in the unit of the key that it belongs to."""
+        kind: type[AlongArm] = Samples
+        kinds = ("cubic", "linear", "constant")[: 3 if number.along is AlongArm else 2]
+        if (interpolation := raw.get("interpolation", "cubic")) not in kinds:
+            allowed = f"must be one of {', '.join(kinds)}"
+            return self._refuse(f"{path}.interpolation", interpolation, allowed)
+        if interpolation == "constant":
+            kind, raw = Pieces, {name: raw[name] for name in raw if name != "interpolation"}
+        values, wrong = self._values(kind, raw, path)
+        if isinstance(values.get("values"), list):
+            values["values"] = self._number(number, values["values"], f"{path}.values")
+        made = self._made(kind, Place(path, field_keys(kind), raw), values, wrong)
+        return _WRONG if made is None else made
+
+    def _material(self, raw: Any, path: str, of: str) -> Material | None:
+        """A material by its name or its values, of the core or of a ring."""
+        if isinstance(raw, dict):
+            made = self._part(Material, raw, path)
+            self.places[of] = self.places[path]
+            return made
+        if isinstance(raw, str) and raw in self._materials:
+            self.places[of] = self.places[f"materials.{key_text(raw)}"]
+            return self._materials[raw]
+        self.places[of] = Place(path, field_keys(Material))
+        if isinstance(raw, str) and raw in material_names():
+            return named_material(raw)
+        if not isinstance(raw, str):
+            allowed = "must be the name of a material, or a table of its values"
+            return self._refuse(path, raw, allowed, None)
+        return self._refuse(path, raw, _materials_text(raw, [*self._materials]), None)
+
+    def _section(self) -> Section | None:
+        rings = [self._part(Ring, raw, f"rings[{k}]") for k, raw in self._tables("rings")]
+        for k in range(len(rings)):
+            path = f"rings[{k}].material"
+            self.places.setdefault(path, Place(path, field_keys(Material)))
+        values, wrong = self._values(Section, self._table("section"), "section")
+        if not rings or None in rings:
+            return None
+        place = Place("section", field_keys(Section), self._table("section"))
+        return self._made(Section, place, values | {"rings": tuple(rings)}, wrong)
+
+    def _display_unit(self) -> Any:
+        """The unit that the arm is to be shown in; whether there is such a one the arm judges."""
+        raw = self._table("display")
+        for key in (key for key in raw if key != "unit"):
+            self._refuse(f"display.{key_text(key)}", raw[key], unknown_key(key, {"unit": "unit"}))
+        self.places["display_unit"] = Place("display.unit")
+        return raw.get("unit")
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""
-        for key, (kind, required) in LAYOUT.items():
-            value = self._document.get(key)
-            if key not in self._document:
-                if required:
-                    self.refused(key, None, "required key is missing")
-            elif kind is list:
-                self._check_list(key, value)
-            elif kind is dict and not isinstance(value, dict):
-                self.refused(key, value, "must be a table")
-        for key in self._document:
-            if key not in LAYOUT:
-                place = _place(key)
-                known = {name: name for name in LAYOUT}
-                said = f"unknown key; {place}" if place else unknown_key(key, known)
-                self.refused(key_text(key), self._document[key], said)
+        words = {dict: "must be a table", list: "must be a list", int: ""}
+        for key, (shape, _, required) in LAYOUT.items():
+            if key not in self._document and required:
+                self._refuse(key, None, "required key is missing")
+            elif key in self._document and not isinstance(self._document[key], shape):
+                self._refuse(key, self._document[key], words[shape])
+        if self._document.get("rings") == []:
+            self._refuse("rings", [], "must not be empty")
+        for key in (key for key in self._document if key not in LAYOUT):
+            known = {name: name for name in LAYOUT}
+            home = _home(key)
+            said = f"unknown key; {home}" if home else unknown_key(key, known)
+            self._refuse(key_text(key), self._document[key], said)
 
-    def _check_list(self, key: str, value: Any) -> None:
-        if not isinstance(value, list):
-            self._document = {**self._document, key: []}
-            self.refused(key, value, "must be a list")
-        elif key == "rings" and not value:
-            self.refused(key, value, "must not be empty")
-        else:
-            for k, table in enumerate(value):
-                if not isinstance(table, dict):
-                    self.refused(f"{key}[{k}]", table, "must be a table")
-
-    def _table(self, key: str) -> dict[str, Any] | None:
+    def _table(self, key: str) -> dict[str, Any]:
+        """A table at the top; an empty one if there is none, or something else."""
         value = self._document.get(key)
-        return value if isinstance(value, dict) else None
+        return value if isinstance(value, dict) else {}
 
-    def _tables(self, key: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        for k, raw in enumerate(self._document.get(key, ())):
-            if isinstance(raw, dict):
-                yield k, raw
+    def _tables(self, key: str) -> list[tuple[int, dict[str, Any]]]:
+        raw = self._document.get(key)
+        tables = [*enumerate(raw)] if isinstance(raw, list) else []
+        for k, table in tables:
+            if not isinstance(table, dict):
+                self._refuse(f"{key}[{k}]", table, "must be a table")
+        return [(k, table) for k, table in tables if isinstance(table, dict)]
 
-    def _profile(self) -> Profile | None:
-        if (raw := self._table("profile")) is None:
-            return None
-        kind = raw.get("kind", "linear")
-        if isinstance(kind, str) and kind in PROFILES:
-            return self.part(PROFILES[kind], raw, "profile")
-        return self._own_part(Profile, kind, raw, "profile")
+    def _plain(self, value: Any, path: str) -> Any:
+        """Lists as tuples, and tables of values along the arm as functions."""
+        if isinstance(value, dict):
+            anything = Number(symbol="", meaning="", allowed=Range(), along=AlongArm)
+            made = self._along(anything, value, path)
+            return None if made is _WRONG else made
+        if isinstance(value, list):
+            return tuple(self._plain(item, path) for item in value)
+        return float(value) if isinstance(value, WrittenFloat) else value
 
-    def material(self, raw: Any, path: str) -> Any:
-        if isinstance(raw, dict):
-            return super().material(raw, path)
-        if not isinstance(raw, str):
-            self._unknown_material = True
-            allowed = "must be the name of a material, or a table of its values"
-            return self.refused(path, raw, allowed)
-        if raw in self._materials:
-            self._unknown_material |= self._materials[raw] is None
-            return self._materials[raw] or Material()
-        if raw in material_names():
-            return named_material(raw)
-        self._unknown_material = True
-        self.refused(path, raw, _materials_text(raw, [*self._materials]))
-        return Material()
-
-    def _section(self, rings: list[Ring | None]) -> Section | None:
-        made = tuple(ring for ring in rings if ring is not None)
-        raw = self._document.get("section", {})
-        if not isinstance(raw, dict):
-            return None
-        values, wrong = self.values(Section, raw, "section")
-        if not made or len(made) < len(rings) or values is None:
-            return None
-        if self._unknown_material:
-            made = tuple(ring.replace(material=Material()) for ring in made)
-            values.pop("core", None)
-        try:
-            section = Section(rings=made, **values)
-        except InvalidDesign as error:
-            certain = [fault for fault in error.faults if not is_doubtful(fault, wrong)]
-            self.faults += self._of_section(certain)
-            return None
-        return None if wrong or self._unknown_material else section
-
-    def _of_section(self, faults: list[Fault]) -> list[Fault]:
-        """Faults of the section under the paths of the file, one for each path."""
-        placed = {}
-        for fault in faults:
-            path = self._place(fault.path.removeprefix("section."))
-            placed.setdefault(path, fault._replace(path=path))
-        return list(placed.values())
-
-    def _place(self, path: str) -> str:
-        """Path in the file of a field of the section, of a ring or of a material of one."""
-        owner, _, field = path.rpartition(".")
-        if path.startswith("loads."):
-            return f"{owner}.{field_keys(PointLoad).get(field, field)}"
-        if not path.startswith(("rings", "core")):
-            return f"section.{path}"
-        key = field_keys(Material).get(field)
-        if key is None:
-            return path if path.startswith("rings") else f"section.{path}"
-        name = self._material_name(owner)
-        if isinstance(name, str) and name in self._materials:
-            return f"materials.{key_text(name)}.{key}"
-        return f"section.{owner}.{key}" if owner == "core" else f"{owner}.{key}"
-
-    def _material_name(self, owner: str) -> Any:
-        if owner == "core":
-            return (self._table("section") or {}).get("core")
-        k = int(owner.partition("[")[2].partition("]")[0])
-        return dict(self._tables("rings"))[k].get("material")
-
-    def _actuator(self, k: int, raw: dict[str, Any]) -> Actuator | None:
-        path, kind = f"actuators[{k}]", raw.get("kind")
-        if isinstance(kind, str) and kind in ACTUATORS:
-            return self.part(ACTUATORS[kind], raw, path)
-        return self._own_part(Actuator, kind, raw, path)
-
-    def _own_part(self, of: type[Kind], kind: Any, raw: dict[str, Any], path: str) -> Kind | None:
-        own = own_kind(of, kind) if isinstance(kind, str) else None
-        if own is None:
-            path = f"{path}.kind"
-            if not isinstance(kind, str) or kind not in self._unknown_kinds:
-                self.refused(path, kind, _kinds_text(of, kind))
-            self._unknown_kinds.append(kind)
-            return None
-        try:
-            return _of_own_kind(own, raw)
-        except InvalidDesign as error:
-            for fault in error.faults:
-                self.faults.append(fault._replace(path=f"{path}.{fault.path}".rstrip(".")))
-            return None
-
-    def _check_fit(
-        self,
-        profile: Profile,
-        section: Section,
-        stations: Stations,
-        actuators: list[tuple[int, Actuator]],
-    ) -> None:
-        lacking: list[Fault] = []
-        for k, actuator in actuators:
-            named = dataclasses.replace(actuator, name=actuator.name or f"actuators[{k}]")
-            faults = _place_faults(named, profile, stations)
-            for fault in faults or placed(named, stations).section_faults(profile, section):
-                if fault.path.startswith(("rings", "core")):
-                    lacking.append(fault)
-                else:
-                    self.faults.append(fault._replace(path=f"actuators[{k}].{fault.path}"))
-        self.faults += self._of_section(lacking)
+    def _refuse(self, path: str, value: Any, allowed: str, instead: Any = _WRONG) -> Any:
+        self.faults.append(Fault(path, value, allowed))
+        return instead
 
 
-def _place_faults(part: Located, profile: Profile, stations: Stations) -> list[Fault]:
-    try:
-        return placed(part, stations).place_faults(profile.length)
-    except InvalidDesign as error:
-        return list(error.faults)
-
-
-def _of_own_kind(kind: type[Kind], table: Mapping[str, Any]) -> Kind:
-    """A part of a class outside softreach, from its fields in Python and in SI units."""
-    values = {key: _plain(value) for key, value in table.items() if key != "kind"}
-    try:
-        return kind(**values)
-    except TypeError as error:
-        raise InvalidDesign([Fault("", kind.__name__, f"has other fields: {error}")]) from None
-
-
-def _plain(value: Any) -> Any:
-    """Lists as tuples, and tables of values along the arm as functions."""
-    if isinstance(value, dict):
-        anything = Number(symbol="", meaning="", allowed=Range(), along=AlongArm)
-        function = TableReader().along(anything, value, "")
-        return value if function is WRONG else function
-    if isinstance(value, list):
-        return tuple(_plain(item) for item in value)
-    return float(value) if isinstance(value, WrittenFloat) else value
-
-
-def _place(key: str) -> str:
+def _home(key: str) -> str:
     """Hint where a key belongs that is not one of the top."""
-    if key.removesuffix("s") in ACTUATORS:
+    if key.removesuffix("s") in KINDS[Actuator]:
         return f'write [[actuators]] with kind = "{key.removesuffix("s")}"'
     homes = {
         "[profile]": LinearTaper,
@@ -416,7 +411,7 @@ def _materials_text(name: str, own: list[str]) -> str:
     return f"must be a material {here}, or of the library; {hint}"
 
 
-def _kinds_text(of: type[Any], kind: Any) -> str:
+def _kinds_text(of: type[Kind], kind: Any) -> str:
     known = KINDS[of]
     if kind is None:
         return f"required key is missing: one of {', '.join(known)}"

@@ -12,13 +12,11 @@ from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
-from softreach.arm.marker import Marker
 from softreach.arm.material import Material
-from softreach.arm.measured import Measured
 from softreach.arm.number import Number
 from softreach.arm.rest_shape import RestShape
-from softreach.arm.rigid import RigidPiece
-from softreach.arm.section import Ring, Section
+from softreach.arm.section import Measured, Ring, Section
+from softreach.arm.stations import Marker, RigidPiece
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
 
@@ -57,56 +55,32 @@ def json_schema() -> dict[str, Any]:
     definitions |= {
         name: _table(kind, kind.__doc__ or "", kind=name) for name, kind in kinds.items()
     }
+    profile = _any_of(PROFILES, "own_profile", "Length and outer radius along the arm")
+    actuator = _any_of(ACTUATORS, "own_actuator", "What drives the arm")
+    unit = {"enum": [*UNITS], "description": "Unit of lengths; L is the arm's"}
     top = {
         "version": {"const": 2, "description": "Version of the format"},
-        "profile": _one_of(
-            {**PROFILES, "own_profile": None}, "Length and outer radius along the arm"
+        "profile": profile,
+        "materials": _by_name(
+            _of("material"), "Materials by name; others are looked up in the library"
         ),
-        "materials": {
-            "description": "Materials by name; others are looked up in the library",
-            "type": "object",
-            "additionalProperties": _of("material"),
-        },
         "section": _of("section"),
-        "rings": {
-            "description": "Layers that actuators live in",
-            "type": "array",
-            "items": _of("ring"),
-            "minItems": 1,
-        },
-        "stations": {
-            "description": "Places along the arm by name, Z [m]",
-            "type": "object",
-            "additionalProperties": {"type": "number", "minimum": 0},
-        },
-        "actuators": {
-            "description": "In the order of the activations; [] for a passive rod",
-            "type": "array",
-            "items": _one_of({**ACTUATORS, "own_actuator": None}, "What drives the arm"),
-        },
-        "rigid_pieces": {
-            "description": "Where the arm is not deformed",
-            "type": "array",
-            "items": _of("rigid_piece"),
-        },
-        "drives": {
-            "description": "Inputs that activate bundles, before the bundles that none names",
-            "type": "array",
-            "items": _of("drive"),
-        },
-        "markers": {
-            "description": "Points that go with sections of the arm",
-            "type": "array",
-            "items": _of("marker"),
-        },
+        "rings": {**_list(_of("ring"), "Layers that actuators live in"), "minItems": 1},
+        "stations": _by_name(
+            {"type": "number", "minimum": 0}, "Places along the arm by name, Z [m]"
+        ),
+        "actuators": _list(actuator, "In the order of the activations; [] for a passive rod"),
+        "rigid_pieces": _list(_of("rigid_piece"), "Where the arm is not deformed"),
+        "drives": _list(
+            _of("drive"), "Inputs that activate bundles, before the bundles that none names"
+        ),
+        "markers": _list(_of("marker"), "Points that go with sections of the arm"),
         "loads": _of("loads"),
         "base": _of("base"),
         "rest": _of("rest"),
         "display": {
             "description": "How the design is shown; it changes nothing about the arm",
-            **_object(
-                {"unit": {"enum": [*UNITS], "description": "Unit of lengths; L is the arm's"}}, []
-            ),
+            **_object({"unit": unit}, []),
         },
     }
     return {
@@ -122,8 +96,16 @@ def _of(name: str) -> _Schema:
     return {"$ref": f"#/$defs/{name}"}
 
 
-def _one_of(names: Mapping[str, Any], description: str) -> _Schema:
-    return {"description": description, "anyOf": [_of(name) for name in names]}
+def _list(of: _Schema, description: str) -> _Schema:
+    return {"description": description, "type": "array", "items": of}
+
+
+def _by_name(of: _Schema, description: str) -> _Schema:
+    return {"description": description, "type": "object", "additionalProperties": of}
+
+
+def _any_of(kinds: Mapping[str, type], own: str, description: str) -> _Schema:
+    return {"description": description, "anyOf": [_of(name) for name in (*kinds, own)]}
 
 
 def _own(part: str, kinds: Mapping[str, type], *required: str) -> _Schema:
@@ -146,11 +128,7 @@ def _object(properties: Mapping[str, _Schema], required: list[str]) -> _Schema:
 
 
 def _table(
-    part: type,
-    description: str,
-    *,
-    kind: str = "",
-    without: tuple[str, ...] = (),
+    part: type, description: str, *, kind: str = "", without: tuple[str, ...] = ()
 ) -> _Schema:
     keys = {name: key for name, key in keys_of(part).items() if name not in without}
     properties = {"kind": {"const": kind}} if kind else {}

@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from typing import Any
 
-from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm, Samples
-from softreach.arm.base import Base
 from softreach.arm.design_file.keys import (
-    ACTUATORS,
-    PROFILES,
+    KINDS,
     degrees_text,
     inline_table,
     key_text,
     keys_of,
     value_text,
 )
-from softreach.arm.drives import BundleNumbers, Drive
-from softreach.arm.loads import Loads
-from softreach.arm.marker import Marker
+from softreach.arm.drives import BundleNumbers
 from softreach.arm.material import Material
 from softreach.arm.number import Station
-from softreach.arm.profile import Profile
-from softreach.arm.rest_shape import RestShape
-from softreach.arm.rigid import RigidPiece
+from softreach.arm.part import Part
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["display_text", "render"]
 
+_NAMES = {kind: name for kinds in KINDS.values() for name, kind in kinds.items()}
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 
@@ -49,27 +43,20 @@ _LAST = (
 """Order of fields: between these stands what distinguishes a kind."""
 
 
-def render(
-    profile: Profile,
-    section: Section,
-    actuators: Sequence[Actuator],
-    loads: Loads | None,
-    base: Base,
-    rest: RestShape,
-    stations: Mapping[str, float],
-    rigid_pieces: Sequence[RigidPiece],
-    drives: Sequence[Drive],
-    markers: Sequence[Marker],
-) -> str:
-    """TOML text of a design, of version 2.
+def render(arm: Mapping[str, Any]) -> str:
+    """TOML text of a design, of version 2, from its fields.
 
     Raises:
         InvalidDesign: A part of one's own kind that is not made of plain values.
     """
-    names = _named_materials(section)
+    section, stations, loads = arm["section"], arm["stations"], arm["loads"]
+    names: dict[str, Material] = {}
+    for material in (section.core, *(ring.material for ring in section.rings)):
+        if material is not None and material.name:
+            names.setdefault(material.name, material)
     blocks = [
-        ["version = 2"] if actuators else ["version = 2", "actuators = []"],
-        ["[profile]", *_part_lines(profile, PROFILES)],
+        ["version = 2"] if arm["actuators"] else ["version = 2", "actuators = []"],
+        ["[profile]", *_lines(arm["profile"])],
         *(
             [f"[materials.{key_text(name)}]", *_lines(material, without=("name",))]
             for name, material in names.items()
@@ -79,18 +66,15 @@ def render(
     if stations:
         places = (f"{key_text(name)} = {value_text(z)}" for name, z in stations.items())
         blocks.append(["[stations]", *places])
-    for actuator in actuators:
-        blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
-    blocks += [["[[rigid_pieces]]", *_lines(piece)] for piece in rigid_pieces]
-    blocks += [["[[drives]]", *_lines(drive)] for drive in drives]
-    blocks += [["[[markers]]", *_lines(marker)] for marker in markers]
+    for several in ("actuators", "rigid_pieces", "drives", "markers"):
+        blocks += [[f"[[{several}]]", *_lines(part)] for part in arm[several]]
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
-    if not base.is_identity:
-        blocks.append(["[base]", *_lines(base)])
-    if not rest.is_straight:
-        blocks.append(["[rest]", *_lines(rest)])
+    if not arm["base"].is_identity:
+        blocks.append(["[base]", *_lines(arm["base"])])
+    if not arm["rest"].is_straight:
+        blocks.append(["[rest]", *_lines(arm["rest"])])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
@@ -99,18 +83,20 @@ def display_text(unit: str | None) -> str:
     return "" if unit is None else f"\n[display]\nunit = {value_text(unit)}\n"
 
 
-def _part_lines(part: Actuator | Profile, kinds: Mapping[str, type]) -> Iterator[str]:
-    """Kind and fields; of a class outside softreach the fields as they are in Python."""
-    for name, kind in kinds.items():
-        if kind is type(part):
-            yield f"kind = {value_text(name)}"
-            yield from _lines(part)
-            return
-    yield f"kind = {value_text(type(part).__name__)}"
+def _lines(part: Part, without: tuple[str, ...] = ("point_loads",)) -> list[str]:
+    """What a table says; of a class outside softreach the fields as they are in Python."""
+    if not isinstance(part, tuple(KINDS)):
+        return [f"{key} = {text}" for key, text in _pairs(part, without)]
+    kind = _NAMES.get(type(part), type(part).__name__)
+    pairs = _pairs(part) if type(part) in _NAMES else _plain_pairs(part)
+    return [f"kind = {value_text(kind)}", *(f"{key} = {text}" for key, text in pairs)]
+
+
+def _plain_pairs(part: Part) -> Iterator[tuple[str, str]]:
     for field in fields(part):  # pyright: ignore[reportArgumentType]
         if field.init and (value := getattr(part, field.name)) is not None:
             value = value.name if isinstance(value, Station) else value
-            yield f"{field.name} = {_plain_text(part, field.name, value)}"
+            yield field.name, _plain_text(part, field.name, value)
 
 
 def _plain_text(part: object, name: str, value: Any) -> str:
@@ -120,15 +106,6 @@ def _plain_text(part: object, name: str, value: Any) -> str:
         kind = type(part).__name__
         allowed = "must be a number, text or a sequence of these to fit in a design file"
         raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
-
-
-def _named_materials(section: Section) -> dict[str, Material]:
-    used = [*([section.core] if section.core else []), *(ring.material for ring in section.rings)]
-    named: dict[str, Material] = {}
-    for material in used:
-        if material.name:
-            named.setdefault(material.name, material)
-    return named
 
 
 def _section_blocks(section: Section, names: Mapping[str, Material]) -> Iterator[list[str]]:
@@ -151,11 +128,7 @@ def _material_text(material: Material, names: Mapping[str, Material]) -> str:
     return inline_table(_pairs(material))
 
 
-def _lines(part: object, without: tuple[str, ...] = ("point_loads",)) -> list[str]:
-    return [f"{key} = {text}" for key, text in _pairs(part, without)]
-
-
-def _pairs(part: object, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
+def _pairs(part: Part, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
     """Keys and texts of what is not the default."""
     for key in sorted(keys_of(type(part)).values(), key=lambda key: _rank(key.field)):
         value = getattr(part, key.field)

@@ -1,0 +1,268 @@
+"""The body of an arm: what bends, and what acts in it and on it, wherever it is clamped.
+
+A body knows where it is not smooth, how stiff it is and what its bundles are; its tables and
+tensions follow from it alone. A `Manipulator` is a body with a base, drives and markers.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.actuators import Actuator, FiberArchitecture, Outline
+from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN
+from softreach.arm.loads import Loads
+from softreach.arm.part import faults_under
+from softreach.arm.profile import Profile
+from softreach.arm.rest_shape import STRAIGHT, RestShape
+from softreach.arm.section import Section, Stiffness, name_faults
+from softreach.arm.stations import Located, RigidPiece, Stations, placed
+from softreach.support.arrays import as_stations, read_only
+from softreach.support.errors import Fault, InvalidDesign
+from softreach.support.lazy import lazy
+
+__all__ = ["Body", "kind_faults", "kinds_in_a_sequence", "named_actuators"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Body:
+    """A slender body with actuators in it.
+
+    Raises:
+        InvalidDesign: It cannot exist; the error names every fault.
+    """
+
+    profile: Profile
+    """R2(Z), the outer radius along the arm, and its length."""
+    section: Section
+    """The core and the ring of actuators, in proportion to R2(Z)."""
+    actuators: tuple[Actuator, ...]
+    """In the order of the activations, bundle by bundle; empty for a passive rod."""
+    rest: RestShape = STRAIGHT
+    """Curvature and twist of the arm that nothing drives; straight."""
+    stations: Mapping[str, float] = Stations()
+    """Z [m] of stations by name, at which actuators, rigid pieces and markers may be."""
+    rigid_pieces: tuple[RigidPiece, ...] = ()
+    """Rigid pieces, which neither bend nor twist nor change their length."""
+    loads: Loads | None = None
+    """Loads beside the actuators; None for nothing, not even its weight."""
+
+    def __post_init__(self) -> None:
+        for faults in (self._faults, self._settle, self._fit_faults):  # each needs those before
+            if found := faults():
+                raise InvalidDesign(found)
+
+    def _faults(self) -> list[Fault]:
+        kinds = {
+            "profile": (Profile, "must be a Profile, such as LinearTaper"),
+            "section": (Section, "must be a Section"),
+            "rest": (RestShape, "must be a RestShape, such as RestShape(curvature_x=2.0)"),
+            "loads": (Loads | None, "must be Loads or None"),
+        }
+        wrong = [
+            Fault(field, value, allowed)
+            for field, (kind, allowed) in kinds.items()
+            if not isinstance(value := getattr(self, field), kind)
+        ]
+        return [
+            *wrong,
+            *kinds_in_a_sequence("rigid_pieces", self.rigid_pieces, RigidPiece),
+            *kind_faults(self.actuators),
+        ]
+
+    def _settle(self) -> list[Fault]:
+        """Give actuators names, and parts the places of the stations that they name."""
+        with faults_under("stations"):
+            places = self.stations
+            places = places if isinstance(places, Stations) else Stations(places)
+        object.__setattr__(self, "stations", places)
+        actuators = [(each.name, each) for each in named_actuators(self.actuators)]
+        pieces = [(f"rigid_pieces[{k}]", piece) for k, piece in enumerate(self.rigid_pieces)]
+        return self._place("actuators", actuators) + self._place("rigid_pieces", pieces)
+
+    def _place(self, field: str, parts: Sequence[tuple[str, Located]]) -> list[Fault]:
+        """Put parts where the stations that they name are; faults begin with their owners."""
+        made, faults = [], []
+        for owner, part in parts:
+            try:
+                with faults_under(owner):
+                    made.append(placed(part, self.stations))
+            except InvalidDesign as error:
+                faults += error.faults
+        object.__setattr__(self, field, tuple(made))
+        return faults
+
+    def _fit_faults(self) -> list[Fault]:
+        """Names given twice; if there are none, what keeps parts from acting together."""
+        names = [actuator.name for actuator in self.actuators]
+        if faults := [*name_faults(names, "actuators")]:
+            return faults
+        if twice := [name for name in self.bundle_names if self.bundle_names.count(name) > 1]:
+            return [Fault("actuators", twice[0], "names two bundles: rename an actuator")]
+        faults = [
+            Fault(f"stations.{name}", z, f"must be on the arm, at most {self.length:g} m")
+            for name, z in self.stations.items()
+            if z > self.length
+        ]
+        for k, piece in enumerate(self.rigid_pieces):
+            faults += _behind(f"rigid_pieces[{k}]", piece.place_faults(self.length))
+        rest = self.rest.curvature(np.linspace(0.0, 1.0, 65))
+        turn = self.length * float(np.linalg.norm(rest, axis=1).mean())
+        if turn > MOST_TURN:
+            most = f"{MOST_TURN / math.tau:g} turns, {MOST_TURN / self.length:.4g} 1/m"
+            allowed = f"must wind the arm by at most {most}"
+            faults.append(Fault("rest", f"{turn / math.tau:.4g} turns", allowed))
+        if self.loads is not None:
+            faults += self.loads.section_faults(self.section, self.length)
+        parts = self.profile, self.section
+        for each in self.actuators:
+            own = each.place_faults(self.length) or each.section_faults(*parts)
+            faults += _behind(each.name, [*own, *_far_faults(each, self.profile)])
+        return faults
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new design."""
+        return replace(self, **changes)
+
+    @property
+    def length(self) -> float:
+        """L, from base to tip before activation [m]."""
+        return self.profile.length
+
+    @property
+    def fibers(self) -> tuple[FiberArchitecture, ...]:
+        """Those actuators that are fiber architectures."""
+        return tuple(each for each in self.actuators if isinstance(each, FiberArchitecture))
+
+    @property
+    def bundles(self) -> int:
+        """m, number of independent activations."""
+        return sum(actuator.bundles for actuator in self.actuators)
+
+    @lazy
+    def bundle_names(self) -> tuple[str, ...]:
+        """A readable name for each bundle."""
+        return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
+
+    @lazy
+    def bundle_actuators(self) -> tuple[Actuator, ...]:
+        """The actuator of each bundle."""
+        return tuple(actuator for actuator in self.actuators for _ in range(actuator.bundles))
+
+    @lazy
+    def bundle_units(self) -> tuple[str, ...]:
+        """The unit of the activation of each bundle."""
+        return tuple(actuator.unit for actuator in self.bundle_actuators)
+
+    @lazy
+    def bounds(self) -> Array:
+        """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
+        bounds = (actuator.bounds for actuator in self.actuators)
+        return read_only(np.concatenate([np.empty((0, 2)), *bounds]))
+
+    @lazy
+    def breakpoints(self) -> tuple[float, ...]:
+        """Stations inside (0, L) where profile, section or actuators are not smooth [m]."""
+        places = {0.0, self.length, *self.profile.breakpoints}
+        places.update(self.length * x for x in self.section.breaks)
+        places.update(z for actuator in self.actuators for z in actuator.breakpoints(self.profile))
+        places.update(z for piece in self.rigid_pieces for z in piece.span(self.length))
+        ascending = np.array(sorted(places))
+        # Two that differ by rounding alone are one.
+        apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
+        inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
+        return tuple(inside.tolist())
+
+    def stiffness_at(self, z: ArrayLike) -> Stiffness:
+        """K0, K1 and K3 at stations Z [m]: those of its section, infinite in rigid pieces."""
+        stations = np.asarray(z, float)
+        stiffness = self.section.stiffness_at(self.profile, stations)
+        if not self.rigid_pieces:
+            return stiffness
+        spans = [piece.span(self.length) for piece in self.rigid_pieces]
+        inside = [
+            (stations >= start) & ((stations < end) | (end >= self.length)) for start, end in spans
+        ]
+        rigid = np.any(inside, axis=0)
+        return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
+
+    @property
+    def bundle_courses(self) -> tuple[str, ...]:
+        """Direction of contraction within each bundle; see `Actuator.course`."""
+        return tuple(actuator.course for actuator in self.bundle_actuators)
+
+    def outline(self, z: ArrayLike) -> Outline:
+        """Places of all bundles in the sections at stations Z [m], shape (station,)."""
+        stations = as_stations("z", z)
+        each = [part.outline(self.profile, self.section, stations) for part in self.actuators]
+        each = each or [Outline.empty(len(stations))]
+        return Outline(
+            center=np.concatenate([part.center for part in each], axis=1),
+            extent=np.concatenate([part.extent for part in each]),
+            inner_ratio=np.concatenate([part.inner_ratio for part in each], axis=1),
+            outer_ratio=np.concatenate([part.outer_ratio for part in each], axis=1),
+            shape=tuple(shape for part in each for shape in part.shape),
+            acts=np.concatenate([part.acts for part in each], axis=1),
+        )
+
+
+def _behind(owner: str, faults: Iterable[Fault]) -> list[Fault]:
+    """Faults of a part under its name; those of the section have theirs."""
+    return [
+        fault
+        if fault.path.startswith(("rings", "core"))
+        else fault._replace(path=f"{owner}.{fault.path}")
+        for fault in faults
+    ]
+
+
+def _far_faults(actuator: Actuator, profile: Profile) -> Iterator[Fault]:
+    """Distances and radii beyond the length of the arm: millimeters taken for meters."""
+    radius = float(np.max(profile.radius(np.linspace(0.0, profile.length, 65))))
+    allowed = f"must be at most the length of the arm, {profile.length:g} m"
+    for name in ("distance", "distance_ratio", "radius", "radius_ratio"):
+        value: Any = getattr(actuator, name, None)
+        values: Any = getattr(value, "values", value)
+        scale = radius if name.endswith("ratio") else 1.0
+        if value is not None and scale * np.max(values) > profile.length:
+            yield Fault(name, values, allowed)
+
+
+def kinds_in_a_sequence(field: str, parts: Any, kind: type) -> Iterator[Fault]:
+    """A fault for what is no sequence of parts of a kind."""
+    if not isinstance(parts, tuple | list) or not all(isinstance(x, kind) for x in parts):
+        yield Fault(field, parts, f"must be {kind.__name__}s")
+
+
+def kind_faults(actuators: Any) -> Iterator[Fault]:
+    """Faults of what is no sequence of actuators, or holds too many bundles."""
+    if not isinstance(actuators, Sequence) or isinstance(actuators, str):
+        yield Fault("actuators", actuators, "must be a sequence of actuators")
+        return
+    wrong = [k for k, part in enumerate(actuators) if not isinstance(part, Actuator)]
+    for k in wrong:
+        allowed = "must be an actuator, such as FiberArchitecture"
+        yield Fault(f"actuators[{k}]", actuators[k], allowed)
+    if not wrong and (count := sum(part.bundles for part in actuators)) > MOST_BUNDLES:
+        yield Fault("actuators", f"{count} bundles", f"must be at most {MOST_BUNDLES} in all")
+
+
+def named_actuators(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
+    """The actuators, those without a name called "fiber 1", "fiber 2", ... by their places."""
+    taken = {actuator.name for actuator in actuators}
+    for place, actuator in enumerate(actuators, start=1):
+        if actuator.name:
+            yield actuator
+            continue
+        names = (f"{actuator.default_name} {number}" for number in itertools.count(place))
+        name = next(name for name in names if name not in taken)
+        taken.add(name)
+        yield actuator.replace(name=name)

@@ -1,0 +1,605 @@
+"""Design parameters: the numbers of an arm that a sweep, a slider or an optimizer varies.
+
+Each is called by its path. Those of the whole arm have plain names: `taper`, `length`,
+`revolution`. Those of a part begin with the part: `profile.radii[1]`, `rings[0].inner_ratio`,
+`rings[0].material.young_modulus`, `core.density`, and an actuator's own with its name:
+`left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`. Counting starts at 0; a ring that
+has a name may be called by it: `rings[skin].inner_ratio`. What several parts share, such as
+`lower`, has a value where theirs are equal; it can be set in any case, which makes them equal.
+
+Files and the command line write the same names with the unit, which stands before the place in a
+series, and angles in degrees: `taper_deg`, `left.helical_angle.values_deg[2]`.
+
+Parts say themselves what numbers they have (`Part.numbers`), what values (`values_of`), and make
+changed copies (`replace`). A parameter is an address among them, or a rule for several of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
+
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.along import AlongArm
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.material import Material
+from softreach.arm.number import Number, alternatives, fields_of, unit_suffix
+from softreach.arm.part import faults_under
+from softreach.arm.profile import LinearTaper
+from softreach.arm.section import Ring
+from softreach.support.arguments import as_instance, as_text, plain
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean
+from softreach.support.quantity import read_quantity, unit_names
+
+__all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "parameters"]
+
+PartKey = tuple[str | int, ...]
+"""("profile",), ("rings", 0, "material"), ("core",), ("actuators", "left"), ("loads",), ..."""
+
+Address = tuple[PartKey, str]
+"""A part, and the name of one of its numbers there."""
+
+Rule = Callable[[float], float]
+"""New value from the old one."""
+
+_ROUNDING = 1e-12  # of an angle that follows from another one
+_FEW = 12
+_ELEMENT = re.compile(r"(.*)\[(\d+)\]$")
+_ACTIVATIONS = ("activation", "force", "pressure", "tension")
+"""Names under which activations are looked for among the parameters of an actuator."""
+_BOUNDS = {"actuators": "activation_bounds", "drives": "bounds"}
+"""Fields that `lower` and `upper` are of."""
+_ABSENT = {
+    "loads": "the arm has no loads: give it some first",
+    "base": "the arm stands upright at the origin: give it another base first",
+    "measured": "nothing was measured on the arm: give its section measured=Measured() first",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A number in which designs can differ: one of a part, or one that several parts share."""
+
+    name: str
+    """`taper`, `left.offset`, or `rings[0].material.young_modulus`."""
+    owner: str = ""
+    """The part that it belongs to, such as `left` or `rings[0].material`; "" for the whole arm."""
+    number: Number
+    """Its declaration."""
+    places: tuple[Address, ...] = ()
+    """The numbers of parts that it is."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values: "m", "rad", "Pa", "kg/m³", "N", or "1"."""
+        return self.number.unit or "1"
+
+    @property
+    def symbol(self) -> str:
+        """Symbol in formulas."""
+        return self.number.symbol
+
+    @property
+    def meaning(self) -> str:
+        """Meaning in a few words."""
+        return self.number.meaning
+
+    @property
+    def range(self) -> Range:
+        """Values that it may have."""
+        return self.number.allowed
+
+    @property
+    def whole(self) -> bool:
+        """It counts something."""
+        return self.range.whole
+
+    @property
+    def field(self) -> str:
+        """The name without its owner."""
+        return self.name.removeprefix(f"{self.owner}.") if self.owner else self.name
+
+    @property
+    def part(self) -> PartKey | None:
+        """The part that alone has it; None of what several may share."""
+        key = self.places[0][0] if self.places else None
+        return key if key and (self.owner or key[0] in ("profile", "section")) else None
+
+    def value(self, arm: Manipulator) -> float:
+        """Its value on an arm [unit].
+
+        NaN where the arm does not give it as one number: a modulus that is left out, an angle that
+        changes along the arm, or what differs between the parts that share it. It can be set all
+        the same.
+        """
+        first, *others = self.values(arm)
+        same = all(math.isclose(first, other, rel_tol=_ROUNDING) for other in others)
+        return first if same else math.nan
+
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Its value in each part that shares it, and of each bundle that a bound is of [unit]."""
+        return tuple(value for place in self.places for value in _values(arm, place))
+
+    def edits(self, arm: Manipulator, new: Rule) -> dict[Address, float]:
+        """New values of numbers of parts by which each of its values becomes new(value)."""
+        edits: dict[Address, float] = {}
+        for part, called in self.places:
+            values = [new(value) for value in _values(arm, (part, called))]
+            if all(value == values[0] for value in values[1:]):
+                edits[part, called] = values[0]
+            else:
+                edits |= {(part, f"{called}[{k}]"): value for k, value in enumerate(values)}
+        return edits
+
+
+def _values(arm: Manipulator, place: Address) -> tuple[float, ...]:
+    part, called = place
+    return parts(arm)[part].values_of(called, arm.profile, arm.section)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DerivedParameter(Parameter):
+    """A number that numbers of parts follow by a law of its own."""
+
+    read: Callable[[Manipulator], tuple[float, ...]]
+    write: Callable[[Manipulator, Rule], dict[Address, float]]
+
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        return self.read(arm)
+
+    def edits(self, arm: Manipulator, new: Rule) -> dict[Address, float]:
+        return self.write(arm, new)
+
+
+# Laws of derived parameters.
+
+
+def _taper(arm: Manipulator) -> tuple[float, ...]:
+    return (float(getattr(arm.profile, "taper")),)  # noqa: B009
+
+
+def _tapered(arm: Manipulator, new: Rule) -> dict[Address, float]:
+    """Revolutions stay, and helical angles follow, but for those given along the arm."""
+    winding = {
+        (("actuators", fiber.name), "revolution"): fiber.revolution_on(arm.profile, arm.section)
+        for fiber in arm.fibers
+        if fiber.helical_angle and not isinstance(fiber.helical_angle, AlongArm)
+    }
+    return {(("profile",), "taper"): new(_taper(arm)[0]), **winding}
+
+
+def _outer_radius(arm: Manipulator) -> tuple[float, ...]:
+    return (float(arm.profile.radius(0.0)),)
+
+
+def _scaled(arm: Manipulator, new: Rule) -> dict[Address, float]:
+    """All radii of a profile that is given by radii keep their proportions."""
+    first, *others = getattr(arm.profile, "radii")  # noqa: B009
+    value = new(_outer_radius(arm)[0])
+    scaled = [value, *(radius * value / first for radius in others)]
+    return {(("profile",), f"radii[{k}]"): radius for k, radius in enumerate(scaled)}
+
+
+def _turns(arm: Manipulator) -> dict[Address, float]:
+    """Ω of all that winds by a single number other than 0 [rad]."""
+    turns: dict[Address, float] = {}
+    for actuator in arm.actuators:
+        numbers = fields_of(type(actuator))
+        along = any(isinstance(getattr(actuator, field), AlongArm) for field in numbers)
+        if not along and "revolution" in numbers and numbers["revolution"].unit == "rad":
+            (turn,) = actuator.values_of("revolution", arm.profile, arm.section)
+            turns |= {(("actuators", actuator.name), "revolution"): turn} if turn else {}
+    return turns
+
+
+def _revolution(arm: Manipulator) -> tuple[float, ...]:
+    return tuple(map(abs, _turns(arm).values())) or (0.0,)
+
+
+def _wound(arm: Manipulator, new: Rule) -> dict[Address, float]:
+    """Each keeps its sense."""
+    return {place: math.copysign(new(abs(turn)), turn) for place, turn in _turns(arm).items()}
+
+
+# The list.
+
+
+def parts(arm: Manipulator) -> dict[PartKey, Any]:
+    """Every part that has numbers, by its key."""
+    keyed: dict[PartKey, Any] = {("profile",): arm.profile, ("section",): arm.section}
+    if arm.loads is not None:
+        keyed["loads",] = arm.loads
+    if not arm.base.is_identity:
+        keyed["base",] = arm.base
+    if not arm.rest.is_straight:
+        keyed["rest",] = arm.rest
+    if arm.stations:
+        keyed["stations",] = arm.stations
+    keyed |= {("rigid_pieces", k): piece for k, piece in enumerate(arm.rigid_pieces)}
+    keyed |= {("markers", marker.name): marker for marker in arm.markers}
+    for k, ring in enumerate(arm.section.rings):
+        keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
+    if arm.section.core is not None:
+        keyed["core",] = arm.section.core
+    if arm.section.measured is not None:
+        keyed["measured",] = arm.section.measured
+    keyed |= {("drives", drive.name): drive for drive in arm.drives}
+    return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
+
+
+def owner_of(key: PartKey) -> str:
+    """Start of names of numbers of a part; "" for profile and section."""
+    kind, *path = key
+    if kind in ("actuators", "drives"):
+        return str(path[0])
+    if kind in ("profile", "section"):
+        return ""
+    steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    return "".join((str(kind), *steps))
+
+
+def parameters(arm: Manipulator) -> dict[str, Parameter]:
+    """Every parameter of an arm by its name.
+
+    Those of the whole arm come first: fields of profile and section, `revolution` (of all that is
+    helical, each in its own sense), `radius_ratio` where all rings begin at one, `poisson_ratio` of
+    all materials; `extent`, `lower` and `upper` (the bounds of activations) of all actuators that
+    have them. Then come those of single parts, by their path: `profile.radii[1]`,
+    `rings[0].inner_ratio`, `rings[0].material.young_modulus`, `core.density`, and of actuators by
+    their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
+    """
+    arm = a_manipulator("arm", arm)
+    own: dict[Address, Parameter] = {}
+    for key, part in parts(arm).items():
+        for called, number in part.numbers.items():
+            owner = "profile" if key == ("profile",) and "[" in called else owner_of(key)
+            name = f"{owner}.{called}" if owner else called
+            places = ((key, called),)
+            own[key, called] = Parameter(name=name, owner=owner, number=number, places=places)
+    every = [*_of_arm(arm, own), *(each for each in own.values() if each.owner)]
+    return {each.name: each for each in every}
+
+
+def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Parameter]:
+    alone = {each.name: each.number for each in own.values() if not each.owner}
+    if any(called == "revolution" and one.unit == "rad" for (_, called), one in own.items()):
+        meaning = "revolution of all that is helical, each in its own sense"
+        number = dataclasses.replace(fields_of(FiberArchitecture)["revolution"], meaning=meaning)
+        yield DerivedParameter(name="revolution", number=number, read=_revolution, write=_wound)
+    if number := alone.pop("taper", None):
+        of = ((("profile",), "taper"),)
+        yield DerivedParameter(name="taper", number=number, places=of, read=_taper, write=_tapered)
+    ratios = _places(own, "inner_ratio", "rings")
+    if len({value for place in ratios for value in _values(arm, place)}) == 1:
+        ratio = fields_of(Ring)["inner_ratio"]
+        number = dataclasses.replace(ratio, meaning="inner over outer radius")
+        yield Parameter(name="radius_ratio", number=number, places=ratios)
+    if "outer_radius" not in alone and isinstance(getattr(arm.profile, "radii", None), tuple):
+        number = fields_of(LinearTaper)["outer_radius"]
+        yield DerivedParameter(
+            name="outer_radius", number=number, read=_outer_radius, write=_scaled
+        )
+    yield from (each for each in own.values() if each.name in alone)
+    ratio, matter = fields_of(Material)["poisson_ratio"], ("rings", "core")
+    places = _places(own, "poisson_ratio", *matter)
+    yield Parameter(name="poisson_ratio", number=ratio, places=places)
+    for called in ("extent", "lower", "upper"):
+        shared = _places(own, called, "actuators")
+        if len({own[place].unit for place in shared}) == 1:
+            yield Parameter(name=called, number=own[shared[0]].number, places=shared)
+
+
+def _places(own: Iterable[Address], called: str, *kinds: str) -> tuple[Address, ...]:
+    return tuple(place for place in own if place[1] == called and place[0][0] in kinds)
+
+
+def parameters_by_every_name(arm: Manipulator) -> dict[str, Parameter]:
+    """As `parameters`, and again by the names of rings: `rings[skin].inner_ratio`."""
+    known = parameters(arm)
+    again: dict[str, Parameter] = {}
+    for k, ring in enumerate(arm.section.rings):
+        for name, each in known.items() if ring.name else ():
+            if name.startswith(f"rings[{k}]"):
+                owner = each.owner.replace(f"[{k}]", f"[{ring.name}]", 1)
+                name = f"{owner}.{each.field}"
+                again[name] = dataclasses.replace(each, name=name, owner=owner)
+    return known | again
+
+
+def find_parameter(arm: Manipulator, name: str) -> Parameter:
+    """The parameter of this name.
+
+    Args:
+        arm: Whose it is.
+        name: As `parameters` has it; a ring may be called by its name too, as in
+            `rings[skin].inner_ratio`.
+
+    Raises:
+        InvalidInput: The arm has no such parameter.
+    """
+    return find_parameters(arm, (as_text("name", name),))[name]
+
+
+def find_parameters(
+    arm: Manipulator, names: Mapping[str, object] | tuple[str, ...]
+) -> dict[str, Parameter]:
+    """The parameters of these names, those of the whole arm first.
+
+    Raises:
+        InvalidInput: The arm has no such parameter, or two names are of one.
+    """
+    as_instance("names", names, (Mapping, list, tuple), "names of parameters")
+    known, taken = parameters_by_every_name(arm), {}
+    for name in names:
+        if not isinstance(name, str) or name not in known:
+            raise unknown_parameter(str(name), parameters(arm))
+        same = known[name].places or name, bool(known[name].owner)
+        if (first := taken.setdefault(same, name)) != name:
+            raise InvalidInput("parameter", name, "given once", f"{first} is the same")
+    whole_arm_first = sorted(known, key=lambda name: bool(known[name].owner))
+    return {name: known[name] for name in whole_arm_first if name in taken.values()}
+
+
+# Arms with other values.
+
+
+class _Edit(NamedTuple):
+    """A new value of a number of a part, and who asked for it."""
+
+    value: float
+    name: str
+    """The parameter."""
+    asked: float
+    """Value of the parameter."""
+    own: bool
+    """It is a parameter of the part itself."""
+
+
+_Edits = dict[PartKey, dict[str, _Edit]]
+
+
+def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
+    """The design with these parameters, everything else unchanged.
+
+    They are applied together, as one may be valid only with another; a part's own parameter wins
+    over one of the whole arm. When the taper changes, revolutions stay and helical angles follow,
+    but for angles that are given along the arm; a new outer radius keeps the ratio of the radii.
+
+    Args:
+        arm: The design to start from.
+        values: Name of a parameter -> value in its unit.
+
+    Raises:
+        InvalidInput: An unknown parameter, or one that is given under two names.
+        InvalidDesign: No such arm can exist; the error names every fault.
+    """
+    as_instance("values", values, Mapping, "a dictionary of parameters")
+    found = find_parameters(a_manipulator("arm", arm), tuple(values))
+    return with_values(arm, {each: values[name] for name, each in found.items()})
+
+
+def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipulator:
+    """As `changed`, with parameters that were found before, those of the whole arm first."""
+    asked = {each: plain(value) for each, value in values.items()}
+    for each, value in asked.items():
+        if each.whole and isinstance(value, float) and value.is_integer():
+            asked[each] = int(value)
+    if faults := [
+        Fault(each.name, value, limits)
+        for each, value in asked.items()
+        if (limits := each.number.refusal(value))
+    ]:
+        raise InvalidDesign(faults)
+    edits: _Edits = {}
+    for each, value in asked.items():
+        _asks(edits, arm, each, value, lambda _, value=value: value)
+    return _made(arm, edits) if edits else arm
+
+
+def shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
+    """The design with one parameter grown, in each part from the part's own value.
+
+    Args:
+        arm: The design to start from.
+        parameter: One of its parameters.
+        amount: By how much it grows [its unit].
+
+    Raises:
+        InvalidDesign: No such arm can exist.
+    """
+    edits: _Edits = {}
+    value = parameter.value(arm) + amount
+    _asks(edits, arm, parameter, value, lambda old: old + amount)
+    return _made(arm, edits)
+
+
+def _asks(edits: _Edits, arm: Manipulator, by: Parameter, asked: float, new: Rule) -> None:
+    """Add what a parameter asks: a part's own wins over what the whole arm asked before."""
+    own = bool(by.owner)
+    for (key, called), value in by.edits(arm, new).items():
+        numbers = edits.setdefault(key, {})
+        if own:
+            other = alternatives(type(parts(arm)[key])).get(called, "")
+            if other in numbers and not numbers[other].own:
+                del numbers[other]
+            numbers[called] = _Edit(value, by.name, asked, own)
+        else:
+            numbers.setdefault(called, _Edit(value, by.name, asked, own))
+
+
+def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
+    """The arm with changed parts; faults under the names and with the values that were asked."""
+    new, faults, inside = dict(parts(arm)), [], edits.get(("section",), {})
+    for key in (key for key in edits if key != ("section",)):
+        part, values = new[key], {name: edit.value for name, edit in edits[key].items()}
+        if "bundles" in values and values["bundles"] != part.bundles:  # all have the first's bounds
+            values = dict(zip(("lower", "upper"), part.bounds[0].tolist(), strict=True)) | values
+        try:
+            with faults_under(owner_of(key)):
+                new[key] = part.replace(**values)
+        except InvalidDesign as error:
+            faults += error.faults
+    try:
+        if not faults:
+            return _assembled(arm, new, {name: edit.value for name, edit in inside.items()})
+    except InvalidDesign as error:
+        faults = [*error.faults]
+    asked = [_as_asked(fault, edits) for fault in faults]
+    raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in asked}.values()])
+
+
+def _assembled(
+    arm: Manipulator, new: Mapping[PartKey, Any], inside: Mapping[str, float]
+) -> Manipulator:
+    """Of the section, other numbers than those of its parts are `inside`."""
+    rings = tuple(
+        new["rings", k].replace(material=new["rings", k, "material"])
+        for k in range(len(arm.section.rings))
+    )
+    own = {name: new[name,] for name in ("core", "measured") if (name,) in new}
+    section = arm.section.replace(rings=rings, **own, **inside)
+    alone = ("profile", "loads", "base", "rest", "stations")
+    kinds = ("rigid_pieces", "markers", "drives", "actuators")
+    several: dict[str, list[Any]] = {kind: [] for kind in kinds}
+    for key, part in new.items():
+        if key[0] in several:
+            several[str(key[0])].append(part)
+    changes = {name: new[name,] for name in alone if (name,) in new}
+    return arm.replace(
+        section=section, **changes, **{name: tuple(each) for name, each in several.items()}
+    )
+
+
+def _as_asked(fault: Fault, edits: _Edits) -> Fault:
+    """A fault of a part or of the arm under the parameters that asked for it."""
+    paths = fault.path.split(", ")
+    by = [
+        edit
+        for path in paths
+        for key, numbers in edits.items()
+        for called, edit in numbers.items()
+        if path in _paths(key, called)
+    ]
+    names = dict.fromkeys(edit.name for edit in by)
+    if not names:
+        return fault
+    value = by[0].asked if len(names) == 1 else fault.value
+    return Fault(", ".join(names), value, fault.allowed)
+
+
+def _paths(key: PartKey, called: str) -> tuple[str, ...]:
+    """Paths that faults of a number may have: its own, that of its series, and of its bounds."""
+    owner, series = owner_of(key), _ELEMENT.sub(r"\1", called)
+    fields = [called, series] + ([_BOUNDS[str(key[0])]] if series in ("lower", "upper") else [])
+    return tuple(f"{owner}.{field}".lstrip(".") for field in fields)
+
+
+def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput:
+    """The error for a name that no parameter has, in one line.
+
+    It lists the parameters of the part that the name begins with, or those of the whole arm, and
+    suggests the closest one.
+
+    Args:
+        name: The name.
+        known: All parameters by what they are called where the name was given.
+    """
+    owners = list(dict.fromkeys(parameter.owner for parameter in known.values() if parameter.owner))
+    meant = max((own for own in owners if name.startswith(f"{own}.")), key=len, default="")
+    own = [key for key, parameter in known.items() if parameter.owner == meant]
+    hint = did_you_mean(name, own if meant else known, 0.5)
+    if name.rpartition(".")[2] in _ACTIVATIONS:
+        bound = f"{meant}.lower" if f"{meant}.lower" in known else "lower"
+        hint = f"activations are given to commands; their bounds are {bound} and {bound[:-5]}upper"
+    part = name.partition(".")[0]
+    if part in _ABSENT and not any(key.startswith(f"{part}.") for key in known):
+        hint = _ABSENT[part]
+    allowed = f"one of {', '.join(_shortened(own))}"
+    if owners and not meant:
+        listed = ", ".join(owners[:_FEW]) + (", ..." if len(owners) > _FEW else "")
+        example = next(key for key, parameter in known.items() if parameter.owner)
+        allowed += f", or of one part ({listed}), such as {example}"
+    return InvalidInput("parameter", name, allowed, hint)
+
+
+def _shortened(names: Iterable[str]) -> list[str]:
+    """The names, of a series its first and its last number."""
+    places: dict[str, list[str]] = {}
+    for name in names:
+        element = _ELEMENT.match(name)
+        base, place = (element[1], f"[{element[2]}]") if element else (name, "")
+        places.setdefault(base, []).append(place)
+    texts: list[str] = []
+    for base, each in places.items():
+        alone = [base] if "" in each else []
+        several = [place for place in each if place]
+        ends = [f"{base}{several[0]} to {several[-1]}"] if len(several) > 1 else []
+        texts += [*alone, *(ends or [base + place for place in several])]
+    return texts
+
+
+# Names with units, as files and the command line write them.
+
+
+def written_name(name: str, unit: str) -> str:
+    """A name with its unit: `taper_deg`, `rings[0].material.young_modulus_pa`, `radii_m[1]`."""
+    return with_suffix(name, unit_suffix(unit))
+
+
+def with_suffix(name: str, suffix: str) -> str:
+    """The name with a suffix, which stands before the place in a series."""
+    return re.sub(r"(\[\d+\])?$", lambda place: suffix + place[0], name, count=1)
+
+
+class Written:
+    """Parameters by every name, with and without units, and values as people write them."""
+
+    def __init__(self, plain: Mapping[str, Parameter]) -> None:
+        self.written = {written_name(name, p.unit): p for name, p in plain.items()}
+        self.by_key = {**self.written, **plain}
+        self._with_unit = self.written.keys() - plain.keys()
+
+    @classmethod
+    def of(cls, arm: Manipulator) -> Self:
+        """Those of an arm."""
+        return cls(parameters_by_every_name(arm))
+
+    def number(self, key: str, value: object, unit: str | None = None) -> float:
+        """A value in its SI unit: a number under a key with the unit, or text with its unit.
+
+        Args:
+            key: A name of `by_key`, or any other for a given unit.
+            value: Number or text.
+            unit: SI unit; None for that of the parameter.
+
+        Raises:
+            ValueError: Anything else.
+        """
+        unit = self.by_key[key].unit if unit is None else unit
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError(value)
+        if key in self._with_unit:
+            return from_written(read_quantity(str(value), "1"), unit)
+        if not isinstance(value, str) and value != 0 and unit != "1":
+            raise ValueError(value)
+        return read_quantity(str(value), unit)
+
+    def allowed(self, key: str, unit: str | None = None) -> str:
+        """Kind of value allowed under a key, in words."""
+        unit = self.by_key[key].unit if unit is None else unit
+        if key in self._with_unit:
+            return "a finite number without a unit, which the name holds"
+        units = ", ".join(unit_names(unit))
+        if not units:
+            return "a finite number without a unit"
+        under = f", or a number under {written_name(key, unit)}" if key in self.by_key else ""
+        return f"a finite number with its unit ({units}){under}"
+
+
+def from_written(value: float, unit: str) -> float:
+    """A value in SI units, from degrees where these are radians."""
+    return math.radians(value) if unit == "rad" else value
