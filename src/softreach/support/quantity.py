@@ -52,7 +52,7 @@ def quantity(value: float, unit: str = "", error: float = math.nan, digits: int 
     """
     if math.isfinite(value) and 0 < error < math.inf:
         return f"{_with_error(value, error, digits)} {unit}".rstrip()
-    return f"{value:.6g} {unit}".rstrip()
+    return f"{value:.6g}{unit if unit == '°' else f' {unit}'}".rstrip()
 
 
 def _with_error(value: float, error: float, digits: int) -> str:
