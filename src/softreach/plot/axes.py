@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.picture.projection import View, is_mirrored, plane_of, project, view_axes
+from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, project, view_axes
 from softreach.picture.shading import seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.plot.style import DPI, pyplot
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _TICK_GAP = 4.0  # points between an edge and its numbers
 _LABEL_GAP = np.array([23.0, 15.0])  # points between an edge beside or above its label and that
 _MARGIN = 0.04
+_OVER = 4  # the order of lines over images
 _ROOM = np.array([2.8, 3.2])  # inches for the image
 _AROUND = np.array([0.6, 0.7])  # inches for labels and key
 _TICK_ROOM = 0.42  # inches between ticks at least
@@ -123,16 +124,13 @@ class Panel:
             draw_box(ax, self.box, self.view, self.unit)
 
     def dot(self, points: Array, opacity: float = 1.0) -> None:
-        """Draw small dots over the image.
+        """Draw small dots over the image, places [m], shape (n, 3)."""
+        style = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4, "zorder": 3}
+        self.plot(self.unit.of(points), "o", markersize=3, alpha=opacity, **style)
 
-        Args:
-            points: Places [m], shape (n, 3).
-            opacity: From 0 to 1.
-        """
-        x, y = project(self.unit.of(points), self.view).T[:2]
-        x = -x if is_mirrored(self.view) else x
-        style = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4}
-        self.ax.plot(x, y, "o", markersize=3, alpha=opacity, zorder=3, **style)
+    def plot(self, points: Array, *marks: str, **style: Any) -> None:
+        """Draw a line or marks over the image, in the units of the axes, shape (n, 3)."""
+        self.ax.plot(*on_paper(points, self.view).T, *marks, **{"zorder": _OVER} | style)
 
     def _columns(self) -> int:
         return max(16, round(_inches(self.ax, self.extent)[0] * DPI))

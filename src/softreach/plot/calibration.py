@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.picture.projection import View, is_mirrored, plane_of, project, view_angles
+from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
 from softreach.plot.axes import bounding_box, draw_box, view_extent
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import figure_style, pyplot, write_note
-from softreach.support.arguments import as_given
+from softreach.plot.style import (
+    HasDataset,
+    dataset_of,
+    figure_style,
+    legend_above,
+    pyplot,
+    remark,
+    write_note,
+)
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
-from softreach.support.units import LengthUnit, handy_unit
+from softreach.support.units import LengthUnit, handy_unit, readable_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,16 +31,12 @@ _WIDTH = 7.2  # inches
 _SPACE, _ROW = 3.6, 1.75  # heights of the upper part and of each row of inputs [inch]
 _COLUMNS = 3
 _FAR = 4.0  # times the 95 % quantile, beyond which places would squash all others
-_SIZES = {"m": ("mm", 1e3), "Pa": ("kPa", 1e-3), "1": ("", 1.0)}
+_MILLIMETER = LengthUnit("mm", 1e-3)  # of inputs
 _MEASURED = "0.45"
 
 
-class _HasDataset(Protocol):
-    def to_dataset(self) -> xr.Dataset: ...
-
-
 def plot_calibration(
-    calibration: _HasDataset, *, view: View = "oblique", unit: Unit = None
+    calibration: HasDataset, *, view: View = "oblique", unit: Unit = None
 ) -> Figure:
     """Draw how far measured and predicted places of the markers are apart.
 
@@ -52,29 +53,24 @@ def plot_calibration(
         InvalidInput: Unknown view or unit, or no calibration.
         MissingExtra: matplotlib is not installed.
     """
-    if isinstance(calibration, type) or not hasattr(calibration, "to_dataset"):
-        raise InvalidInput("calibration", as_given(calibration), "what `calibrate` returned")
+    data = dataset_of("calibration", calibration, "calibrate", "residual")
     view_angles(view)
-    data = calibration.to_dataset()
-    if "residual" not in getattr(data, "variables", {}):
-        raise InvalidInput("calibration", as_given(calibration), "what `calibrate` returned")
     length = float(data.attrs["length"])
     shown = _Shown(data, unit_for(length, handy_unit(length) if unit is None else unit))
     inputs = shown.moving_inputs
     rows = math.ceil(len(inputs) / _COLUMNS)
     with figure_style():
-        plt = pyplot()
-        figure = plt.figure(figsize=(_WIDTH, _SPACE + _ROW * rows), layout="constrained")
-        parts = figure.subfigures(
-            2 if rows else 1, 1, height_ratios=[_SPACE, _ROW * rows][: 1 + (rows > 0)]
-        )
-        upper, lower = (parts[0], parts[1]) if rows else (parts, None)
+        size = (_WIDTH, _SPACE + _ROW * rows)
+        figure = pyplot().figure(figsize=size, layout="constrained")
+        heights = [_SPACE, _ROW * rows][: 1 + (rows > 0)]
+        parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+        upper = parts[0]
         grid = upper.add_gridspec(2, 2, width_ratios=[1.25, 1.0])
         _draw_places(upper.add_subplot(grid[:, 0]), shown, view)
         _draw_markers(upper.add_subplot(grid[0, 1]), shown)
         _draw_order(upper.add_subplot(grid[1, 1]), shown)
-        if lower is not None:
-            axes = lower.subplots(rows, min(_COLUMNS, len(inputs)), sharey=True, squeeze=False)
+        if rows:
+            axes = parts[1].subplots(rows, min(_COLUMNS, len(inputs)), sharey=True, squeeze=False)
             for ax, k in zip(axes.flat, inputs, strict=False):
                 _draw_input(ax, shown, k)
             for ax in axes[:, 0]:
@@ -86,7 +82,10 @@ def plot_calibration(
 
 class _Shown:
     def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
-        self.data, self.unit = data, unit
+        self.data, self.unit, self.label = data, unit, unit.label("error")
+        self.markers = [str(name) for name in data["marker"].values]
+        moving = np.ptp(data["input_value"].values, axis=0) > 0
+        self.moving_inputs: list[int] = np.flatnonzero(moving).tolist()
         self.measured = unit.of(data["measured"].values)
         residual = unit.of(data["residual"].values)
         self.predicted = self.measured + residual
@@ -98,25 +97,13 @@ class _Shown:
         colors = pyplot().get_cmap("tab10")
         self.colors = [colors(k % 10) for k in range(data.sizes["marker"])]
 
-    @property
-    def markers(self) -> list[str]:
-        return [str(name) for name in self.data["marker"].values]
-
-    @property
-    def label(self) -> str:
-        return self.unit.label("error")
-
-    @property
-    def moving_inputs(self) -> list[int]:
-        return np.flatnonzero(np.ptp(self.data["input_value"].values, axis=0) > 0).tolist()
-
     def scatter(self, ax: Axes, x: Array, marker: int) -> None:
         size = {"s": 9 if len(x) < 300 else 4, "linewidths": 0.6, "zorder": 3}
-        for rows, face in ((~self.held, self.colors[marker]), (self.held, "none")):
-            color: Any = self.colors[marker]
+        color: Any = self.colors[marker]
+        for rows, face in ((~self.held, color), (self.held, "none")):
             ax.scatter(x[rows], self.distance[rows, marker], color=face, edgecolors=color, **size)
 
-    def frame(self, ax: Axes, rows: NDArray[np.bool_] | None = None) -> None:
+    def frame(self, ax: Axes) -> None:
         ax.set_ylim(0.0, self.top)
         far = int((self.distance > self.top).sum())
         if far:
@@ -130,8 +117,7 @@ def _draw_places(ax: Axes, shown: _Shown, view: View) -> None:
     measured, predicted = shown.measured[near], shown.predicted[near]
     box = bounding_box(measured, predicted)
     colors = [shown.colors[k] for k in np.nonzero(near)[1]]
-    mirror = np.array([-1.0 if is_mirrored(view) else 1.0, 1.0])
-    here, there = (mirror * project(points, view)[:, :2] for points in (measured, predicted))
+    here, there = on_paper(measured, view), on_paper(predicted, view)
     lines = LineCollection(list(np.stack([here, there], axis=1)), colors=colors, linewidths=0.7)
     lines.set_zorder(2)
     ax.add_collection(lines)
@@ -140,12 +126,13 @@ def _draw_places(ax: Axes, shown: _Shown, view: View) -> None:
     ax.scatter(*there.T, s=size, facecolors="none", edgecolors=colors, linewidths=0.7, zorder=4)
     ax.scatter([], [], s=10, facecolors="none", edgecolors="0.2", linewidths=0.7, label="predicted")
     left, right, low, high = view_extent(box, view)
-    ax.set(xlim=(mirror[0] * left, mirror[0] * right), ylim=(low, high), aspect="equal")
+    mirror = -1 if is_mirrored(view) else 1
+    ax.set(xlim=(mirror * left, mirror * right), ylim=(low, high), aspect="equal")
     if plane := plane_of(view):
         ax.set(xlabel=shown.unit.label(plane[0]), ylabel=shown.unit.label(plane[1]))
     else:
         draw_box(ax, box, view, shown.unit)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, handletextpad=0.2)
+    legend_above(ax, 2, handletextpad=0.2)
 
 
 def _draw_markers(ax: Axes, shown: _Shown) -> None:
@@ -161,10 +148,7 @@ def _draw_markers(ax: Axes, shown: _Shown) -> None:
     if len(shown.markers) > 4:
         ax.tick_params(axis="x", labelrotation=40)
     ax.set(ylabel=shown.label, xlim=(-0.6, len(shown.markers) - 0.4))
-    words = "line: rms"
-    if shown.held.any():
-        words += "; hollow, dotted: held out"
-    ax.set_title(words, fontsize=7, color="0.25", loc="left")
+    remark(ax, "line: rms" + ("; hollow, dotted: held out" if shown.held.any() else ""))
     shown.frame(ax)
 
 
@@ -180,11 +164,10 @@ def _draw_order(ax: Axes, shown: _Shown) -> None:
 
 
 def _draw_input(ax: Axes, shown: _Shown, k: int) -> None:
-    unit = str(shown.data["input_unit"].values[k])
-    name, size = _SIZES.get(unit, (unit, 1.0))
-    values = size * shown.data["input_value"].values[:, k]
+    unit, values = str(shown.data["input_unit"].values[k]), shown.data["input_value"].values[:, k]
+    name, size = readable_unit(unit, 1e3, _MILLIMETER)
     for marker in range(len(shown.markers)):
-        shown.scatter(ax, values, marker)
+        shown.scatter(ax, values / size, marker)
     label = str(shown.data["input"].values[k])
     ax.set_xlabel(f"{label} [{name}]" if name else label)
     shown.frame(ax)

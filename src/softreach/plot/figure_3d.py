@@ -19,7 +19,7 @@ from softreach.picture.thumbnail import Dots, Skin
 from softreach.plot.arm import shapes_of
 from softreach.plot.axes import bounding_box
 from softreach.plot.clouds import drawn_tips, point_size
-from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey, color_map, color_samples
+from softreach.plot.coloring import BundleKey, ScalarKey, color_map, color_samples, key_entries
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import a_surface
 from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
@@ -316,11 +316,9 @@ def _length(thing: Any) -> float | None:
 def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
     if key is None:
         return []
-    marks = [("unstable", css_color(np.array(UNSTABLE) / 255))] if key.unstable else []
+    marks = [(label, css_color(rgb)) for label, rgb in key_entries(key)]
     if isinstance(key, BundleKey):
-        named = zip(key.labels, key.colors / 255, strict=True)
-        swatches = [(label, css_color(rgb)) for label, rgb in named]
-        return [Swatches([*swatches, *marks], key.title)]
+        return [Swatches(marks, key.title)]
     scale = color_map(key)
     shares = np.linspace(0.0, 1.0, 17)
     colors = [css_color(rgb[:3]) for rgb in scale.cmap(shares)]

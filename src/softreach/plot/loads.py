@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.picture.projection import View, is_mirrored, project, view_axes
+from softreach.picture.projection import View, on_paper
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.lengths import Unit, unit_for
@@ -36,7 +36,6 @@ _BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
 _ARROW = 26  # length of the arrow of gravity [points]
 _SHORTEST_ARROW = 0.1  # part of a direction in the paper, below which an arrow says nothing
 _LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
-_ABOVE = 4  # the order of lines over images
 _LARGEST = 0.2  # L, the longest half axis if the force is not given
 _CORNERS = 120
 _COLOR = "tab:orange"
@@ -91,10 +90,10 @@ def plot_equilibria(
         draw_arms(panel, arm, followed, range(arm.bundles))
         for k, circle in circles.items():
             color = _STABLE if stable[k] else _UNSTABLE
-            _line(panel, circle, color=color, linestyle=":", linewidth=0.8)
+            panel.plot(circle, color=color, linestyle=":", linewidth=0.8, solid_capstyle="round")
         for k, shape in enumerate(shapes):
-            _line(panel, counted.of(shape["position"].values), **_style(equilibria, k))
-        _line(panel, rim, color="0.2", linewidth=2.0)
+            panel.plot(counted.of(shape["position"].values), **_style(equilibria, k))
+        panel.plot(rim, color="0.2", linewidth=2.0, solid_capstyle="round")
         _gravity_arrow(panel, equilibria)
         _add_legend(panel.ax, own_figure=ax is None)
     return panel.ax
@@ -211,14 +210,9 @@ def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
         "color": _FOLLOWED if follows else _STABLE if stable else _UNSTABLE,
         "linestyle": "-" if stable else "--",
         "linewidth": 1.4 if stable or follows else 1.0,
+        "solid_capstyle": "round",
         "label": f"{kind}, from the unloaded arm" if follows else kind,
     }
-
-
-def _line(panel: Panel, points: Array, **style: Any) -> None:
-    right, up, _ = project(points, panel.view).T
-    mirror = -1 if is_mirrored(panel.view) else 1
-    panel.ax.plot(mirror * right, up, zorder=_ABOVE, solid_capstyle="round", **style)
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:
@@ -240,21 +234,20 @@ def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
     if equilibria.solver is None:
         return
     tables = equilibria.solver.tables
-    right, up, _ = view_axes(panel.view) @ equilibria.rod.pose.directions_to_world(tables.axes[0])
+    right, up = on_paper(equilibria.rod.pose.directions_to_world(tables.axes[0]), panel.view)
     if np.hypot(right, up) < _SHORTEST_ARROW:
         return
-    mirror = -1 if is_mirrored(panel.view) else 1
     panel.ax.annotate(
         "g" if any(tables.loads.gravity) else "force",
         xy=(0.09, 0.86),
         xycoords="axes fraction",
-        xytext=(-_ARROW * mirror * right, -_ARROW * up),
+        xytext=(-_ARROW * right, -_ARROW * up),
         textcoords="offset points",
         ha="center",
         va="center",
         fontsize=8,
         arrowprops={"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0},
-        zorder=_ABOVE,
+        zorder=4,
     )
 
 
@@ -276,12 +269,10 @@ def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
     """Outlines of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     circle = np.array([np.cos(turn), np.sin(turn)])
-    mirror = np.array([-1.0 if is_mirrored(view) else 1.0, 1.0])[:, None]
-    centers = project(tips, view)[:, :2, None]
     outlines = []
-    for center, matrix in zip(centers, axes, strict=True):
-        left, half, _ = np.linalg.svd(project(matrix.T, view).T[:2], full_matrices=False)
-        outlines.append(mirror * (center + (left * half) @ circle))
+    for tip, matrix in zip(tips, axes, strict=True):
+        left, half, _ = np.linalg.svd(on_paper(matrix.T, view).T, full_matrices=False)
+        outlines.append(on_paper(tip, view)[:, None] + (left * half) @ circle)
     return outlines
 
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import figure_style, pyplot
-from softreach.support.arguments import as_given
-from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput
-from softreach.support.units import LengthUnit, handy_unit, readable_unit
+from softreach.plot.style import (
+    HasDataset,
+    dataset_of,
+    figure_style,
+    legend_above,
+    pyplot,
+    remark,
+)
+from softreach.support.arrays import Mask
+from softreach.support.palette import BEST, MET, MISSED
+from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,18 +26,13 @@ if TYPE_CHECKING:
 
 _WIDTH = 7.2  # inches
 _ABOVE, _ROW, _ENDS = 2.5, 0.24, 0.75  # heights of panels, of a parameter, and around these [inch]
-_MET, _MISSED, _BEST = (0.13, 0.40, 0.60), (0.80, 0.12, 0.12), (0.90, 0.50, 0.05)
 _COARSE: dict[str, Any] = {"marker": "o", "s": 14, "facecolors": "none", "linewidths": 0.7}
-_FINAL: dict[str, Any] = {"marker": "D", "s": 24, "color": _BEST, "linewidths": 0, "zorder": 4}
-_OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": _MISSED, "linewidths": 0.8, "zorder": 3}
+_FINAL: dict[str, Any] = {"marker": "D", "s": 24, "color": BEST, "linewidths": 0, "zorder": 4}
+_OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": MISSED, "linewidths": 0.8, "zorder": 3}
 _MOST_LINES = 200
 
 
-class _HasDataset(Protocol):
-    def to_dataset(self) -> xr.Dataset: ...
-
-
-def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
+def plot_search(search: HasDataset, *, unit: Unit = None) -> Figure:
     """Draw what a search came to: designs that were judged, and the best in their ranges.
 
     Of one objective, its value against the designs that were looked at, with the best so far, and
@@ -46,11 +47,7 @@ def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
         InvalidInput: Unknown unit, or no search.
         MissingExtra: matplotlib is not installed.
     """
-    if isinstance(search, type) or not hasattr(search, "to_dataset"):
-        raise InvalidInput("search", as_given(search), "what `search` returned")
-    data = search.to_dataset()
-    if "objective_value" not in getattr(data, "variables", {}):
-        raise InvalidInput("search", as_given(search), "what `search` returned")
+    data = dataset_of("search", search, "search", "objective_value")
     length = float(data.attrs["length"])
     name = data.attrs["display_unit"] or handy_unit(length)
     shown = _Shown(data, unit_for(length, name if unit is None else unit))
@@ -80,7 +77,7 @@ class _Shown:
         count = data.sizes["design"]
         self.final: Mask = np.arange(count) >= count - int(data.attrs["finalists"])
         self.front: Mask = data["front"].values & self.final
-        self.looked_at = data["looked_at"].values
+        self.looked_at, self.senses = data["looked_at"].values, data["sense"].values
         self.values, self.errors = data["objective_value"].values, data["objective_error"].values
         self.labels: list[str] = []
         for k, own in enumerate(data["objective_unit"].values):
@@ -88,42 +85,30 @@ class _Shown:
             name, size = readable_unit(str(own), float(largest), unit)
             self.values[:, k] /= size
             self.errors[:, k] = np.nan_to_num(self.errors[:, k] / size)
-            objective = str(data["objective"].values[k])
-            between = " / " if name.startswith("L") else " ["
-            self.labels.append(
-                objective if not name else f"{objective}{between}{name}{']' * (between == ' [')}"
-            )
-
-    @property
-    def senses(self) -> Array:
-        return self.data["sense"].values
+            objective, relative = str(data["objective"].values[k]), name.startswith("L")
+            label = f"{objective} / {name}" if relative else f"{objective} [{name}]"
+            self.labels.append(label if name else objective)
 
 
 def _draw_progress(ax: Axes, shown: _Shown) -> None:
     value, at = shown.values[:, 0], shown.looked_at
     way, final = shown.feasible & ~shown.final, shown.feasible & shown.final
-    ax.scatter(at[way], value[way], edgecolors=_MET, label="on the way", zorder=3, **_COARSE)
+    ax.scatter(at[way], value[way], edgecolors=MET, label="on the way", zorder=3, **_COARSE)
     if way.any():
         best = np.maximum if shown.senses[0] > 0 else np.minimum
         so_far = best.accumulate(value[way])
         ends = [*at[way], shown.looked_at[-1]], [*so_far, so_far[-1]]
         ax.step(*ends, where="post", color="0.35", lw=0.9, zorder=2, label="best so far")
     if final.any():
-        bars = {"fmt": "none", "ecolor": _BEST, "elinewidth": 0.8, "capsize": 2, "zorder": 4}
+        bars = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "capsize": 2, "zorder": 4}
         ax.errorbar(at[final], value[final], shown.errors[final, 0], **bars)
         ax.scatter(at[final], value[final], label="full accuracy", **_FINAL)
-    _mark_missed(ax, shown)
-    ax.set(xlabel="designs looked at", ylabel=shown.labels[0])
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, handletextpad=0.3)
-
-
-def _mark_missed(ax: Axes, shown: _Shown) -> None:
-    """Crosses along the lower edge where designs miss requirements, which have no value."""
     out = ~shown.feasible & ~shown.final
-    if out.any():
+    if out.any():  # which have no value
         places = {"transform": ax.get_xaxis_transform(), "clip_on": False}
-        at = shown.looked_at[out]
-        ax.scatter(at, np.zeros(len(at)), label="requirements missed", **places, **_OUT)
+        ax.scatter(at[out], np.zeros(out.sum()), label="requirements missed", **places, **_OUT)
+    ax.set(xlabel="designs looked at", ylabel=shown.labels[0])
+    legend_above(ax, 4, handletextpad=0.3)
 
 
 def _draw_fidelities(ax: Axes, shown: _Shown) -> None:
@@ -135,33 +120,28 @@ def _draw_fidelities(ax: Axes, shown: _Shown) -> None:
     if not known.any():
         ax.set_axis_off()
         return
+    errors = shown.errors[rows[known], 0], shown.errors[before[known], 0]
     bars = {"fmt": "none", "ecolor": "0.5", "elinewidth": 0.7, "capsize": 2, "zorder": 2}
-    ax.errorbar(
-        coarse[known],
-        full[known],
-        shown.errors[rows[known], 0],
-        shown.errors[before[known], 0],
-        **bars,
-    )
+    ax.errorbar(coarse[known], full[known], *errors, **bars)
     ax.scatter(coarse[known], full[known], **_FINAL)
     first = float(full[known][0])
     ax.axline((first, first), slope=1.0, color="0.7", lw=0.7, zorder=1)
     ax.set(xlabel=f"{shown.labels[0]}, coarse", ylabel="full accuracy")
-    ax.set_title("the best, judged again", fontsize=7, color="0.25", loc="left")
+    remark(ax, "the best, judged again")
     ax.locator_params(nbins=4)
 
 
 def _draw_front(ax: Axes, shown: _Shown) -> None:
     way = shown.feasible & ~shown.final
-    ax.scatter(*shown.values[way].T, edgecolors=_MET, label="on the way", zorder=3, **_COARSE)
+    ax.scatter(*shown.values[way].T, edgecolors=MET, label="on the way", zorder=3, **_COARSE)
     rows = np.flatnonzero(shown.front & shown.feasible)
     if len(rows):
         points = shown.values[rows]
         points = points[np.argsort(points[:, 0])]
         # Between two designs nothing is known to be better than the worse one of each value.
         where = "post" if shown.senses[0] < 0 else "pre"
-        ax.step(*points.T, where=where, color=_BEST, lw=0.9, zorder=2)
-        bars = {"fmt": "none", "ecolor": _BEST, "elinewidth": 0.8, "zorder": 4}
+        ax.step(*points.T, where=where, color=BEST, lw=0.9, zorder=2)
+        bars = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zorder": 4}
         ax.errorbar(*shown.values[rows].T, *shown.errors[rows].T[::-1], **bars)
         ax.scatter(*shown.values[rows].T, label="front, full accuracy", **_FINAL)
     words = [
@@ -169,7 +149,7 @@ def _draw_front(ax: Axes, shown: _Shown) -> None:
         for label, sense in zip(shown.labels, shown.senses, strict=True)
     ]
     ax.set(xlabel=words[0], ylabel=words[1])
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.3)
+    legend_above(ax, handletextpad=0.3)
 
 
 def _draw_missed(ax: Axes, shown: _Shown) -> None:
@@ -179,7 +159,7 @@ def _draw_missed(ax: Axes, shown: _Shown) -> None:
     met, never = way & shown.feasible, way & ~np.isfinite(excess)
     out = way & ~met & ~never
     if met.any():
-        ax.scatter(at[met], excess[met], edgecolors=_MET, label="met", **_COARSE)
+        ax.scatter(at[met], excess[met], edgecolors=MET, label="met", **_COARSE)
     if out.any():
         ax.scatter(at[out], excess[out], label="missed", **_OUT)
     if never.any():
@@ -188,7 +168,7 @@ def _draw_missed(ax: Axes, shown: _Shown) -> None:
         ax.scatter(at[never], np.ones(never.sum()), label="no such arm", **top, **style)
     ax.set(xlabel="designs looked at", ylabel="requirements missed, sum [-]")
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]), top=None if out.any() else 1.0)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.3)
+    legend_above(ax, handletextpad=0.3)
 
 
 def _draw_objectives(ax: Axes, shown: _Shown) -> None:
@@ -225,7 +205,7 @@ def _draw_ranges(ax: Axes, shown: _Shown) -> None:
         ax.hlines(k, 0.0, 1.0, color="0.85", lw=0.8, zorder=0)
         met, out = way & shown.feasible, way & ~shown.feasible
         small = {"s": 9, "linewidths": 0.5, "alpha": 0.6}
-        ax.scatter(shares[met, k], np.full(met.sum(), k), edgecolors=_MET, **{**_COARSE, **small})
+        ax.scatter(shares[met, k], np.full(met.sum(), k), edgecolors=MET, **{**_COARSE, **small})
         ax.scatter(shares[out, k], np.full(out.sum(), k), **{**_OUT, **small})
         ax.scatter(shares[rows, k], np.full(len(rows), k), **_FINAL)
         for place, end, across in ((-0.01, low[k], "right"), (1.01, high[k], "left")):
@@ -235,14 +215,12 @@ def _draw_ranges(ax: Axes, shown: _Shown) -> None:
     ax.tick_params(axis="y", length=0, pad=42)
     ax.set(xlim=(-0.02, 1.1), ylim=(count - 0.4, -0.6), xticks=[])
     word = "the best" if len(rows) < 2 else "the front"
-    ax.set_title(f"free parameters in their ranges, {word} ◆", fontsize=7, color="0.25", loc="left")
-    for side in ("top", "right", "bottom", "left"):
-        ax.spines[side].set_visible(False)
+    remark(ax, f"free parameters in their ranges, {word} ◆")
+    ax.spines[:].set_visible(False)
 
 
 def _end_text(shown: _Shown, k: int, end: float) -> str:
     choices = str(shown.data["choices"].values[k])
     if choices:
         return choices.split(", ")[round(end)]
-    name, size = readable_unit(str(shown.data["parameter_unit"].values[k]), end, shown.unit)
-    return f"{end / size:.4g}{name if name == '°' else f' {name}'}".rstrip()
+    return readable(end, str(shown.data["parameter_unit"].values[k]), shown.unit)
