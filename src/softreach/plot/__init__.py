@@ -19,12 +19,16 @@ from softreach.plot.calibration import plot_calibration
 from softreach.plot.check import plot_check
 from softreach.plot.clouds import plot_cloud, plot_slab, plot_views
 from softreach.plot.cross_section import plot_cross_section
-from softreach.plot.curvature import plot_curvature
 from softreach.plot.figure_3d import Figure3D, plot_3d
 from softreach.plot.loads import plot_compliance, plot_equilibria, plot_payload_curve
-from softreach.plot.redundancy import plot_distance, plot_distance_histograms, plot_redundancy
 from softreach.plot.search import plot_search
 from softreach.plot.sets import plot_hull, plot_slice, plot_slices, plot_volume_curve
+from softreach.plot.statistics import (
+    plot_curvature,
+    plot_distance,
+    plot_distance_histograms,
+    plot_redundancy,
+)
 from softreach.plot.style import save_figure
 
 __all__ = [

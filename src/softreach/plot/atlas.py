@@ -163,7 +163,7 @@ def plot_cloud_sheet(
         if not unit.relative:
             raise InvalidInput("cloud.tip.attrs['length']", None, "L [m], the unit of the sheet")
         tips = drawn_tips(cloud, unit)
-        pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
+        pixels = point_size(len(tips), box) * columns / extent.size[0]
         buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
         colors = activation_colors(bundle_activations(cloud).values)
         buffer.draw_points(tips, colors, max(1.0, pixels), view=_VIEW)
@@ -220,12 +220,8 @@ def panel_extent(box: Array, view: View) -> Extent:
     axes = view_axes(view)[:2]
     x, y = axes @ middle
     w, h = 1.2 * np.linalg.norm(axes * half, axis=1)
-    return Extent(
-        max(limits.left, x - w),
-        min(limits.right, x + w),
-        max(limits.bottom, y - h),
-        min(limits.top, y + h),
-    )
+    left, right = max(limits.left, x - w), min(limits.right, x + w)
+    return Extent(left, right, max(limits.bottom, y - h), min(limits.top, y + h))
 
 
 def plot_opposite_sides(
@@ -364,10 +360,9 @@ def _sheet(
     """A sheet of images; the threads find and draw the contents, the caller places them."""
     with figure_style():
         extent = panel_extent(box, _VIEW)
-        spans = extent.right - extent.left, extent.top - extent.bottom
-        counts = len(across.values), len(up.values)
-        spread = ([span] * count for span, count in zip(spans, counts, strict=True))
-        figure, panels = place_panels(PAGE, *spread, (_LEFT, _RIGHT, _BOTTOM, _TOP))
+        wide, high = extent.size.tolist()
+        columns, rows = [wide] * len(across.values), [high] * len(up.values)
+        figure, panels = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, _TOP))
         panels = panels[::-1]  # row 0 at the bottom
         for ax in panels.ravel().tolist():
             ax.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
@@ -381,11 +376,11 @@ def _sheet(
         middle = (_LEFT + width - _RIGHT) / 2 / width, (_BOTTOM + height - _TOP) / 2 / height
         figure.text(middle[0], 0.12 / height, across.label, ha="center", fontsize=9)
         figure.text(0.1 / width, middle[1], up.label, va="center", rotation=90, fontsize=9)
-        columns = max(16, round(panels[0, 0].get_position().width * width * DPI))
+        across_each = max(16, round(panels[0, 0].get_position().width * width * DPI))
 
         def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
             content = content_at(column, row)
-            return None if content is None else image(content, extent, columns).rgba()
+            return None if content is None else image(content, extent, across_each).rgba()
 
         tasks = (partial(pixels, *place) for place in np.ndindex(panels.shape))
         for ax, rgba in zip(panels.ravel().tolist(), parallel.in_order(tasks), strict=True):

@@ -97,14 +97,7 @@ def plot_cloud(
 
 
 def cloud_image(panel: Panel, tips: Array, rgb: NDArray[np.uint8], size: float | None) -> ZBuffer:
-    """The image of points in a panel.
-
-    Args:
-        panel: Where it will be shown.
-        tips: In the units of the axes, shape (n, 3).
-        rgb: From 0 to 255, shape (n, 3).
-        size: As in `plot_cloud`.
-    """
+    """The image in a panel of tips in its unit, shape (n, 3), with RGB from 0 to 255, (n, 3)."""
     spread = point_size(len(tips), panel.box) * panel.pixels_per_unit
     pixels = size or min(_LARGEST, spread)
     # small points gain nothing from smoothing; fine steps of color drown in their noise
@@ -180,8 +173,7 @@ def plot_slab(
     coloring = color_samples(cloud, color)
     with figure_style(ax):
         panel = Panel.opened(tips, counted, ax, view, box)
-        extent = panel.extent
-        area = (extent.right - extent.left) * (extent.top - extent.bottom) / inside.sum()
+        area = np.prod(panel.extent.size) / inside.sum()
         # about the mean spacing in the plane, which closes the slab
         spacing = float(np.clip(1.2 * np.sqrt(area) * panel.pixels_per_unit, 2.0, 8.0))
         panel.show(cloud_image(panel, tips[inside], coloring.rgb[inside], size or spacing))

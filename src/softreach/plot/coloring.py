@@ -95,11 +95,7 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
     Raises:
         InvalidInput: No such bundle, or an array of another length.
     """
-    return _marked(_colored(cloud, color), cloud)
-
-
-def _marked(coloring: Coloring, cloud: xr.Dataset) -> Coloring:
-    """Unstable samples in their own color, which the key explains."""
+    coloring = _colored(cloud, color)
     unstable = cloud["status"].values == 1 if "status" in cloud else np.zeros(0, bool)
     if not unstable.any():
         return coloring

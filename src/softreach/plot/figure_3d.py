@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -131,7 +131,7 @@ class Scene:
     def add(self, things: Sequence[Any]) -> None:
         """Things to show, one after the other."""
         for thing in things:
-            _ADD[_kind(thing)](self, thing)
+            getattr(self, f"add_{_kind(thing)}")(thing)
 
     def points(self) -> list[ArrayLike]:
         """All places, one array for each part."""
@@ -145,9 +145,7 @@ class Scene:
         if len(known) > _POINTS:
             chosen = np.sort(np.random.default_rng(0).choice(known, _POINTS, replace=False))
         shown, of = f"{len(chosen):,}", f"{len(known):,}"
-        self.notes.append(
-            f"{shown} points" if shown == of else f"{shown} of {of} points, at random"
-        )
+        self.notes.append(f"{of} points" if shown == of else f"{shown} of {of} points, at random")
         self.captions.append(f"Cloud of {of} tips")
         name, tips = self._name("cloud"), tips[chosen]
         dots = Dots(tips, coloring.rgb[chosen])
@@ -263,28 +261,16 @@ class Scene:
         return word if number == 1 else f"{word} #{number}"
 
 
-_ADD: dict[str, Callable[[Scene, Any], None]] = {
-    "cloud": Scene.add_cloud,
-    "set": Scene.add_set,
-    "hull": Scene.add_hull,
-    "surface": Scene.add_surface,
-    "arm": Scene.add_arm,
-    "configuration": Scene.add_configuration,
-    "equilibria": Scene.add_equilibria,
-}
+_CLASSES = {"AllEquilibria": "equilibria", "ReachableSet": "set", "Hull": "hull"}
 
 
 def _kind(thing: Any) -> str:
     """The kind of a thing to show, by its class, which need not be loaded, or by what it has."""
-    bases = {base.__name__ for base in type(thing).__mro__}
+    bases = [base.__name__ for base in type(thing).__mro__]
     if isinstance(thing, Manipulator):
         return "arm"
-    if "AllEquilibria" in bases:
-        return "equilibria"
-    if "ReachableSet" in bases:
-        return "set"
-    if "Hull" in bases:
-        return "hull"
+    if known := [_CLASSES[name] for name in bases if name in _CLASSES]:
+        return known[0]
     if "Dataset" in bases and "tip" in thing and "activation" in thing:
         a_cloud("data", thing)
         return "cloud"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ from softreach.schema import a_configuration
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
+from softreach.support.quantity import round_below
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,7 +143,9 @@ def plot_compliance(
         raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
     if len(matrices) != len(shapes):
         raise InvalidInput("compliance", f"{len(matrices)} of them", f"one each of {len(shapes)}")
-    force = _round_force(matrices, arm.length) if force is None else force
+    if force is None:  # that keeps the ellipsoids small
+        softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
+        force = round_below(_LARGEST * arm.length / softest)
     if not 0 < force < np.inf:
         raise InvalidInput("force", force, "> 0 N")
     counted = unit_for(arm.length, unit)
@@ -274,11 +276,3 @@ def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
         left, half, _ = np.linalg.svd(on_paper(matrix.T, view).T, full_matrices=False)
         outlines.append(on_paper(tip, view)[:, None] + (left * half) @ circle)
     return outlines
-
-
-def _round_force(matrices: Array, length: float) -> float:
-    """The largest of 1, 2, 5, 10, ... [N] that keeps the ellipsoids small."""
-    softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
-    most = _LARGEST * length / softest
-    power = 10.0 ** math.floor(math.log10(most))
-    return max(power * digit for digit in (1.0, 2.0, 5.0) if power * digit <= most * (1 + 1e-9))

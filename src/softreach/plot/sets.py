@@ -233,12 +233,12 @@ def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
     across, up = plane
     name = "count" if "count" in layer else "occupied"
     shown = np.minimum(layer[name].transpose(up, across).values.astype(int), len(_COLORS) - 1)
-    centers = unit.of(layer[across].values), unit.of(layer[up].values)
+    x, y = unit.of(layer[across].values), unit.of(layer[up].values)
     half = float(unit.of(layer.attrs["cell"])) / 2
     ax.imshow(
         shown,
         origin="lower",
-        extent=[end for x in centers for end in (x[0] - half, x[-1] + half)],
+        extent=(x[0] - half, x[-1] + half, y[0] - half, y[-1] + half),
         cmap=ListedColormap(_COLORS),
         vmin=-0.5,
         vmax=len(_COLORS) - 0.5,
@@ -247,7 +247,7 @@ def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
     if "degree" in layer:
         folded = (layer["count"] > abs(layer["degree"])).transpose(up, across).values
         if folded.any():
-            ax.contour(*centers, folded.astype(float), levels=[0.5], colors="black", linewidths=0.6)
+            ax.contour(x, y, folded.astype(float), levels=[0.5], colors="black", linewidths=0.6)
     ax.set(xlabel=unit.label(across), ylabel=unit.label(up), aspect="equal")
     if is_mirrored(view) and not ax.xaxis_inverted():
         ax.invert_xaxis()

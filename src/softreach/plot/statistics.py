@@ -1,4 +1,4 @@
-"""Pictures of redundancy: activation distance D̄ in space, its distribution, and sheets."""
+"""Pictures of what clouds are asked: activation distance D̄, redundancy, curvature."""
 
 from __future__ import annotations
 
@@ -24,10 +24,12 @@ from softreach.plot.lengths import Unit, common_unit, unit_of
 from softreach.plot.style import (
     LENGTH,
     PAGE,
+    as_axes,
     figure_style,
     panel_arguments,
     place_panels,
     pyplot,
+    small_axes,
     write_note,
 )
 from softreach.schema import a_cloud
@@ -37,6 +39,7 @@ from softreach.support.arguments import (
     as_flag,
     as_mapping,
     as_number,
+    as_one_of,
 )
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -52,6 +55,13 @@ _LABEL = "mean activation distance D̄"
 _BINS = 60
 _AROUND, _GAPS = (0.75, 0.1, 0.4, 0.55), (0.12, 0.95)  # of panels [inch]
 _a_distance = partial(as_dataset, kind="DataArray")
+_COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
+_SYMBOLS = {"bending": "κ", "torsion": "u₃", "extension": "ζ"}
+_COARSE = 64  # bins of a distribution of curvature
+
+
+def _some_statistics(name: str, value: object) -> xr.Dataset:
+    return as_dataset(name, value, "bending_count", "Z")
 
 
 def plot_distance(
@@ -185,9 +195,10 @@ def plot_redundancy(
                 plot_slab(cloud, ax=ax, view=view, thickness=thickness, color=rgb, **shared)
             plot_distance(cloud, distances[title], ax=row[3], high=high, **shared)
             for ax, key in ((row[0], coloring.key), (row[3], ScalarKey("D̄", 0.0, high))):
-                bar = ax.inset_axes((0.05, 1.05, 0.9, 0.035))
-                options = {"location": "top", "label": key.label, "ticks": MaxNLocator(4)}
-                figure.colorbar(color_map(key), cax=bar, **options)
+                if isinstance(key, ScalarKey):
+                    bar = ax.inset_axes((0.05, 1.05, 0.9, 0.035))
+                    options = {"location": "top", "label": key.label, "ticks": MaxNLocator(4)}
+                    figure.colorbar(color_map(key), cax=bar, **options)
             for ax in row[1:]:
                 ax.set(ylabel="", yticklabels=[])
             row[0].set_ylabel(f"{title}\n{row[0].get_ylabel()}")
@@ -206,3 +217,81 @@ def _draw_histogram(ax: Any, values: Array, edges: Array) -> None:
         ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
         text = f"median {median:.3f}\nisolated {1 - len(finite) / len(values):.2%}"
         write_note(ax, text, 0.98, 0.98)
+
+
+def plot_curvature(
+    statistics: Mapping[str, xr.Dataset],
+    *,
+    ax: Axes | None = None,
+    quantity: str = "bending",
+    unit: Unit = None,
+) -> Axes:
+    """Distributions at the stations of one or two designs (figure 3c); dots are medians.
+
+    Each distribution is drawn to the same width. Curvatures are shown times L, or in 1/m if the
+    statistics do not know L, unless there is a unit.
+
+    Args:
+        statistics: Label -> what `curvature_statistics` returned; the first is drawn to the left
+            of each station and the second to the right.
+        ax: Axes to draw in; None for a new figure.
+        quantity: "bending", "torsion" or "extension".
+        unit: Of lengths: "m", "cm", "mm" or "L"; None for L if the statistics know it, else m.
+
+    Raises:
+        InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
+            the arm, or designs of which only one knows L.
+    """
+    statistics, ax = as_mapping("statistics", statistics, _some_statistics), as_axes(ax)
+    if not 1 <= len(statistics) <= 2:
+        raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
+    as_one_of("quantity", quantity, _SYMBOLS)
+    units = [unit_of(data, unit) for data in statistics.values()]
+    counted = common_unit(units)
+    every = zip(units, statistics.values(), strict=True)
+    places, *others = [own.of(data["Z"].values) for own, data in every]
+    for other in others:
+        if other.shape != places.shape or not np.allclose(other, places):
+            raise InvalidInput("stations", other.tolist(), f"those of the first: {places.tolist()}")
+    symbol, per_length = _SYMBOLS[quantity], quantity != "extension"
+    if per_length:
+        symbol += "L" if counted.relative else f" [1/{counted.name}]"
+    with figure_style(ax):
+        ax = small_axes() if ax is None else ax
+        sides = (-1, 1) if len(statistics) == 2 else (0,)
+        both = zip(statistics.items(), sides, _COLORS, units, strict=False)
+        for (label, data), side, color, own in both:
+            scale = own.size if per_length else 1.0
+            _draw_side(ax, data, quantity, side, color, label, scale)
+        ax.set(xlabel=counted.label("station Z"), ylabel=symbol)
+        digits = ".2g" if counted.relative else ".4g"
+        ax.set_xticks(range(len(places)), [f"{place:{digits}}" for place in places])
+        ax.legend(loc="upper left")
+    return ax
+
+
+def _draw_side(
+    ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str, scale: float
+) -> None:
+    medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
+    for k in range(len(medians)):
+        edges, density = _coarse(data.isel(station=k), quantity)
+        reach = 0.46 * density / density.max()
+        low, high = (k - reach if side <= 0 else k), (k + reach if side >= 0 else k)
+        name = label if k == 0 else None
+        ax.fill_betweenx(
+            edges * scale, low, high, color=color, alpha=0.75, lw=0.3, ec="w", label=name
+        )
+    ax.plot(np.arange(len(medians)) + 0.1 * side, medians, ".", color="k", ms=3, zorder=3)
+
+
+def _coarse(data: xr.Dataset, quantity: str) -> tuple[Array, Array]:
+    """Centers of fewer bins, between the smallest and largest value, and counts per width."""
+    count, edges = data[f"{quantity}_count"].values, data[f"{quantity}_edge"].values
+    used = np.flatnonzero(count)
+    first, last = used[0], used[-1] + 1
+    ends = np.unique(np.linspace(first, last, _COARSE + 1).astype(int))
+    sums = np.add.reduceat(count, ends[:-1])
+    sums[-1] = count[ends[-2] : last].sum()
+    centers = (edges[ends[:-1]] + edges[ends[1:]]) / 2
+    return centers, sums / np.diff(edges[ends])
