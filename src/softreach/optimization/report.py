@@ -124,7 +124,7 @@ def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[Sequence[str]]
             reach = f"one of {', '.join(_number_text(each, x, unit) for x in each.choices)}"
         else:
             low = each.low / readable_unit(each.unit, each.high, unit)[1]
-            reach = f"{low:.6g} to {readable(each.high, each.unit, unit)}"
+            reach = f"{low:.5g} to {readable(each.high, each.unit, unit)}"
         end = f", at its {ends[name]} end" if name in ends else ""
         yield name, _number_text(each, values[name], unit) + end, reach
     for tie in parameters.ties:

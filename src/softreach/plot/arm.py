@@ -109,16 +109,14 @@ def draw_arms(
     bundles: Collection[int],
     fade: float = 0.0,
 ) -> None:
-    """One image of all shapes, over what the axes hold."""
+    """One image of all shapes, over what the axes hold, and their markers in front."""
     if shapes:
         panel.show(*arm_images(panel, arm, shapes, bundles, fade))
         draw_markers(panel, arm, shapes, fade)
 
 
-def draw_markers(
-    panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float = 0.0
-) -> None:
-    """Small dots where the markers of all shapes are, in front of everything."""
+def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
+    """Small dots where the markers of all shapes are."""
     if arm.markers and shapes:
         panel.dot(np.concatenate([marker_points(arm, shape) for shape in shapes]), 1.0 - fade)
 
@@ -141,12 +139,11 @@ def arm_images(
             draw_mesh(buffer, panel.unit.of(body.vertices), part, BODY, panel.view, fade)
         skins = bundle_skins(arm, shape, lift=0.008)
         for index in bundles:
-            color, points, faces = bundle_color(index), skins[index].vertices, skins[index].faces
-            places = panel.unit.of(points)
-            draw_mesh(buffer, places, faces, color, panel.view, fade)
+            points, faces = panel.unit.of(skins[index].vertices), skins[index].faces
+            look = bundle_color(index), panel.view, fade
+            draw_mesh(buffer, points, faces, *look)
             if clear:
-                faces = faces_to_eye(points, faces, panel.view)
-                draw_mesh(within, places, faces, color, panel.view, fade)
+                draw_mesh(within, points, faces_to_eye(points, faces, panel.view), *look)
     return buffer, within if clear else None
 
 
@@ -179,29 +176,22 @@ def plot_designs(
         InvalidInput: A station off an arm, or an unknown view.
         MissingExtra: matplotlib is not installed.
     """
-    if not isinstance(panels, list | tuple):
-        raise InvalidInput("panels", as_given(panels), "a list or tuple")
+    if not isinstance(panels, list | tuple) or not panels:
+        raise InvalidInput("panels", as_given(panels), "a list or tuple of DesignPanels")
     for k, panel in enumerate(panels):
         as_instance(f"panels[{k}]", panel, DesignPanel, "a DesignPanel")
-    if not panels:
-        raise InvalidInput("panels", "none", "at least one DesignPanel")
     stations = as_stations("stations_over_length", stations_over_length).tolist()
     width = 1.5 * len(panels) if width is None else as_number("width", width, WIDTH)
     box = bounding_box(
         *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
     )
-    reach = 1.08 * max(
-        section_reach(p.arm, s * p.arm.length) / p.arm.length
-        for p in panels
-        for s in (*stations, 0.0)
-    )
-    rows = 1 + len(stations)
+    places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
+    reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
     with figure_style():
         heights = [2.6, *[width / len(panels)] * len(stations)]
         shape = {"height_ratios": heights, "layout": "constrained", "squeeze": False}
-        figure, axes = pyplot().subplots(
-            rows, len(panels), figsize=(width, sum(heights) + 0.1), **shape
-        )
+        size = (width, sum(heights) + 0.1)
+        figure, axes = pyplot().subplots(len(heights), len(panels), figsize=size, **shape)
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
             drawn, shown = panel.bundles, length * box

@@ -316,17 +316,15 @@ def _draw_contours(
     low = np.array([across.values[0], up.values[0]])
     span = np.array([across.values[-1], up.values[-1]]) - low
     paths = ((np.asarray(path.vertices, float) - low) / span for path in lines.get_paths())
-    places = [low + span * place for path in paths for place in _label_place(path)]
+    places = []
+    for path in paths:  # far from every edge
+        inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
+        if len(inside):
+            distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
+            places.append(low + span * inside[distance.argmin()])
     if places:
         decimals = max(0, math.ceil(-math.log10(levels[1] - levels[0])))
         ax.clabel(lines, manual=places, fontsize=6, fmt=f"%.{decimals}f")
-
-
-def _label_place(path: Array) -> list[Array]:
-    """Place on a contour, from 0 to 1 across and up, that is far from every edge."""
-    inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
-    distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
-    return [inside[distance.argmin()]] if len(inside) else []
 
 
 def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smallest: bool) -> None:

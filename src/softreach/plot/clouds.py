@@ -242,6 +242,6 @@ def plot_views(
             for image, within in drawn:
                 panel.show(image, within)
             if arm is not None:
-                draw_markers(panel, arm, shapes)
+                draw_markers(panel, arm, shapes, 0.0)
         draw_figure_key(figure, coloring.key, _AROUND[3] / height)
     return figure

@@ -16,7 +16,7 @@ from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import figure_style, panel_arguments, small_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
+from softreach.support.arguments import POSITIVE, as_given, as_number
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 from softreach.support.quantity import round_below
@@ -107,7 +107,6 @@ def plot_compliance(
     ax: Axes | None = None,
     view: View = "front",
     force: float | None = None,
-    rest: bool = False,
     box: ArrayLike | None = None,
     unit: Unit = None,
 ) -> Axes:
@@ -122,7 +121,6 @@ def plot_compliance(
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
         force: Size of the force [N]; None for a round one.
-        rest: Whether to draw the arm at rest too.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
         unit: As in `plot_arm`.
 
@@ -133,7 +131,7 @@ def plot_compliance(
         InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
         MissingExtra: matplotlib is not installed.
     """
-    arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
+    arm = a_manipulator("arm", arm)
     shapes = shapes_of(a_configuration("configuration", configuration))
     values = as_floats("compliance", compliance)
     force = None if force is None else as_number("force", force, POSITIVE)
@@ -156,7 +154,7 @@ def plot_compliance(
             surfaces = [arm_points(arm, shape, counted) for shape in shapes]
             half = np.linalg.norm(axes, axis=2)  # of the boxes around the ellipsoids
             box = counted.size * bounding_box(*surfaces, tips - half, tips + half)
-        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box, unit=counted)
+        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=False, box=box, unit=counted)
         for outline in _outlines(tips, axes, view):
             ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
             ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
@@ -169,7 +167,6 @@ def plot_payload_curve(
     *,
     ax: Axes | None = None,
     largest: Sequence[LargestPayload] = (),
-    label: str | None = None,
 ) -> Axes:
     """Draw the share of the reachable volume against the payload, with its errors.
 
@@ -177,7 +174,6 @@ def plot_payload_curve(
         curve: What `payload_curve` gives.
         ax: Axes to draw in; None for a new figure.
         largest: Payloads to mark, from `PayloadCurve.largest_payload`.
-        label: What a legend calls the curve.
 
     Returns:
         The axes, payloads in kg.
@@ -190,7 +186,7 @@ def plot_payload_curve(
     mass, share = zip(*sorted(points), strict=True)
     with figure_style(ax):
         ax = small_axes(3.4, 2.6) if ax is None else ax
-        (line,) = ax.plot(mass, share, linewidth=1.2, label=label)
+        (line,) = ax.plot(mass, share, linewidth=1.2)
         style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
         ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)
         for point in largest:
@@ -199,8 +195,6 @@ def plot_payload_curve(
             ax.plot(point.payload, point.share, "o", markersize=4, mfc="white", color="0.3")
         ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
         ax.set(xlim=(0.0, None), ylim=(0.0, None))
-        if label is not None:
-            ax.legend(loc="upper right")
     return ax
 
 

@@ -14,6 +14,7 @@ __all__ = [
     "Color",
     "activation_colors",
     "bundle_color",
+    "eight_bit",
     "material_fill",
 ]
 
@@ -70,6 +71,12 @@ _BLOCK = 1 << 15  # samples at a time: temporary arrays stay in the cache
 def material_fill(index: int) -> tuple[Color, str]:
     """Color and hatch of a material in sections; they repeat after six."""
     return _MATERIALS[index % len(_MATERIALS)]
+
+
+def eight_bit(color: Color) -> tuple[int, int, int]:
+    """A color in channels from 0 to 255."""
+    red, green, blue = (round(255 * channel) for channel in color)
+    return red, green, blue
 
 
 def bundle_color(index: int) -> Color:

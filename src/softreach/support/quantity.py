@@ -49,12 +49,12 @@ def quantity(value: float, unit: str = "", error: float = math.nan, digits: int 
     Args:
         value: The number.
         unit: What it counts.
-        error: How far off it may be, same unit; without one the value has six digits.
+        error: How far off it may be, same unit; without one the value has five digits.
         digits: Number of digits of the error.
     """
     if math.isfinite(value) and 0 < error < math.inf:
         return f"{_with_error(value, error, digits)} {unit}".rstrip()
-    return f"{value:.6g}{unit if unit == '°' else f' {unit}'}".rstrip()
+    return f"{value:.5g}{unit if unit == '°' else f' {unit}'}".rstrip()
 
 
 def _with_error(value: float, error: float, digits: int) -> str:
