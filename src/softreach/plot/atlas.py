@@ -273,21 +273,16 @@ def _axis(values: xr.DataArray) -> SheetAxis:
     si_unit = values.attrs.get("units", "1")
     unit = _UNITS.get(si_unit, si_unit)
     shown = np.degrees(values.values) if si_unit == "rad" else values.values
-    name = _name(values)
+    name = values.attrs.get("symbol", _plain(str(values.name)))
+    if "symbol" in values.attrs and _INDEXED.search(name):
+        name = "$" + _INDEXED.sub(r"\1_\2", name) + "$"
+    if "symbol" in values.attrs and (part := values.attrs.get("part")):
+        name += f" of {_plain(part)}"
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
 
 
 def _plain(name: str) -> str:
     return name.replace("_", " ")
-
-
-def _name(values: xr.DataArray) -> str:
-    if "symbol" not in values.attrs:
-        return _plain(str(values.name))
-    symbol = values.attrs["symbol"]
-    if _INDEXED.search(symbol):
-        symbol = "$" + _INDEXED.sub(r"\1_\2", symbol) + "$"
-    return f"{symbol} of {_plain(part)}" if (part := values.attrs.get("part")) else symbol
 
 
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:

@@ -131,7 +131,12 @@ def bounding_box(*points: ArrayLike) -> Array:
     Raises:
         InvalidInput: No finite point to show.
     """
-    corners = [corner for cloud in points for corner in _corners(np.asarray(cloud, float))]
+    corners: list[Array] = []
+    for cloud in points:
+        finite = np.asarray(cloud, float).reshape(-1, 3)
+        if not np.isfinite(finite).all():
+            finite = finite[np.isfinite(finite).all(axis=1)]
+        corners += [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
     if not corners:
         raise InvalidInput("points", "none", "at least one finite point")
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
@@ -238,13 +243,6 @@ def _round_numbers(count: int) -> Any:
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(count, steps=[1, 2, 5, 10], min_n_ticks=1)
-
-
-def _corners(points: Array) -> list[Array]:
-    finite = points.reshape(-1, 3)
-    if not np.isfinite(finite).all():
-        finite = finite[np.isfinite(finite).all(axis=1)]
-    return [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
 
 
 def _widen(ax: Axes, extent: tuple[float, float, float, float], first: bool, mirror: int) -> None:

@@ -189,21 +189,17 @@ def _material_style(section: Section, material: Material) -> dict[str, Any]:
     return {"facecolor": color, "hatch": hatch, "edgecolor": _HATCH, "linewidth": 0.0}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class _Placed:
     """One bundle that acts in a section."""
 
     index: int
     shape: str
     course: str
-    center: float
-    """Polar angle of its middle [rad]."""
-    extent: float
-    """Angular extent [rad]."""
-    inner_ratio: float
-    """Inner radius over R2 [-]."""
-    outer_ratio: float
-    """Outer radius over R2 [-]."""
+    center: float  # polar angle [rad]
+    extent: float  # angular [rad]
+    inner_ratio: float  # of R2
+    outer_ratio: float  # of R2
 
     @property
     def color(self) -> Color:
@@ -225,16 +221,9 @@ class _Placed:
 
 def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> list[_Placed]:
     outline = arm.outline(z)
+    sizes = (outline.center[0], outline.extent, outline.inner_ratio[0], outline.outer_ratio[0])
     return [
-        _Placed(
-            index=k,
-            shape=outline.shape[k],
-            course=arm.bundle_courses[k],
-            center=float(outline.center[0, k]),
-            extent=float(outline.extent[k]),
-            inner_ratio=float(outline.inner_ratio[0, k]),
-            outer_ratio=float(outline.outer_ratio[0, k]),
-        )
+        _Placed(k, outline.shape[k], arm.bundle_courses[k], *(float(size[k]) for size in sizes))
         for k in bundles
         if outline.acts[0, k]
     ]

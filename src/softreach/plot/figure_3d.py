@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -285,18 +286,13 @@ def _kind(thing: Any) -> str:
 
 def _length(thing: Any) -> float | None:
     """L [m] of the arm that a thing is of; None where it is not known."""
-    match _kind(thing):
-        case "arm":
-            return thing.length
-        case "set":
-            return thing.arm.length
-        case "equilibria":
-            return thing.rod.arm.length
-        case "cloud":
-            return thing["tip"].attrs.get("length")
-        case "configuration":
-            return design_of(thing).length
-    return None
+    kind = _kind(thing)
+    if kind == "cloud":
+        return thing["tip"].attrs.get("length")
+    if kind == "configuration":
+        return design_of(thing).length
+    arms = {"arm": "length", "set": "arm.length", "equilibria": "rod.arm.length"}
+    return attrgetter(arms[kind])(thing) if kind in arms else None
 
 
 def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:

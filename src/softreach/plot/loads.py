@@ -82,7 +82,9 @@ def plot_equilibria(
     rings = [k for k, ring in enumerate(equilibria.is_ring) if ring]
     circles = {k: counted.of(_circle(equilibria, k)) for k in rings}
     with figure_style(ax):
-        rim = _rim(float(arm.profile.radius(0.0)))
+        turn = np.linspace(0.0, 2.0 * np.pi, 65)
+        rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+        rim *= _BASE * float(arm.profile.radius(0.0))
         rim = counted.of(equilibria.rod.pose.to_world(rim))
         points = [rim, *(arm_points(arm, shape, counted) for shape in shapes), *circles.values()]
         panel = Panel.opened(np.concatenate(points), counted, ax, view, box)
@@ -219,11 +221,6 @@ def _circle(equilibria: AllEquilibria, k: int) -> Array:
     along, across = (tip @ axis) * axis, np.cross(axis, tip)
     turned = along + np.cos(angle) * (tip - along) + np.sin(angle) * across
     return pose.to_world(turned)
-
-
-def _rim(radius: float) -> Array:
-    angle = np.linspace(0.0, 2.0 * np.pi, 65)
-    return _BASE * radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
 
 
 def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:

@@ -167,7 +167,12 @@ def plot_slice(
     grid, ax = as_dataset("grid", grid, "x", "y", "z"), as_axes(ax)
     axis, counted, key = sight_axis(view), unit_of(grid, unit), as_flag("key", key)
     at = _middle(grid, axis) if at is None else as_number("at", at, PLACE)
-    layer = _layer(grid, axis, at)
+    centers, half = grid[axis].values, grid.attrs["cell"] / 2
+    if not centers[0] - half <= at <= centers[-1] + half:
+        raise InvalidInput(
+            "at", at, f"between {centers[0]:.4g} and {centers[-1]:.4g} m along {axis}"
+        )
+    layer = grid.sel({axis: at}, method="nearest")
     with figure_style(ax):
         ax = small_axes(3.4, 4.2) if ax is None else ax
         highest = _draw(ax, layer, view, counted)
@@ -215,14 +220,6 @@ def _middle(grid: xr.Dataset, axis: str) -> float:
     middle = (extent[0] + extent[-1]) / 2 if len(extent) else grid[axis].values.mean()
     tenth = grid.attrs["cell"] / 10
     return float(np.rint(middle / tenth) * tenth)
-
-
-def _layer(grid: xr.Dataset, axis: str, at: float) -> xr.Dataset:
-    centers, half = grid[axis].values, grid.attrs["cell"] / 2
-    if not centers[0] - half <= at <= centers[-1] + half:
-        inside = f"between {centers[0]:.4g} and {centers[-1]:.4g} m along {axis}"
-        raise InvalidInput("at", at, inside)
-    return grid.sel({axis: at}, method="nearest")
 
 
 def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:

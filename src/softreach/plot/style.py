@@ -42,15 +42,9 @@ _RC: dict[str, Any] = {
     "font.size": 8,
     "legend.fontsize": 7,
     "legend.frameon": False,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "xtick.color": "0.25",
-    "ytick.color": "0.25",
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5,
 }
+_TICKS = {"labelsize": 7, "color": "0.25", "major.width": 0.6, "major.size": 2.5}
+_RC |= {f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.items()}
 # names that others gave, such as $x_1$ or 50 %, are no mathematics and no LaTeX
 _TEXT: dict[str, Any] = {"text.parse_math": False, "text.usetex": False}
 # text stays text in vector files, so that a journal can set it in its own type
