@@ -153,8 +153,8 @@ def _remarks(search: Search) -> Iterator[str]:
 
 
 def _figures(search: Search, unit: LengthUnit) -> Iterator[tuple[Any, str]]:
-    from softreach.plot.check import plot_check
-    from softreach.plot.search import plot_search
+    from softreach.plot.arm import plot_check
+    from softreach.plot.results import plot_search
 
     yield plot_search(search, unit=unit), _PICTURE
     if search.problem.requirements.targets or search.problem.requirements.keeps:

@@ -5,7 +5,7 @@ What draws one panel takes `ax=None` and returns the axes; what draws several re
 
 from __future__ import annotations
 
-from softreach.plot.arm import DesignPanel, plot_arm, plot_designs
+from softreach.plot.arm import DesignPanel, plot_arm, plot_check, plot_designs
 from softreach.plot.atlas import (
     SheetAxis,
     box_over_length,
@@ -15,13 +15,11 @@ from softreach.plot.atlas import (
     plot_opposite_sides,
     sheet_axes,
 )
-from softreach.plot.calibration import plot_calibration
-from softreach.plot.check import plot_check
 from softreach.plot.clouds import plot_cloud, plot_slab, plot_views
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.figure_3d import Figure3D, plot_3d
 from softreach.plot.loads import plot_compliance, plot_equilibria, plot_payload_curve
-from softreach.plot.search import plot_search
+from softreach.plot.results import plot_calibration, plot_search
 from softreach.plot.sets import plot_hull, plot_slice, plot_slices, plot_volume_curve
 from softreach.plot.statistics import (
     plot_curvature,

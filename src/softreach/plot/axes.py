@@ -178,11 +178,18 @@ def _label_edge(ax: Axes, box: Array, view: View, edge: Array, ticks: Array, lab
     outward = _outward(ends, project(box.mean(axis=0), view)[:2])
     axis = int(np.argmax(np.ptp(edge, axis=0)))
     low, high = edge[:, axis]
+    texts = []
     for value in ticks:
         place = ends[0] + (value - low) / (high - low) * (ends[1] - ends[0])
-        _text(ax, place, f"{value:g}".replace("-", "\N{MINUS SIGN}"), outward, _TICK_GAP, 7)
-    gap = float(np.abs(outward) @ _LABEL_GAP)
-    _text(ax, ends.mean(axis=0), label, outward, gap, 8)
+        texts.append((place, f"{value:g}".replace("-", "\N{MINUS SIGN}"), _TICK_GAP, 7))
+    texts.append((ends.mean(axis=0), label, float(np.abs(outward) @ _LABEL_GAP), 8))
+    sideways, upward = (np.sign(outward) * (np.abs(outward) > 0.4)).astype(int)
+    across = {-1: "right", 0: "center", 1: "left"}[sideways]
+    along = {-1: "top", 0: "center", 1: "bottom"}[upward]
+    for place, text, gap, size in texts:
+        look = {"ha": across, "va": along, "fontsize": size, "color": "0.25"}
+        at = {"xytext": tuple(gap * outward), "textcoords": "offset points"}
+        ax.annotate(text, tuple(place), **at, **look)
 
 
 def _outer_edge(box: Array, view: View, axis: int) -> Array:
@@ -202,20 +209,6 @@ def _outward(ends: Array, center: Array) -> Array:
     if size == 0:  # the edge points at the camera
         return np.array([0.0, -1.0])
     return normal / size * np.sign((ends.mean(axis=0) - center) @ normal or 1.0)
-
-
-def _text(ax: Axes, place: Array, text: str, outward: Array, gap: float, size: float) -> None:
-    sideways, upward = (np.sign(outward) * (np.abs(outward) > 0.4)).astype(int)
-    ax.annotate(
-        text,
-        tuple(place),
-        xytext=tuple(gap * outward),
-        textcoords="offset points",
-        ha={-1: "right", 0: "center", 1: "left"}[sideways],
-        va={-1: "top", 0: "center", 1: "bottom"}[upward],
-        fontsize=size,
-        color="0.25",
-    )
 
 
 def _framed_axes(box: Array, view: View) -> Axes:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,6 @@ from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -171,23 +170,6 @@ def write_note(ax: Axes, text: str, right: float, up: float) -> None:
     place = {"ha": across, "va": along, "transform": ax.transAxes}
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
     ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)
-
-
-class HasDataset(Protocol):
-    """A result that gives what it found as a dataset."""
-
-    def to_dataset(self) -> xr.Dataset:
-        """All that it found."""
-        ...
-
-
-def dataset_of(name: str, result: HasDataset, maker: str, variable: str) -> xr.Dataset:
-    """The dataset of what a function returned, which holds a variable."""
-    of_maker = hasattr(result, "to_dataset") and not isinstance(result, type)
-    data = result.to_dataset() if of_maker else None
-    if data is None or variable not in getattr(data, "variables", {}):
-        raise InvalidInput(name, as_given(result), f"what `{maker}` returned")
-    return data
 
 
 def a_surface(name: str, value: Any) -> SurfaceMesh:
