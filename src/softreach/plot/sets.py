@@ -219,7 +219,7 @@ def _middle(grid: xr.Dataset, axis: str) -> float:
     extent = grid[axis].values[reached.any([other for other in "xyz" if other != axis]).values]
     middle = (extent[0] + extent[-1]) / 2 if len(extent) else grid[axis].values.mean()
     tenth = grid.attrs["cell"] / 10
-    return float(np.rint(middle / tenth) * tenth)
+    return float(np.rint(middle / tenth) * tenth) + 0.0  # no -0
 
 
 def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
