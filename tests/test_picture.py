@@ -259,6 +259,6 @@ class TestThumbnails:
         shown = hull._repr_html_()
         data = re.search(r"data:image/png;base64,([^\"]+)", shown)
         assert pixels_of(base64.b64decode(data[1]))[..., 3].any()
-        assert f"volume {hull.volume:.6g} m³" in shown
+        assert f"volume {hull.volume:.5g} m³" in shown
         flat = convex_hull(np.eye(3))
         assert "<img" not in flat._repr_html_()

@@ -328,7 +328,7 @@ def test_isolated_points_are_gray_and_never_hide_others(drawn):
 
 def test_histograms_share_their_scale_and_count_every_point(drawn):
     _, distance = drawn
-    figure = plot_distance_histograms({"some": distance[:500], "all": distance}, bins=20)
+    figure = plot_distance_histograms({"some": distance[:500], "all": distance})
     some, every = figure.axes
     assert (some.get_title(), every.get_title()) == ("some", "all")
     assert some.get_xlim() == every.get_xlim()

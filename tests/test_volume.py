@@ -77,7 +77,7 @@ def test_the_hull_states_what_it_was_made_of():
 def test_a_hull_prints_its_numbers_and_what_it_was_made_of():
     hull = concave_hull(in_ball(20_000), alpha=0.3, bias=True)
     size, origin = repr(hull).splitlines()
-    assert size.startswith(f"Hull: volume {hull.volume:.6g} m³ (without sampling bias about 4.")
+    assert size.startswith(f"Hull: volume {hull.volume:.5g} m³ (without sampling bias about 4.")
     assert "1 region, " in size
     assert origin == "  alpha shape, alpha = 0.3 m (5.1 mean spacings), of 20,000 points"
     assert "convex hull of 20,000 points" in repr(convex_hull(in_ball(20_000)))

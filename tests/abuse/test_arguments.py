@@ -43,7 +43,6 @@ CONVERTERS = {
     "as_one_of": (arguments.as_one_of, (["front"],), (*STRANGERS, 1, ["front"])),
     "as_names": (arguments.as_names, (), (None, 1, [1, 2], {1.0}, Stranger)),
     "as_mapping": (arguments.as_mapping, (arguments.as_number,), (None, "abc", 5, [1.0], {1: 1})),
-    "as_name_or_index": (arguments.as_name_or_index, (), (None, 1.5, True, [1], Stranger)),
     "as_instance": (arguments.as_instance, (sr.Manipulator, "an arm"), (*STRANGERS, 1.0)),
     "as_function": (arguments.as_function, (), (None, "abc", 5)),
     "as_dataset": (arguments.as_dataset, (), (*STRANGERS, 1.0, np.ones((4, 3)))),

@@ -34,7 +34,7 @@ from softreach.cli.app import run
 from softreach.paper.atlas_figures import hulls_of
 from softreach.picture.projection import view_axes
 from softreach.plot import box_over_length, plot_metric_map
-from softreach.plot.sheet import panel_extent
+from softreach.plot.atlas import panel_extent
 from softreach.support.errors import InvalidInput
 from tests.atlas.families import (
     SMALL,

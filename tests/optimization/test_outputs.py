@@ -68,7 +68,7 @@ def test_it_prints_objectives_with_units_and_parameters_in_their_ranges(one):
     text = repr(one)
     assert "best design, 2 requirements met" in text
     assert re.search(r"largest mass +[\d.]+ kg", text)
-    assert re.search(r"\n +revolution +[\d.]+°.* +0 to 103\.132°", text)
+    assert re.search(r"\n +revolution +[\d.]+°.* +0 to 103\.13°", text)
     assert re.search(r"\d+ by bounds alone", text)
     assert "<pre>Search: " in one._repr_html_()
 

@@ -42,7 +42,7 @@ class ErrorRow(NamedTuple):
 
 def report_of(result: Calibration, unit: LengthUnit) -> Report:
     """All that a calibration found, with lengths in a unit."""
-    from softreach.plot.calibration import plot_calibration
+    from softreach.plot.results import plot_calibration
 
     arm, data = result.arm, result.data
     fitted, markers = len(data) - int(result.held.sum()), ", ".join(data.marker_names)

@@ -13,9 +13,8 @@ from softreach.optimization.free_parameters import FreeParameter
 from softreach.optimization.objectives import Goal, Value
 from softreach.optimization.problem import NEAR
 from softreach.support.errors import SoftreachError, counted
-from softreach.support.quantity import quantity
 from softreach.support.report import Report, Section
-from softreach.support.units import LengthUnit, readable_unit
+from softreach.support.units import LengthUnit, readable, readable_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,8 +112,7 @@ def value_text(goal: Goal, value: Value, unit: LengthUnit) -> str:
     """A value of an objective in a unit that people read, with its error."""
     if not math.isfinite(value.value):
         return "-"
-    name, size = readable_unit(goal.objective.unit, value.value, unit)
-    return quantity(value.value / size, name, value.error / size)
+    return readable(value.value, goal.objective.unit, unit, value.error)
 
 
 def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[Sequence[str]]:
@@ -126,7 +124,7 @@ def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[Sequence[str]]
             reach = f"one of {', '.join(_number_text(each, x, unit) for x in each.choices)}"
         else:
             low = each.low / readable_unit(each.unit, each.high, unit)[1]
-            reach = f"{low:.6g} to {_number_text(each, each.high, unit)}"
+            reach = f"{low:.5g} to {readable(each.high, each.unit, unit)}"
         end = f", at its {ends[name]} end" if name in ends else ""
         yield name, _number_text(each, values[name], unit) + end, reach
     for tie in parameters.ties:
@@ -135,10 +133,7 @@ def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[Sequence[str]]
 
 
 def _number_text(parameter: FreeParameter, value: float | str, unit: LengthUnit) -> str:
-    if isinstance(value, str):
-        return value
-    name, size = readable_unit(parameter.unit, value, unit)
-    return f"{value / size:.6g}{'' if name == '°' else ' '}{name}".rstrip()
+    return value if isinstance(value, str) else readable(value, parameter.unit, unit)
 
 
 def _remarks(search: Search) -> Iterator[str]:
@@ -158,8 +153,8 @@ def _remarks(search: Search) -> Iterator[str]:
 
 
 def _figures(search: Search, unit: LengthUnit) -> Iterator[tuple[Any, str]]:
-    from softreach.plot.check import plot_check
-    from softreach.plot.search import plot_search
+    from softreach.plot.arm import plot_check
+    from softreach.plot.results import plot_search
 
     yield plot_search(search, unit=unit), _PICTURE
     if search.problem.requirements.targets or search.problem.requirements.keeps:

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from softreach.support.arrays import Array
+from softreach.support.quantity import round_above
 
 __all__ = ["AxesBox", "Edge", "Side", "axes_box", "round_box", "seen_from"]
-
-Array = NDArray[np.float64]
 
 _TICK = 0.02  # length of a tick, of the largest side
 _MOST = 8  # ticks along the longest edge
@@ -75,7 +76,7 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
             ends = np.tile(np.where(edge.high, high, low), (2, 1))
             ends[:, axis] = low[axis], high[axis]
             seen = _seen(ends - place, toward, picture) / (high - low)[axis]
-            steps[axis] = max(usual, _round_up(_room(seen, focal, (_WIDE, _HIGH))))
+            steps[axis] = max(usual, round_above(_room(seen, focal, (_WIDE, _HIGH))))
             ends[:] = ends.mean(axis=0)
             ends[1, edge.outward] += _TICK * float((high - low).max())
             tick = _seen(ends - place, toward, picture)
@@ -99,10 +100,8 @@ def _seen(ends: Array, toward: Array, picture: Array) -> Array:
 def _room(seen: Array, focal: float, apart: tuple[float, float]) -> float:
     """The least step, in units of a length, of texts that touch neither beside nor above.
 
-    Args:
-        seen: How far that length leads to the right and up, in focal lengths, shape (2,).
-        focal: Focal length [pixel].
-        apart: Pixels from one text to the next, beside or above each other.
+    That length leads so far to the right and up in focal lengths [pixel], shape (2,); texts are so
+    many pixels apart, beside or above each other.
     """
     return float((np.array(apart) / ((seen + 1e-9) * focal)).min())
 
@@ -179,14 +178,7 @@ def round_box(*points: Array) -> tuple[Array, Array]:
 
 
 def _round_step(span: float) -> float:
-    return _round_up(max(span, 1e-9) / _MOST)
-
-
-def _round_up(value: float) -> float:
-    if value == 0.0:
-        return 0.0
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(next(f * power for f in (1, 2, 5, 10) if value <= f * power))
+    return round_above(max(span, 1e-9) / _MOST)
 
 
 def _edges(low: Array, high: Array, side: Side) -> list[Array]:

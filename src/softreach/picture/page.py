@@ -31,7 +31,6 @@ __all__ = [
     "Swatches",
     "css_color",
     "packed",
-    "packed_keys",
     "script_text",
     "web_page",
 ]
@@ -132,7 +131,7 @@ def web_page(
         "labels": [unit.label(axis) for axis in "xyz"],
         "views": [(name, *VIEWS[name]) for name in _BUTTONS],
         "start": view_angles(view),
-        "keys": packed_keys(keys),
+        "keys": [key._asdict() for key in keys],
         "caption": caption,
         "note": note,
         "parts": [part if isinstance(part, dict) else _packed(part, box) for part in parts],
@@ -149,11 +148,6 @@ def script_text(content: Any) -> str:
     """A value as JSON, no text of which can end the script that it stands in."""
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
-
-
-def packed_keys(keys: Sequence[Swatches | ColorScale]) -> list[dict[str, Any]]:
-    """Keys of colors as the script of a page reads them."""
-    return [key._asdict() for key in keys]
 
 
 def packed(part: PagePart, box: Array) -> PackedPart:

@@ -12,6 +12,7 @@ __all__ = [
     "VIEWS",
     "View",
     "is_mirrored",
+    "on_paper",
     "plane_of",
     "project",
     "sight_axis",
@@ -68,6 +69,15 @@ def project(points: ArrayLike, view: View) -> Array:
         InvalidInput: An unknown view.
     """
     return np.asarray(points, float) @ view_axes(view).T
+
+
+def on_paper(points: ArrayLike, view: View) -> Array:
+    """Right and up on axes, where the coordinate of a mirrored view grows to the left, (n, 2).
+
+    Raises:
+        InvalidInput: An unknown view.
+    """
+    return project(points, view)[..., :2] * (-1 if is_mirrored(view) else 1, 1)
 
 
 def plane_of(view: View) -> tuple[str, str] | None:

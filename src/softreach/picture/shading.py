@@ -22,15 +22,9 @@ def draw_mesh(
     view: View,
     fade: float = 0.0,
 ) -> None:
-    """Draw a shaded triangle mesh.
+    """Draw a shaded mesh of vertices in the units of the buffer, (v, 3), and faces, (f, 3).
 
-    Args:
-        buffer: Where to.
-        vertices: In the units of the buffer, shape (v, 3).
-        faces: Shape (f, 3).
-        color: RGB from 0 to 1.
-        view: The direction of the camera.
-        fade: How far the lit colors go toward white.
+    The color is RGB from 0 to 1; `fade` is how far the lit colors go toward white.
     """
     points, faces = project(vertices, view), np.asarray(faces)
     colors = shade(vertex_normals(points, faces), color)
@@ -41,9 +35,7 @@ def draw_mesh(
 def shade(normals: Array, color: ArrayLike) -> Array:
     """RGB from 0 to 255 of surface elements, lit alike from both sides, shape (n, 3).
 
-    Args:
-        normals: Unit normals: right, up, toward the camera; shape (n, 3).
-        color: RGB from 0 to 1.
+    Unit normals are right, up and toward the camera, shape (n, 3); the color is RGB from 0 to 1.
     """
     facing = np.where(normals[:, 2:] < 0, -normals, normals)
     # from 0 to 1 all around, so that the dark side has a shape too
@@ -64,12 +56,7 @@ def vertex_normals(points: Array, faces: NDArray[np.integer]) -> Array:
 
 
 def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """An image through which another shows.
-
-    Args:
-        image: What is outside, RGBA from 0 to 255, shape (rows, columns, 4).
-        within: What is inside, as large.
-    """
+    """An image through which one of what is within shows: RGBA, 0 to 255, (rows, columns, 4)."""
     front, back = image.astype(float), within.astype(float)
     cover = front[..., 3:] / 255
     weight = back[..., 3:] / 255 * (1.0 - (1.0 - _SHARE) * cover)
@@ -79,13 +66,7 @@ def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray
 
 
 def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> Index:
-    """Those of the faces that are seen from outside, shape (n, 3).
-
-    Args:
-        vertices: Shape (v, 3).
-        faces: Turning outwards, shape (f, 3).
-        view: The direction of the camera.
-    """
+    """Those of faces turning outwards, (f, 3), that are seen from outside, shape (n, 3)."""
     points, faces = project(vertices, view)[:, :2], np.asarray(faces)
     a, b, c = (points[faces[:, k]] for k in range(3))
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T

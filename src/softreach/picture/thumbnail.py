@@ -115,10 +115,12 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
             size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
             buffer.draw_points(points, part.colors, size)
             continue
-        _draw_skin(buffer, part, view)
+        if not np.size(part.faces):
+            continue
+        draw_mesh(buffer, part.vertices, part.faces, part.color, view)
         if clear and not part.clear:
-            faces = faces_to_eye(part.vertices, part.faces, view)
-            _draw_skin(within, part._replace(faces=faces), view)
+            toward = faces_to_eye(part.vertices, part.faces, view)
+            draw_mesh(within, part.vertices, toward, part.color, view)
     return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
 
 
@@ -137,8 +139,3 @@ def _thinned(dots: Dots) -> Dots:
     points, colors = np.reshape(dots.points, (-1, 3)), np.asarray(dots.colors)
     every = 1 + len(points) // _MOST
     return Dots(points[::every], colors[::every] if colors.ndim == 2 else colors)
-
-
-def _draw_skin(buffer: ZBuffer, skin: Skin, view: View) -> None:
-    if np.size(skin.faces):
-        draw_mesh(buffer, skin.vertices, skin.faces, skin.color, view)

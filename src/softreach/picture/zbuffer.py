@@ -28,6 +28,11 @@ class Extent(NamedTuple):
     bottom: float
     top: float
 
+    @property
+    def size(self) -> Array:
+        """Width and height, shape (2,)."""
+        return np.array([self.right - self.left, self.top - self.bottom])
+
 
 class ZBuffer:
     """An image under construction: (right, up, toward the camera) coordinates in, RGBA out.
@@ -43,8 +48,7 @@ class ZBuffer:
         self, extent: Extent, width: int, oversample: int = 2, color_step: int = 1
     ) -> None:
         self.extent, self.oversample, self.color_step = extent, oversample, color_step
-        aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
-        height = max(1, round(width * aspect))
+        height = max(1, round(width * (extent.size[1] / extent.size[0])))
         self._keys: Keys = np.zeros((height * oversample, width * oversample), np.uint64)
 
     @property
@@ -103,9 +107,9 @@ class ZBuffer:
 
     def _to_pixels(self, points: Array) -> Array:
         """Column and row from the top, where whole numbers are the edges of pixels."""
-        e, (rows, columns) = self.extent, self._keys.shape
-        column = (points[..., 0] - e.left) * (columns / (e.right - e.left))
-        row = (e.top - points[..., 1]) * (rows / (e.top - e.bottom))
+        (rows, columns), (width, height) = self._keys.shape, self.extent.size
+        column = (points[..., 0] - self.extent.left) * (columns / width)
+        row = (self.extent.top - points[..., 1]) * (rows / height)
         return np.stack([column, row], axis=-1)
 
     def _splat(self, layer: Keys, points: Array, colors: NDArray[np.uint8]) -> None:

@@ -5,20 +5,28 @@ What draws one panel takes `ax=None` and returns the axes; what draws several re
 
 from __future__ import annotations
 
-from softreach.plot.arm import DesignPanel, plot_arm, plot_designs
-from softreach.plot.calibration import plot_calibration
-from softreach.plot.check import plot_check
+from softreach.plot.arm import DesignPanel, plot_arm, plot_check, plot_designs
+from softreach.plot.atlas import (
+    SheetAxis,
+    box_over_length,
+    plot_cloud_sheet,
+    plot_hull_sheet,
+    plot_metric_map,
+    plot_opposite_sides,
+    sheet_axes,
+)
 from softreach.plot.clouds import plot_cloud, plot_slab, plot_views
 from softreach.plot.cross_section import plot_cross_section
-from softreach.plot.curvature import plot_curvature
 from softreach.plot.figure_3d import Figure3D, plot_3d
-from softreach.plot.hull import plot_hull, plot_volume_curve
 from softreach.plot.loads import plot_compliance, plot_equilibria, plot_payload_curve
-from softreach.plot.metric_map import SheetAxis, box_over_length, plot_metric_map, sheet_axes
-from softreach.plot.redundancy import plot_distance, plot_distance_histograms, plot_redundancy
-from softreach.plot.search import plot_search
-from softreach.plot.sheet import plot_cloud_sheet, plot_hull_sheet, plot_opposite_sides
-from softreach.plot.slice import plot_slice, plot_slices
+from softreach.plot.results import plot_calibration, plot_search
+from softreach.plot.sets import plot_hull, plot_slice, plot_slices, plot_volume_curve
+from softreach.plot.statistics import (
+    plot_curvature,
+    plot_distance,
+    plot_distance_histograms,
+    plot_redundancy,
+)
 from softreach.plot.style import save_figure
 
 __all__ = [

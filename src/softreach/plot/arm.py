@@ -1,9 +1,9 @@
-"""Pictures of arms, unloaded and deformed: lit tubes with their bundles, alone or side by side."""
+"""Pictures of arms, lit tubes with their bundles: alone, side by side, at their targets."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Collection, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,13 +16,20 @@ from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import WIDTH, figure_style, panel_arguments, pyplot, some_bundles
+from softreach.plot.style import (
+    WIDTH,
+    figure_style,
+    legend_above,
+    panel_arguments,
+    pyplot,
+    some_bundles,
+)
 from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_instance, as_number
-from softreach.support.arrays import Array, as_stations
+from softreach.support.arrays import Array, Mask, as_stations
 from softreach.support.errors import InvalidInput
-from softreach.support.palette import BODY, bundle_color
+from softreach.support.palette import BODY, MET, MISSED, bundle_color
 from softreach.support.units import LengthUnit, in_lengths
 
 if TYPE_CHECKING:
@@ -34,6 +41,13 @@ if TYPE_CHECKING:
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
+_CHECKED = 0.35  # and those of arms at their targets
+_POSES = 5  # of places that are apart
+_REGIONS = {
+    "stay_inside": {"color": (0.25, 0.35, 0.60), "linestyle": "-", "label": "stay inside"},
+    "avoid": {"color": (0.75, 0.42, 0.05), "linestyle": "--", "label": "avoid"},
+    "cover": {"color": MET, "linestyle": ":", "label": "to be covered"},
+}
 
 
 def plot_arm(
@@ -109,16 +123,14 @@ def draw_arms(
     bundles: Collection[int],
     fade: float = 0.0,
 ) -> None:
-    """One image of all shapes, over what the axes hold."""
+    """One image of all shapes, over what the axes hold, and their markers in front."""
     if shapes:
         panel.show(*arm_images(panel, arm, shapes, bundles, fade))
         draw_markers(panel, arm, shapes, fade)
 
 
-def draw_markers(
-    panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float = 0.0
-) -> None:
-    """Small dots where the markers of all shapes are, in front of everything."""
+def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
+    """Small dots where the markers of all shapes are."""
     if arm.markers and shapes:
         panel.dot(np.concatenate([marker_points(arm, shape) for shape in shapes]), 1.0 - fade)
 
@@ -141,12 +153,11 @@ def arm_images(
             draw_mesh(buffer, panel.unit.of(body.vertices), part, BODY, panel.view, fade)
         skins = bundle_skins(arm, shape, lift=0.008)
         for index in bundles:
-            color, points, faces = bundle_color(index), skins[index].vertices, skins[index].faces
-            places = panel.unit.of(points)
-            draw_mesh(buffer, places, faces, color, panel.view, fade)
+            points, faces = panel.unit.of(skins[index].vertices), skins[index].faces
+            look = bundle_color(index), panel.view, fade
+            draw_mesh(buffer, points, faces, *look)
             if clear:
-                faces = faces_to_eye(points, faces, panel.view)
-                draw_mesh(within, places, faces, color, panel.view, fade)
+                draw_mesh(within, points, faces_to_eye(points, faces, panel.view), *look)
     return buffer, within if clear else None
 
 
@@ -179,29 +190,22 @@ def plot_designs(
         InvalidInput: A station off an arm, or an unknown view.
         MissingExtra: matplotlib is not installed.
     """
-    if not isinstance(panels, list | tuple):
-        raise InvalidInput("panels", as_given(panels), "a list or tuple")
+    if not isinstance(panels, list | tuple) or not panels:
+        raise InvalidInput("panels", as_given(panels), "a list or tuple of DesignPanels")
     for k, panel in enumerate(panels):
         as_instance(f"panels[{k}]", panel, DesignPanel, "a DesignPanel")
-    if not panels:
-        raise InvalidInput("panels", "none", "at least one DesignPanel")
     stations = as_stations("stations_over_length", stations_over_length).tolist()
     width = 1.5 * len(panels) if width is None else as_number("width", width, WIDTH)
     box = bounding_box(
         *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
     )
-    reach = 1.08 * max(
-        section_reach(p.arm, s * p.arm.length) / p.arm.length
-        for p in panels
-        for s in (*stations, 0.0)
-    )
-    rows = 1 + len(stations)
+    places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
+    reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
     with figure_style():
         heights = [2.6, *[width / len(panels)] * len(stations)]
         shape = {"height_ratios": heights, "layout": "constrained", "squeeze": False}
-        figure, axes = pyplot().subplots(
-            rows, len(panels), figsize=(width, sum(heights) + 0.1), **shape
-        )
+        size = (width, sum(heights) + 0.1)
+        figure, axes = pyplot().subplots(len(heights), len(panels), figsize=size, **shape)
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
             drawn, shown = panel.bundles, length * box
@@ -215,3 +219,91 @@ def plot_designs(
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])
     return figure
+
+
+class _Check(Protocol):
+    @property
+    def arm(self) -> Manipulator: ...
+    @property
+    def places(self) -> Array: ...
+    @property
+    def reached(self) -> Mask: ...
+    @property
+    def nearest(self) -> Array: ...
+    @property
+    def regions(self) -> Sequence[tuple[str, Any]]: ...
+    @property
+    def findings(self) -> Sequence[Any]: ...
+    def shapes(self, count: int) -> xr.Dataset | None: ...
+
+
+def plot_check(
+    check: _Check,
+    *,
+    ax: Axes | None = None,
+    view: View = "oblique",
+    unit: Unit = None,
+) -> Axes:
+    """Draw an arm at the places that it must reach, and the regions that it must keep to.
+
+    Five poses are drawn, of places that are apart. Places that are reached under every payload are
+    green dots; those that are missed are red crosses, each with a line to the nearest tip. The
+    legend says which kinds of regions are missed or undecided.
+
+    Args:
+        check: What `check` returned.
+        ax: Axes to draw in; None for a new figure.
+        view: As in `plot_cloud`.
+        unit: Of the axes: "m", "cm", "mm" or "L"; None for L.
+
+    Returns:
+        The axes, in that unit.
+
+    Raises:
+        InvalidInput: Unknown view or unit, or no check.
+        MissingExtra: matplotlib is not installed.
+    """
+    if isinstance(check, type) or not hasattr(check, "requirements"):
+        raise InvalidInput("check", as_given(check), "what `check` returned")
+    arm = check.arm
+    ax, _ = panel_arguments(ax, view, None)
+    counted = unit_for(arm.length, unit)
+    shapes = shapes_of(check.shapes(_POSES)) or [rest_configuration(arm)]
+    with figure_style(ax):
+        points = [arm_points(arm, shape, counted) for shape in shapes]
+        points.append(counted.of(check.places))
+        around = counted.size * bounding_box(*points)
+        lines: dict[str, list[Array]] = {kind: [] for kind in _REGIONS}
+        for kind, region in check.regions:
+            lines[kind] += [counted.of(line) for line in region.wireframe(around)]
+        points += [line for each in lines.values() for line in each]
+        panel = Panel.opened(np.concatenate(points), counted, ax, view, None)
+        draw_arms(panel, arm, shapes, range(arm.bundles), _CHECKED)
+        for kind, each in lines.items():
+            style = {"linewidth": 0.9, **_REGIONS[kind]}
+            words = {each.verdict for each in check.findings if each.kind == kind} - {"met"}
+            style["label"] = ": ".join([str(style["label"]), *sorted(words)])
+            _draw_lines(panel, each, style)
+        _draw_places(panel, check)
+        if panel.ax.get_legend_handles_labels()[1]:
+            legend_above(panel.ax)
+    return panel.ax
+
+
+def _draw_places(panel: Panel, check: _Check) -> None:
+    met = check.reached.all(axis=0)
+    load = (~check.reached).sum(axis=1).argmax()  # under which most are missed
+    gaps = np.stack([check.places[~met], check.nearest[load, ~met]], axis=1)
+    _draw_lines(panel, panel.unit.of(gaps), {"color": MISSED, "linewidth": 1.0, "label": "gap"})
+    styles = ((met, "o", MET, "reached", 4.5), (~met, "X", MISSED, "missed", 6.0))
+    for rows, marks, color, label, size in styles:
+        if rows.any():
+            edge = {"markeredgecolor": "white", "markeredgewidth": 0.5, "zorder": 5}
+            look = {"color": color, "markersize": size, "label": label}
+            panel.plot(panel.unit.of(check.places[rows]), marks, **look, **edge)
+
+
+def _draw_lines(panel: Panel, lines: Iterable[Array], style: dict[str, Any]) -> None:
+    for line in lines:
+        panel.plot(line, **style)
+        style = {**style, "label": None}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.picture.projection import View, is_mirrored, plane_of, project, view_axes
+from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, project, view_axes
 from softreach.picture.shading import seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.plot.style import DPI, pyplot
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _TICK_GAP = 4.0  # points between an edge and its numbers
 _LABEL_GAP = np.array([23.0, 15.0])  # points between an edge beside or above its label and that
 _MARGIN = 0.04
+_OVER = 4  # the order of lines over images
 _ROOM = np.array([2.8, 3.2])  # inches for the image
 _AROUND = np.array([0.6, 0.7])  # inches for labels and key
 _TICK_ROOM = 0.42  # inches between ticks at least
@@ -31,13 +32,9 @@ _UNIT_MARK = "_counted in "  # the label of an image, which no legend shows
 
 
 def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
-    """Draw the walls of a box that lie behind what it holds, and label its edges.
+    """Draw the walls of a box, shape (2, 3), behind what it holds, and label its edges.
 
-    Args:
-        ax: Axes with an orthographic image of the inside; their own frame is hidden.
-        box: Lower and upper corner, shape (2, 3).
-        view: The direction of the camera.
-        unit: What coordinates are counted in.
+    The frame of the axes, which hold an orthographic image of the inside, is hidden.
     """
     from matplotlib.collections import LineCollection
 
@@ -67,14 +64,7 @@ class Panel:
     def opened(
         cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: ArrayLike | None
     ) -> Self:
-        """Axes for points.
-
-        Args:
-            points: What is going to be shown, in the units of the axes, shape (..., 3).
-            unit: The units of the axes.
-            ax: Axes to draw in; None for a new figure.
-            view: The direction of sight.
-            box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
+        """Axes for points in their unit, shape (..., 3), or for a box [m], shape (2, 3).
 
         Raises:
             InvalidInput: Unknown view, a box of another shape, or no finite point to show.
@@ -90,18 +80,16 @@ class Panel:
     @property
     def pixels_per_unit(self) -> float:
         """At print resolution."""
-        return self._columns() / (self.extent.right - self.extent.left)
+        return self._columns() / self.extent.size[0]
 
     def buffer(self, oversample: int, color_step: int = 1) -> ZBuffer:
         """An empty image of the panel; see `ZBuffer`."""
         return ZBuffer(self.extent, self._columns(), oversample, color_step)
 
     def show(self, buffer: ZBuffer, within: ZBuffer | None = None) -> None:
-        """Place the finished image in the axes and label them; what is there stays in view.
+        """Place the finished image, and what shows through it, in the axes and label them.
 
-        Args:
-            buffer: The image.
-            within: What shows through it; None for nothing.
+        What is there stays in view.
 
         Raises:
             InvalidInput: What is there is counted in another unit.
@@ -118,21 +106,20 @@ class Panel:
         _widen(ax, extent, first, mirror)
         if plane:
             ax.set(xlabel=self.unit.label(plane[0]), ylabel=self.unit.label(plane[1]))
-            _set_ticks(ax, _inches(ax, buffer.extent))
+            for axis, length in zip((ax.xaxis, ax.yaxis), _inches(ax, buffer.extent), strict=True):
+                axis.set_major_locator(_round_numbers(int(np.clip(length / _TICK_ROOM, 1, 6))))
         elif first:
             draw_box(ax, self.box, self.view, self.unit)
 
     def dot(self, points: Array, opacity: float = 1.0) -> None:
-        """Draw small dots over the image.
+        """Draw small dots over the image, places [m], shape (n, 3)."""
+        style = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4, "zorder": 3}
+        self.plot(self.unit.of(points), "o", markersize=3, alpha=opacity, **style)
 
-        Args:
-            points: Places [m], shape (n, 3).
-            opacity: From 0 to 1.
-        """
-        x, y = project(self.unit.of(points), self.view).T[:2]
-        x = -x if is_mirrored(self.view) else x
-        style = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4}
-        self.ax.plot(x, y, "o", markersize=3, alpha=opacity, zorder=3, **style)
+    def plot(self, points: Array, *marks: str, **style: Any) -> None:
+        """Draw a line or marks over the image, in the units of the axes, shape (n, 3)."""
+        look: dict[str, Any] = {"zorder": _OVER, **style}
+        self.ax.plot(*on_paper(points, self.view).T, *marks, **look)
 
     def _columns(self) -> int:
         return max(16, round(_inches(self.ax, self.extent)[0] * DPI))
@@ -144,7 +131,12 @@ def bounding_box(*points: ArrayLike) -> Array:
     Raises:
         InvalidInput: No finite point to show.
     """
-    corners = [corner for cloud in points for corner in _corners(np.asarray(cloud, float))]
+    corners: list[Array] = []
+    for cloud in points:
+        finite = np.asarray(cloud, float).reshape(-1, 3)
+        if not np.isfinite(finite).all():
+            finite = finite[np.isfinite(finite).all(axis=1)]
+        corners += [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
     if not corners:
         raise InvalidInput("points", "none", "at least one finite point")
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
@@ -162,14 +154,11 @@ def view_extent(box: Array, view: View) -> Extent:
 
 def _ticks(box: Array, edges: list[Array]) -> list[Array]:
     """Round numbers along each axis, as many as its edge has room for on paper."""
-    from matplotlib.ticker import MaxNLocator
-
     lengths = np.array([np.linalg.norm(edge[1] - edge[0]) for edge in edges])
     counts = np.maximum(2, np.rint(6 * lengths / lengths.max())).astype(int)
     ticks = []
     for (low, high), count in zip(box.T, counts.tolist(), strict=True):
-        locator = MaxNLocator(count, steps=[1, 2, 5, 10], min_n_ticks=1)
-        values = np.asarray(locator.tick_values(low, high))
+        values = np.asarray(_round_numbers(count).tick_values(low, high))
         ticks.append(values[(values >= low) & (values <= high)])
     return ticks
 
@@ -189,22 +178,26 @@ def _label_edge(ax: Axes, box: Array, view: View, edge: Array, ticks: Array, lab
     outward = _outward(ends, project(box.mean(axis=0), view)[:2])
     axis = int(np.argmax(np.ptp(edge, axis=0)))
     low, high = edge[:, axis]
+    texts = []
     for value in ticks:
         place = ends[0] + (value - low) / (high - low) * (ends[1] - ends[0])
-        _text(ax, place, f"{value:g}".replace("-", "\N{MINUS SIGN}"), outward, _TICK_GAP, 7)
-    gap = float(np.abs(outward) @ _LABEL_GAP)
-    _text(ax, ends.mean(axis=0), label, outward, gap, 8)
+        texts.append((place, f"{value:g}".replace("-", "\N{MINUS SIGN}"), _TICK_GAP, 7))
+    texts.append((ends.mean(axis=0), label, float(np.abs(outward) @ _LABEL_GAP), 8))
+    sideways, upward = (np.sign(outward) * (np.abs(outward) > 0.4)).astype(int)
+    across = {-1: "right", 0: "center", 1: "left"}[sideways]
+    along = {-1: "top", 0: "center", 1: "bottom"}[upward]
+    for place, text, gap, size in texts:
+        look = {"ha": across, "va": along, "fontsize": size, "color": "0.25"}
+        at = {"xytext": tuple(gap * outward), "textcoords": "offset points"}
+        ax.annotate(text, tuple(place), **at, **look)
 
 
 def _outer_edge(box: Array, view: View, axis: int) -> Array:
     """The edge along an axis on the outline of the box, lowest on paper (z: farthest left)."""
     others = [k for k in range(3) if k != axis]
-    edges = []
-    for pick in np.ndindex(2, 2):
-        edge = np.zeros((2, 3))
-        edge[:, axis] = box[:, axis]
+    edges = [box.copy() for _ in range(4)]
+    for edge, pick in zip(edges, np.ndindex(2, 2), strict=True):
         edge[:, others] = box[pick, others]
-        edges.append(edge)
     place = 0 if axis == 2 else 1
     return min(edges, key=lambda edge: project(edge, view)[:, place].mean())
 
@@ -218,22 +211,8 @@ def _outward(ends: Array, center: Array) -> Array:
     return normal / size * np.sign((ends.mean(axis=0) - center) @ normal or 1.0)
 
 
-def _text(ax: Axes, place: Array, text: str, outward: Array, gap: float, size: float) -> None:
-    sideways, upward = (np.sign(outward) * (np.abs(outward) > 0.4)).astype(int)
-    ax.annotate(
-        text,
-        tuple(place),
-        xytext=tuple(gap * outward),
-        textcoords="offset points",
-        ha={-1: "right", 0: "center", 1: "left"}[sideways],
-        va={-1: "top", 0: "center", 1: "bottom"}[upward],
-        fontsize=size,
-        color="0.25",
-    )
-
-
 def _framed_axes(box: Array, view: View) -> Axes:
-    span = _span(view_extent(box, view))
+    span = view_extent(box, view).size
     inches = span * (_ROOM / span).min() + _AROUND
     return pyplot().subplots(figsize=tuple(inches), layout="constrained")[1]
 
@@ -246,31 +225,17 @@ def _check_unit(ax: Axes, unit: LengthUnit) -> None:
         raise InvalidInput("ax", f"counted in {', '.join(symbols)}", f"in {unit.name}", hint)
 
 
-def _span(extent: Extent) -> Array:
-    return np.array([extent.right - extent.left, extent.top - extent.bottom])
-
-
 def _inches(ax: Axes, extent: Extent) -> Array:
     figure = ax.get_figure(root=True)
     assert figure is not None
     room = np.array(ax.get_position().size) * figure.get_size_inches()
-    span = _span(extent)
-    return span * (room / span).min()
+    return extent.size * (room / extent.size).min()
 
 
-def _set_ticks(ax: Axes, inches: Array) -> None:
+def _round_numbers(count: int) -> Any:
     from matplotlib.ticker import MaxNLocator
 
-    for axis, length in zip((ax.xaxis, ax.yaxis), inches, strict=True):
-        bins = int(np.clip(length / _TICK_ROOM, 1, 6))
-        axis.set_major_locator(MaxNLocator(bins, steps=[1, 2, 5, 10], min_n_ticks=1))
-
-
-def _corners(points: Array) -> list[Array]:
-    finite = points.reshape(-1, 3)
-    if not np.isfinite(finite).all():
-        finite = finite[np.isfinite(finite).all(axis=1)]
-    return [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
+    return MaxNLocator(count, steps=[1, 2, 5, 10], min_n_ticks=1)
 
 
 def _widen(ax: Axes, extent: tuple[float, float, float, float], first: bool, mirror: int) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.picture.projection import View, sight_axis, view_angles
+from softreach.picture.projection import View, sight_axis
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.arm import arm_images, arm_points, draw_markers, shapes_of
 from softreach.plot.axes import Panel, bounding_box
@@ -17,12 +17,12 @@ from softreach.plot.coloring import color_samples, draw_figure_key, draw_key
 from softreach.plot.lengths import Unit, common_unit, unit_for, unit_of
 from softreach.plot.style import (
     LENGTH,
+    PAGE,
     PLACE,
     SIZE,
-    WIDTH,
     figure_style,
     panel_arguments,
-    pyplot,
+    place_panels,
     write_note,
 )
 from softreach.rod.arm_shape import rest_configuration
@@ -44,7 +44,9 @@ _THICKNESS = 1 / 50  # of L, or of the cloud's extent
 Images = tuple[ZBuffer, ZBuffer | None]
 """An image, and what shows through it."""
 
-_LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
+_VIEWS = ("front", "side", "top", "oblique")
+_AROUND, _GAP = (0.55, 0.12, 0.42, 0.42), 0.60  # left, right, bottom and top of four views [inch]
+_LOWER = 0.126  # of the oblique view, whose numbers stand outside of its box [inch]
 
 
 def plot_cloud(
@@ -95,14 +97,7 @@ def plot_cloud(
 
 
 def cloud_image(panel: Panel, tips: Array, rgb: NDArray[np.uint8], size: float | None) -> ZBuffer:
-    """The image of points in a panel.
-
-    Args:
-        panel: Where it will be shown.
-        tips: In the units of the axes, shape (n, 3).
-        rgb: From 0 to 255, shape (n, 3).
-        size: As in `plot_cloud`.
-    """
+    """The image in a panel of tips in its unit, shape (n, 3), with RGB from 0 to 255, (n, 3)."""
     spread = point_size(len(tips), panel.box) * panel.pixels_per_unit
     pixels = size or min(_LARGEST, spread)
     # small points gain nothing from smoothing; fine steps of color drown in their noise
@@ -160,14 +155,16 @@ def plot_slab(
         MissingExtra: matplotlib is not installed.
     """
     cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
-    at = None if at is None else as_number("at", at, PLACE)
-    thickness = None if thickness is None else as_number("thickness", thickness, LENGTH)
     size = None if size is None else as_number("size", size, SIZE)
     ax, box = panel_arguments(ax, view, box)
     counted, axis = unit_of(cloud["tip"], unit), sight_axis(view)
     tips = drawn_tips(cloud, counted)
-    at = float(base_of(cloud)["xyz".index(axis)]) if at is None else at
-    middle, half = float(counted.of(at)), _half(thickness, tips, counted)
+    at = float(base_of(cloud)["xyz".index(axis)]) if at is None else as_number("at", at, PLACE)
+    if thickness is None:
+        whole = _THICKNESS * (1.0 if counted.relative else float(np.nanmax(np.ptp(tips, axis=0))))
+    else:
+        whole = float(counted.of(as_number("thickness", thickness, LENGTH)))
+    middle, half = float(counted.of(at)), whole / 2
     depth = tips[:, "xyz".index(axis)] - middle
     inside = np.abs(depth) <= half
     if not inside.any():
@@ -176,11 +173,12 @@ def plot_slab(
     coloring = color_samples(cloud, color)
     with figure_style(ax):
         panel = Panel.opened(tips, counted, ax, view, box)
-        slab, rgb = cloud.isel(sample=np.flatnonzero(inside)), coloring.rgb[inside] / 255
-        pixels = size or _point_size(len(rgb), panel)
-        shown = {"box": panel.box * counted.size, "key": False, "unit": counted}
-        plot_cloud(slab, ax=panel.ax, view=view, color=rgb, size=pixels, **shown)
-        write_note(panel.ax, _place(axis, middle, half, counted), 0.03, 0.02)
+        area = np.prod(panel.extent.size) / inside.sum()
+        # about the mean spacing in the plane, which closes the slab
+        spacing = float(np.clip(1.2 * np.sqrt(area) * panel.pixels_per_unit, 2.0, 8.0))
+        panel.show(cloud_image(panel, tips[inside], coloring.rgb[inside], size or spacing))
+        distance = f"{axis} - {middle:.3g} {counted.name}" if middle else axis
+        write_note(panel.ax, f"|{distance}| ≤ {half:.3g} {counted.name}", 0.03, 0.02)
         if key:
             draw_key(panel.ax, coloring.key)
     return panel.ax
@@ -191,10 +189,7 @@ def plot_views(
     arm: Manipulator | None = None,
     configuration: xr.Dataset | None = None,
     *,
-    view: View = "oblique",
     color: str | int | ArrayLike | None = None,
-    size: float | None = None,
-    width: float = 6.9,
     unit: Unit = None,
 ) -> Figure:
     """Draw a cloud in three orthogonal views at one scale and an oblique one.
@@ -203,10 +198,7 @@ def plot_views(
         cloud: As in `plot_cloud`.
         arm: Drawn over the cloud; None for the cloud alone.
         configuration: Configurations of that arm to draw; None for the arm at rest.
-        view: Of the fourth panel; the first three are "front", "side" and "top".
         color: As in `plot_cloud`.
-        size: As in `plot_cloud`.
-        width: Of the figure [inch].
         unit: As in `plot_cloud`.
 
     Returns:
@@ -217,9 +209,7 @@ def plot_views(
         InvalidInput: As `plot_cloud`; an arm beside a cloud that does not know L, without a unit.
         MissingExtra: matplotlib is not installed.
     """
-    cloud, width = a_cloud("cloud", cloud), as_number("width", width, WIDTH)
-    size = None if size is None else as_number("size", size, SIZE)
-    view_angles(view)
+    cloud = a_cloud("cloud", cloud)
     counted = unit_of(cloud["tip"], unit)
     tips = drawn_tips(cloud, counted)
     shown, shapes = [tips], shapes_of(configuration)
@@ -228,15 +218,22 @@ def plot_views(
         common_unit([counted, unit_for(arm.length, unit)])
         shapes = shapes or [rest_configuration(arm)]
         shown += [arm_points(arm, shape, counted) for shape in shapes]
-    box = _not_too_slim(bounding_box(*shown))
+    box = bounding_box(*shown)
+    span = np.ptp(box, axis=0)
+    slim = np.maximum(0.5 * span.max() - span, 0.0) / 2  # so that a thin arm fits a page
+    box = box + [-slim, slim]
     coloring = color_samples(cloud, color)
     with figure_style():
-        figure, axes, top = _layout(np.ptp(box, axis=0), width, view)
-        panels = [Panel(ax, box, seen, counted) for seen, ax in axes]
+        x, y, z = np.ptp(box, axis=0)
+        figure, axes = place_panels(PAGE, (x, y), (z, y), _AROUND, (_GAP, _GAP))
+        low, height = axes[1, 1].get_position(), figure.get_size_inches()[1]
+        axes[1, 1].set_position(low.translated(0.0, -_LOWER / height))
+        pairs = zip(axes.ravel().tolist(), _VIEWS, strict=True)
+        panels = [Panel(ax, box, view, counted) for ax, view in pairs]
         images: list[list[Images]] = [[] for _ in panels]
 
         def draw(panel: Panel, drawn: list[Images]) -> None:
-            drawn.append((cloud_image(panel, tips, coloring.rgb, size), None))
+            drawn.append((cloud_image(panel, tips, coloring.rgb, None), None))
             if arm is not None:
                 drawn.append(arm_images(panel, arm, shapes, range(arm.bundles)))
 
@@ -245,49 +242,6 @@ def plot_views(
             for image, within in drawn:
                 panel.show(image, within)
             if arm is not None:
-                draw_markers(panel, arm, shapes)
-        draw_figure_key(figure, coloring.key, top)
+                draw_markers(panel, arm, shapes, 0.0)
+        draw_figure_key(figure, coloring.key, _AROUND[3] / height)
     return figure
-
-
-def _not_too_slim(box: Array) -> Array:
-    """The box with sides of half the longest one at least, so that a thin arm fits a page."""
-    span = np.ptp(box, axis=0)
-    margin = np.maximum(0.5 * span.max() - span, 0.0) / 2
-    return box + np.array([-margin, margin])
-
-
-def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
-    if thickness is not None:
-        return float(unit.of(thickness)) / 2
-    return _THICKNESS / 2 * (1.0 if unit.relative else float(np.nanmax(np.ptp(tips, axis=0))))
-
-
-def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
-    distance = f"{axis} - {middle:.3g} {unit.name}" if middle else axis
-    return f"|{distance}| ≤ {half:.3g} {unit.name}"
-
-
-def _point_size(count: int, panel: Panel) -> float:
-    """A diameter [pixels] that closes a slice: about the mean spacing in the plane."""
-    extent = panel.extent
-    area = (extent.right - extent.left) * (extent.top - extent.bottom)
-    return float(np.clip(1.2 * np.sqrt(area / count) * panel.pixels_per_unit, 2.0, 8.0))
-
-
-def _layout(span: Array, width: float, view: View) -> tuple[Figure, list[tuple[View, Axes]], float]:
-    """Views and axes whose sizes are the spans at one scale, and the share of height above them."""
-    x, y, z = span * (width - _LEFT - _GAP - _RIGHT) / (span[0] + span[1])
-    height = _BOTTOM + y + _GAP + z + _TOP
-    figure = pyplot().figure(figsize=(width, height))
-    column, row = _LEFT + x + _GAP, _BOTTOM + y + _GAP
-    places = [
-        ("front", (_LEFT, row, x, z)),
-        ("side", (column, row, y, z)),
-        ("top", (_LEFT, _BOTTOM, x, y)),
-        # its tick labels stand outside the box, so it gets the margins too
-        (view, (column, 0.7 * _BOTTOM, y, y)),
-    ]
-    share = np.array([width, height, width, height])
-    panels = [(seen, figure.add_axes(tuple(place / share))) for seen, place in places]
-    return figure, panels, _TOP / height

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,21 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = [
-    "COLORMAP",
-    "POWERS",
-    "UNSTABLE",
-    "BundleKey",
-    "Coloring",
-    "ScalarKey",
-    "bundle_activations",
-    "bundle_names",
-    "color_map",
-    "color_samples",
-    "draw_figure_key",
-    "draw_key",
-]
 
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
@@ -78,6 +63,11 @@ class ScalarKey(NamedTuple):
     clipped: bool = False
     """True if the ends stand for all values beyond them too."""
 
+    @property
+    def extend(self) -> str:
+        """Ends of a color bar that point outward, as matplotlib has it."""
+        return "both" if self.clipped else "neither"
+
 
 class Coloring(NamedTuple):
     """RGB of every sample, shape (sample, 3), and what it means."""
@@ -105,11 +95,7 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
     Raises:
         InvalidInput: No such bundle, or an array of another length.
     """
-    return _marked(_colored(cloud, color), cloud)
-
-
-def _marked(coloring: Coloring, cloud: xr.Dataset) -> Coloring:
-    """Unstable samples in their own color, which the key explains."""
+    coloring = _colored(cloud, color)
     unstable = cloud["status"].values == 1 if "status" in cloud else np.zeros(0, bool)
     if not unstable.any():
         return coloring
@@ -134,7 +120,7 @@ def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring
         bundle = _bundle(names, color)
         magnitude = np.abs(activation.values[:, bundle])
         unit = "" if units[bundle] == "1" else f" [{units[bundle]}]"
-        return _scalar(magnitude, f"|{symbols[bundle]}| {names[bundle]}{unit}", 0.0)
+        return Coloring(*_scalar(magnitude, f"|{symbols[bundle]}| {names[bundle]}{unit}", 0.0))
     return _given(color, len(activation))
 
 
@@ -163,7 +149,7 @@ def _effort(magnitude: Array, names: tuple[str, ...], units: Sequence[str]) -> C
     share = (magnitude[:, acts] / largest[acts]).sum(axis=1) / max(np.count_nonzero(acts), 1)
     (symbol, *others) = sorted(set(activation_symbols(units)))
     symbol = "a" if others else symbol
-    return _scalar(share, f"effort: mean |{symbol}| / max |{symbol}| [-]", 0.0)
+    return Coloring(*_scalar(share, f"effort: mean |{symbol}| / max |{symbol}| [-]", 0.0))
 
 
 _OF_ALL = {"strongest": _strongest, "effort": _effort}
@@ -188,17 +174,11 @@ def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
 
 def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
     """Explain the colors in axes, by a legend above them or a color bar beside them."""
-    if isinstance(key, BundleKey):
-        columns = _columns(key, _LINE, 2)
-        if key.title and columns == 2:  # above the others, where they do not stand in one line
-            ax.legend(handles=_patches(key)[1:], title=key.title, **_ABOVE | {"ncols": columns})
-        else:
-            ax.legend(handles=_patches(key), **_ABOVE | {"ncols": columns})
-    elif key is not None:
-        bar = {"label": key.label, "fraction": 0.046, "pad": 0.03, "extend": _extend(key)}
+    if isinstance(key, ScalarKey):
+        bar = {"label": key.label, "fraction": 0.046, "pad": 0.03, "extend": key.extend}
         ax.figure.colorbar(color_map(key), ax=ax, **bar)
-        if key.unstable:
-            ax.legend(handles=_marks(key), **_ABOVE)
+    if key is not None:
+        _draw_legend(ax, key, _LINE, 2)
 
 
 def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: float) -> None:
@@ -209,30 +189,43 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
         key: What to explain; None for nothing.
         top: Height of that room, as a share of the figure.
     """
-    if isinstance(key, BundleKey):
-        options = _ABOVE | {"loc": "center", "bbox_to_anchor": (0.5, 1 - top / 2)}
-        figure.legend(handles=_patches(key), **options | {"ncols": _columns(key, _PAGE, 4)})
-    elif key is not None:
+    place = (0.5, 1 - top / 2)
+    if isinstance(key, ScalarKey):
+        place = (0.88, 1 - 0.4 * top)
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
-        figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=_extend(key))
+        figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=key.extend)
         bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
-        if key.unstable:
-            options = _ABOVE | {"loc": "center", "bbox_to_anchor": (0.88, 1 - 0.4 * top)}
-            figure.legend(handles=_marks(key), **options)
+    if key is not None:
+        _draw_legend(figure, key, _PAGE, 4, loc="center", bbox_to_anchor=place)
 
 
-def _columns(key: BundleKey, room: int, otherwise: int) -> int:
-    fits = len(key.title) + sum(len(name) + 6 for name in key.names) <= room
-    return len(key.names) + 2 if fits else otherwise
+def _draw_legend(
+    owner: Axes | Figure, key: BundleKey | ScalarKey, room: int, columns: int, **place: Any
+) -> None:
+    """Title and entries in one line where there is room, else in columns below the title."""
+    entries, title = key_entries(key), key.title if isinstance(key, BundleKey) else ""
+    names = key.names if isinstance(key, BundleKey) else ()
+    if len(title) + sum(len(name) + 6 for name in names) <= room:
+        entries = [(title, "none"), *entries] if title else entries
+        title, columns = "", len(entries)
+    if entries:
+        above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "columnspacing": 1.2}
+        look = above | {"title": title or None, "ncols": columns, "handlelength": 1.0}
+        draw_entries(owner, entries, **look | place)
 
 
-_ABOVE: dict[str, Any] = {
-    "loc": "lower center",
-    "bbox_to_anchor": (0.5, 1.0),
-    "ncols": 4,
-    "handlelength": 1.0,
-    "columnspacing": 1.2,
-}
+def key_entries(key: BundleKey | ScalarKey) -> list[tuple[str, Any]]:
+    """Label and RGB from 0 to 1 of what has a color by itself; unstable samples are the last."""
+    named = zip(key.labels, key.colors / 255, strict=True) if isinstance(key, BundleKey) else ()
+    unstable = ("unstable", np.array(UNSTABLE) / 255)
+    return [*named, unstable] if key.unstable else [*named]
+
+
+def draw_entries(owner: Axes | Figure, entries: Iterable[tuple[str, Any]], **look: Any) -> None:
+    """A legend of colors that stand for something each."""
+    from matplotlib.patches import Patch
+
+    owner.legend(handles=[Patch(facecolor=color, label=label) for label, color in entries], **look)
 
 
 def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
@@ -240,68 +233,50 @@ def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
         return names.index(color)
     if not isinstance(color, str) and 0 <= color < len(names):
         return int(color)
-    known = ", ".join(names)
-    raise InvalidInput(
-        "color",
-        color,
-        f'"rgb", "strongest", "effort", a bundle ({known}) or its index, or an array',
-    )
+    known = f"a bundle ({', '.join(names)}) or its index"
+    raise InvalidInput("color", color, f'"rgb", "strongest", "effort", {known}, or an array')
 
 
 def _given(color: ArrayLike, samples: int) -> Coloring:
     values = as_floats("color", color, '"rgb", a bundle or its index, or an array of numbers')
-    if values.shape == (samples,):
-        if _spans_decades(values, color):
-            return _logarithmic(values, _described(color))
-        coloring = _scalar(values, _described(color))
-        return _clipped(coloring) if getattr(color, "attrs", {}).get("clipped") else coloring
     if values.shape == (samples, 3):
         return Coloring(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8), None)
-    raise InvalidInput("color.shape", values.shape, f"({samples},) or ({samples}, 3)")
-
-
-def _clipped(coloring: Coloring) -> Coloring:
-    assert isinstance(coloring.key, ScalarKey)
-    return coloring._replace(key=coloring.key._replace(clipped=True))
-
-
-def _described(color: ArrayLike) -> str:
+    if values.shape != (samples,):
+        raise InvalidInput("color.shape", values.shape, f"({samples},) or ({samples}, 3)")
     attrs = getattr(color, "attrs", {})
     name, unit = attrs.get("long_name", ""), attrs.get("units", "").translate(POWERS)
-    return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
-
-
-def _spans_decades(values: Array, color: ArrayLike) -> bool:
-    """True if an array whose ratios count has some that are too large for even steps of color."""
-    if getattr(color, "attrs", {}).get("scale") != "log":
-        return False
+    label = f"{name} [{'-' if unit == '1' else unit}]" if unit else name
     known = values[np.isfinite(values)]
-    return known.size > 0 and 0.0 < _WIDE * known.min() < known.max()
+    if attrs.get("scale") == "log" and known.size and 0.0 < _WIDE * known.min() < known.max():
+        rgb, key = _scalar(np.log(values), label)
+        ends = {"low": math.exp(key.low), "high": math.exp(key.high)}
+        return Coloring(rgb, key._replace(**ends, logarithmic=True))
+    rgb, key = _scalar(values, label)
+    return Coloring(rgb, key._replace(clipped=bool(attrs.get("clipped"))))
 
 
-def _logarithmic(values: Array, label: str) -> Coloring:
-    rgb, key = _scalar(np.log(values), label)
-    assert isinstance(key, ScalarKey)
-    low, high = math.exp(key.low), math.exp(key.high)
-    return Coloring(rgb, ScalarKey(label, low, high, logarithmic=True))
-
-
-def _scalar(values: Array, label: str, low: float | None = None) -> Coloring:
-    from matplotlib import colormaps
-
+def _scalar(
+    values: Array, label: str, low: float | None = None
+) -> tuple[NDArray[np.uint8], ScalarKey]:
     finite = np.isfinite(values)
     some = finite.any()
     start = float(values.min(where=finite, initial=np.inf)) if low is None and some else low or 0.0
     stop = float(values.max(where=finite, initial=start)) if some else start + 1.0
+    return scale_colors(values, start, stop), ScalarKey(label, start, stop)
+
+
+def scale_colors(
+    values: Array, low: float, high: float, missing: int = _MISSING
+) -> NDArray[np.uint8]:
+    """Colors of numbers from low to high, and the gray of those that are missing, shape (n, 3)."""
+    from matplotlib import colormaps
+
     table = colormaps[COLORMAP](np.arange(257), bytes=True)[:, :3]
-    table[256] = _MISSING
-    share = np.where(finite, (values - start) / ((stop - start) or 1.0), 0.0)
-    index = np.minimum(255, (256 * share).astype(np.int16))
-    return Coloring(table[np.where(finite, index, 256)], ScalarKey(label, start, stop))
-
-
-def _extend(key: ScalarKey) -> str:
-    return "both" if key.clipped else "neither"
+    table[256] = missing
+    finite = np.isfinite(values)
+    share = np.where(finite, (values - low) / ((high - low) or 1.0), 0.0)
+    index = np.minimum(255, 256 * share).astype(np.int16)
+    return table[np.where(finite, index, 256)]
 
 
 def color_map(key: ScalarKey) -> Any:
@@ -311,19 +286,3 @@ def color_map(key: ScalarKey) -> Any:
 
     norm = LogNorm if key.logarithmic else Normalize
     return ScalarMappable(norm(key.low, key.high), COLORMAP)
-
-
-def _patches(key: BundleKey) -> list[Any]:
-    from matplotlib.patches import Patch
-
-    named = zip(key.labels, key.colors / 255, strict=True)
-    title = [Patch(facecolor="none", label=key.title)] if key.title else []
-    patches = (Patch(facecolor=tuple(rgb), label=label) for label, rgb in named)
-    return [*title, *patches, *_marks(key)]
-
-
-def _marks(key: BundleKey | ScalarKey) -> list[Any]:
-    from matplotlib.patches import Patch
-
-    color = tuple(np.array(UNSTABLE) / 255)
-    return [Patch(facecolor=color, label="unstable")] if key.unstable else []

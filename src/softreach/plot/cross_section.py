@@ -1,73 +1,39 @@
-"""Picture of a cross-section: its layers, its bundles, and the key of both."""
+"""Picture of a cross-section: its layers by material, its bundles in their colors, their key."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.section_parts import (
-    PlacedBundle,
-    draw_bundles,
-    draw_layers,
-    lumen_style,
-    material_style,
-    placed_bundles,
-    section_materials,
-    tendon_style,
-)
 from softreach.plot.style import LENGTH, PLACE, as_axes, figure_style, small_axes, some_bundles
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
+from softreach.support.palette import BODY, Color, bundle_color, material_fill
+from softreach.support.units import METER, readable_unit
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.patches import Patch, Wedge
 
     from softreach.arm.material import Material
+    from softreach.arm.section import Section
 
 
 _MOST = 12  # entries
 _HANDLE, _LETTER = 0.5, 0.056  # inches
-_UNITS = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))
 _SIZE = 2.0  # inches
 _MARGIN = 1.08
-
-
-class SectionKey(NamedTuple):
-    """Key of a cross-section: looks and names of its materials and bundles."""
-
-    handles: list[Artist]
-    labels: list[str]
-
-    @property
-    def width(self) -> float:
-        """Room that it takes on paper, about [inch]."""
-        return _HANDLE + _LETTER * max(map(len, self.labels), default=0)
-
-    def draw(self, ax: Axes) -> None:
-        """Place it to the right of the axes."""
-        place = {"loc": "center left", "bbox_to_anchor": (1.02, 0.5), "borderaxespad": 0.0}
-        ax.legend(self.handles, self.labels, frameon=False, fontsize=7, **place)
-
-
-def needs_section_key(arm: Manipulator) -> bool:
-    """True if colors alone leave open what is what: several materials, or more than fibers."""
-    shapes = set(arm.outline(0.0).shape)
-    plain = shapes == {"sector"} and set(arm.bundle_courses) == {"along"}
-    return not plain or len(section_materials(arm.section)) > 1
-
-
-def section_key(arm: Manipulator, placed: Collection[PlacedBundle]) -> SectionKey:
-    """Names of the materials, and of bundles with their activations."""
-    entries = [*_materials(arm), *_bundles(arm, placed)]
-    handles, labels = [list(column) for column in zip(*entries[:_MOST], strict=True)] or [[], []]
-    if len(entries) > _MOST:
-        labels[-1] += f" and {len(entries) - _MOST} more"
-    return SectionKey(handles, labels)
+_EDGE, _HATCH = "0.4", "0.55"
+_STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
+_LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
+_LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
+_OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
 
 
 def plot_cross_section(
@@ -106,26 +72,35 @@ def plot_cross_section(
     """
     arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
     half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
-    legend = needs_section_key(arm) if legend is None else as_flag("legend", legend)
+    if legend is None:  # where colors alone leave open what is what
+        plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.bundle_courses) == {"along"}
+        legend = not plain or len(_section_materials(arm.section)) > 1
+    legend = as_flag("legend", legend)
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     counted = unit_for(arm.length, unit)
     outer = float(counted.of(arm.profile.radius(z)))
-    placed = placed_bundles(
+    placed = _placed_bundles(
         arm, z, range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
     )
     with figure_style(ax):
-        key = section_key(arm, placed) if legend else None
-        ax = small_axes(_SIZE + (key.width if key else 0.0), _SIZE) if ax is None else ax
-        draw_layers(ax, arm.section, outer)
-        draw_bundles(ax, placed, outer)
+        entries = [*_materials(arm), *_bundles(arm, placed)] if legend else []
+        handles, labels = [artist for artist, _ in entries], [label for _, label in entries]
+        if len(labels) > _MOST:
+            labels[_MOST - 1] += f" and {len(labels) - _MOST} more"
+        labels = labels[:_MOST]
+        room = _HANDLE + _LETTER * max(map(len, labels), default=0) if legend else 0.0
+        ax = small_axes(_SIZE + room, _SIZE) if ax is None else ax
+        _draw_layers(ax, arm.section, outer)
+        _draw_bundles(ax, placed, outer)
         half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
         half = float(counted.of(half))
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
         ax.set(xlabel=counted.label("x"), ylabel=counted.label("y"))
         ax.locator_params(nbins=3)
-        if key:
-            key.draw(ax)
+        if legend:
+            place = {"loc": "center left", "bbox_to_anchor": (1.02, 0.5), "borderaxespad": 0.0}
+            ax.legend(handles[:_MOST], labels, frameon=False, fontsize=7, **place)
     return ax
 
 
@@ -139,35 +114,223 @@ def section_reach(arm: Manipulator, z: float) -> float:
 def _materials(arm: Manipulator) -> Iterator[tuple[Artist, str]]:
     from matplotlib.patches import Patch
 
-    materials = section_materials(arm.section)
+    materials = _section_materials(arm.section)
     if len(materials) == 1 and materials[0][1].young_modulus is None:
         return
     for part, material in materials:
-        patch = Patch(**material_style(arm.section, material))
+        patch = Patch(**_material_style(arm.section, material))
         patch.set_hatch_linewidth(0.4)
-        yield patch, _material_label(part, material)
+        label = material.name or part
+        if (modulus := material.young_modulus) is not None:
+            unit, size = readable_unit("Pa", modulus, METER)
+            label += f": E = {modulus / size:.3g} {unit}"
+        yield patch, label
 
 
-def _bundles(arm: Manipulator, placed: Collection[PlacedBundle]) -> Iterator[tuple[Artist, str]]:
+def _bundles(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[tuple[Artist, str]]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     symbols = [actuator.symbol for actuator in arm.bundle_actuators]
     for bundle in placed:
         if bundle.shape == "line":
-            handle: Artist = Line2D([], [], **tendon_style(bundle.color))
+            handle: Artist = Line2D([], [], **_tendon_style(bundle.color))
         else:
             lumen = bundle.shape == "lumen"
-            handle = Patch(**lumen_style(bundle.color)) if lumen else Patch(color=bundle.color)
+            handle = Patch(**_lumen_style(bundle.color)) if lumen else Patch(color=bundle.color)
         course = "" if bundle.course == "along" else f", {bundle.course}"
         unit = arm.bundle_units[bundle.index].replace("1", "-")
         name = arm.bundle_names[bundle.index]
         yield handle, f"{name}{course}: {symbols[bundle.index]} [{unit}]"
 
 
-def _material_label(part: str, material: Material) -> str:
-    name = material.name or part
-    if material.young_modulus is None:
-        return name
-    size, unit = next(pair for pair in _UNITS if material.young_modulus >= pair[0])
-    return f"{name}: E = {material.young_modulus / (size or 1.0):.3g} {unit}"
+def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
+    """Layers; what is empty is white.
+
+    In a section of one material the core is paler than the rings; rings above others are clear.
+    """
+    from matplotlib.patches import Circle
+
+    line = {"edgecolor": _EDGE, "linewidth": 0.6}
+    ax.add_patch(Circle((0, 0), outer, facecolor="0.97", **line))
+    several = len(_section_materials(section)) > 1
+    if several and section.inner_ratio > section.bore_ratio:
+        _draw_material(ax, section, section.core_material, 0.0, outer * section.inner_ratio)
+    _draw_voids(ax, section, outer)
+    for k, ring in enumerate(section.rings):
+        low, high = ring.inner_ratio, ring.outer_ratio
+        over = any(
+            low < other.outer_ratio and other.inner_ratio < high for other in section.rings[:k]
+        )
+        if several:
+            alpha = 0.5 if over else 1.0
+            _draw_material(ax, section, ring.material, outer * low, outer * high, alpha)
+        else:
+            ax.add_patch(_annulus(outer * low, outer * high, BODY))
+
+
+def _section_materials(section: Section) -> tuple[tuple[str, Material], ...]:
+    """The different materials of a section, rings first, each with the part it is found in."""
+    rings = [
+        (ring.name or ("ring" if len(section.rings) == 1 else f"ring {k + 1}"), ring.material)
+        for k, ring in enumerate(section.rings)
+    ]
+    has_core = section.inner_ratio > section.bore_ratio
+    materials: list[tuple[str, Material]] = []
+    for part, material in [*rings, *([("core", section.core_material)] if has_core else [])]:
+        if not any(material.same_matter(other) for _, other in materials):
+            materials.append((part, material))
+    return tuple(materials)
+
+
+def _material_style(section: Section, material: Material) -> dict[str, Any]:
+    known = [material.same_matter(other) for _, other in _section_materials(section)]
+    color, hatch = material_fill(known.index(True))
+    return {"facecolor": color, "hatch": hatch, "edgecolor": _HATCH, "linewidth": 0.0}
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """One bundle that acts in a section."""
+
+    index: int
+    shape: str
+    course: str
+    center: float  # polar angle [rad]
+    extent: float  # angular [rad]
+    inner_ratio: float  # of R2
+    outer_ratio: float  # of R2
+
+    @property
+    def color(self) -> Color:
+        return bundle_color(self.index)
+
+    def overlaps(self, other: _Placed) -> Iterator[_Placed]:
+        """The parts of this sector that another shares."""
+        inner = max(self.inner_ratio, other.inner_ratio)
+        outer = min(self.outer_ratio, other.outer_ratio)
+        apart = (other.center - self.center + np.pi) % (2 * np.pi) - np.pi
+        for turn in (apart - 2 * np.pi, apart, apart + 2 * np.pi):
+            low = max(-self.extent / 2, turn - other.extent / 2)
+            high = min(self.extent / 2, turn + other.extent / 2)
+            if outer - inner > _OVERLAP and high - low > _OVERLAP:
+                middle, extent = self.center + 0.5 * (low + high), high - low
+                ratios = {"inner_ratio": inner, "outer_ratio": outer}
+                yield replace(self, center=middle, extent=extent, **ratios)
+
+
+def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> list[_Placed]:
+    outline = arm.outline(z)
+    sizes = (outline.center[0], outline.extent, outline.inner_ratio[0], outline.outer_ratio[0])
+    return [
+        _Placed(k, outline.shape[k], arm.bundle_courses[k], *(float(size[k]) for size in sizes))
+        for k in bundles
+        if outline.acts[0, k]
+    ]
+
+
+def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
+    from matplotlib.patches import Circle
+
+    sectors = [bundle for bundle in placed if bundle.shape == "sector"]
+    for bundle in sectors:
+        ax.add_patch(_sector(bundle, outer, color=bundle.color, linewidth=0))
+    for k, bundle in enumerate(sectors):
+        for above in sectors[k + 1 :]:
+            for part in bundle.overlaps(above):
+                look = {"facecolor": "none", "edgecolor": part.color, "linewidth": 0.0}
+                stripes = _sector(part, outer, **look)
+                stripes.set_hatch("//////")
+                stripes.set_hatch_linewidth(1.2)
+                ax.add_patch(stripes)
+    for bundle in sectors:
+        _draw_strokes(ax, bundle, outer)
+    for bundle in (bundle for bundle in placed if bundle.shape == "lumen"):
+        radius = 0.5 * outer * (bundle.outer_ratio - bundle.inner_ratio)
+        (x,), (y,) = _middle(bundle, outer)
+        ax.add_patch(Circle((x, y), radius, **_lumen_style(bundle.color)))
+    lines = [bundle for bundle in placed if bundle.shape == "line"]
+    for ratio in sorted({round(line.outer_ratio, 9) for line in lines if line.outer_ratio > 1}):
+        disk = {"facecolor": "none", "edgecolor": "0.6", "linewidth": 0.6, "linestyle": ":"}
+        ax.add_patch(Circle((0, 0), outer * ratio, **disk))
+    for bundle in lines:
+        ax.plot(*_middle(bundle, outer), zorder=3, **_tendon_style(bundle.color))
+
+
+def _tendon_style(color: Color) -> dict[str, Any]:
+    edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
+    return {"marker": "o", "markersize": 5.5, "linestyle": "none", "color": color, **edge}
+
+
+def _lumen_style(color: Color) -> dict[str, Any]:
+    pale = tuple(0.25 * part + 0.75 for part in color)
+    return {"facecolor": pale, "edgecolor": color, "linewidth": 1.4}
+
+
+def _draw_material(
+    ax: Axes, section: Section, material: Material, low: float, high: float, alpha: float = 1.0
+) -> None:
+    style = _material_style(section, material)
+    fill = _annulus(low, high, "none")
+    fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
+    fill.set_hatch_linewidth(0.4)
+    ax.add_patch(fill)
+    ax.add_patch(_annulus(low, high, "none"))
+
+
+def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
+    reached = section.bore_ratio
+    voids = [(0.0, reached)] if reached > 0 else []
+    reached = max(reached, section.inner_ratio)
+    for ring in sorted(section.rings, key=lambda ring: ring.inner_ratio):
+        if ring.inner_ratio > reached:
+            voids.append((reached, ring.inner_ratio))
+        reached = max(reached, ring.outer_ratio)
+    for low, high in voids:
+        ax.add_patch(_annulus(outer * low, outer * high, "white"))
+
+
+def _annulus(low: float, high: float, fill: Any) -> Patch:
+    from matplotlib.patches import Annulus, Circle
+
+    look = {"facecolor": fill, "edgecolor": _EDGE, "linewidth": 0.4}
+    return Annulus((0, 0), high, high - low, **look) if low > 0 else Circle((0, 0), high, **look)
+
+
+def _sector(bundle: _Placed, outer: float, **style: Any) -> Wedge:
+    from matplotlib.patches import Wedge
+
+    center, extent = np.degrees(bundle.center), np.degrees(bundle.extent)
+    ends = center - extent / 2, center + extent / 2
+    radius, width = outer * bundle.outer_ratio, outer * (bundle.outer_ratio - bundle.inner_ratio)
+    return Wedge((0, 0), radius, *ends, width=width, **style)
+
+
+def _draw_strokes(ax: Axes, bundle: _Placed, outer: float) -> None:
+    """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
+    from matplotlib.collections import LineCollection
+
+    lean = {"along": None, "radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[
+        bundle.course
+    ]
+    if lean is None:
+        return
+    half = 0.5 * (bundle.extent - abs(lean))
+    if half <= 0:
+        half, lean = 0.4 * bundle.extent, np.sign(lean) * min(abs(lean), 0.2 * bundle.extent)
+    angles = bundle.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
+    ends = [
+        outer * ratio * np.column_stack([np.cos(at), np.sin(at)])
+        for ratio, at in (
+            (bundle.inner_ratio, angles - lean / 2),
+            (bundle.outer_ratio, angles + lean / 2),
+        )
+    ]
+    strokes = np.stack(ends, axis=1)
+    ink = "white" if np.dot(bundle.color, _LIGHTNESS) < 0.55 else "0.3"
+    ax.add_collection(LineCollection(list(strokes), colors=ink, linewidths=0.7))
+
+
+def _middle(bundle: _Placed, outer: float) -> tuple[list[float], list[float]]:
+    radius = 0.5 * outer * (bundle.inner_ratio + bundle.outer_ratio)
+    return [radius * np.cos(bundle.center)], [radius * np.sin(bundle.center)]

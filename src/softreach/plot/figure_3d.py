@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from softreach.picture.thumbnail import Dots, Skin
 from softreach.plot.arm import shapes_of
 from softreach.plot.axes import bounding_box
 from softreach.plot.clouds import drawn_tips, point_size
-from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey, color_map, color_samples
+from softreach.plot.coloring import BundleKey, ScalarKey, color_map, color_samples, key_entries
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import a_surface
 from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
@@ -131,7 +132,7 @@ class Scene:
     def add(self, things: Sequence[Any]) -> None:
         """Things to show, one after the other."""
         for thing in things:
-            _ADD[_kind(thing)](self, thing)
+            getattr(self, f"add_{_kind(thing)}")(thing)
 
     def points(self) -> list[ArrayLike]:
         """All places, one array for each part."""
@@ -145,9 +146,7 @@ class Scene:
         if len(known) > _POINTS:
             chosen = np.sort(np.random.default_rng(0).choice(known, _POINTS, replace=False))
         shown, of = f"{len(chosen):,}", f"{len(known):,}"
-        self.notes.append(
-            f"{shown} points" if shown == of else f"{shown} of {of} points, at random"
-        )
+        self.notes.append(f"{of} points" if shown == of else f"{shown} of {of} points, at random")
         self.captions.append(f"Cloud of {of} tips")
         name, tips = self._name("cloud"), tips[chosen]
         dots = Dots(tips, coloring.rgb[chosen])
@@ -263,28 +262,16 @@ class Scene:
         return word if number == 1 else f"{word} #{number}"
 
 
-_ADD: dict[str, Callable[[Scene, Any], None]] = {
-    "cloud": Scene.add_cloud,
-    "set": Scene.add_set,
-    "hull": Scene.add_hull,
-    "surface": Scene.add_surface,
-    "arm": Scene.add_arm,
-    "configuration": Scene.add_configuration,
-    "equilibria": Scene.add_equilibria,
-}
+_CLASSES = {"AllEquilibria": "equilibria", "ReachableSet": "set", "Hull": "hull"}
 
 
 def _kind(thing: Any) -> str:
     """The kind of a thing to show, by its class, which need not be loaded, or by what it has."""
-    bases = {base.__name__ for base in type(thing).__mro__}
+    bases = [base.__name__ for base in type(thing).__mro__]
     if isinstance(thing, Manipulator):
         return "arm"
-    if "AllEquilibria" in bases:
-        return "equilibria"
-    if "ReachableSet" in bases:
-        return "set"
-    if "Hull" in bases:
-        return "hull"
+    if known := [_CLASSES[name] for name in bases if name in _CLASSES]:
+        return known[0]
     if "Dataset" in bases and "tip" in thing and "activation" in thing:
         a_cloud("data", thing)
         return "cloud"
@@ -299,28 +286,21 @@ def _kind(thing: Any) -> str:
 
 def _length(thing: Any) -> float | None:
     """L [m] of the arm that a thing is of; None where it is not known."""
-    match _kind(thing):
-        case "arm":
-            return thing.length
-        case "set":
-            return thing.arm.length
-        case "equilibria":
-            return thing.rod.arm.length
-        case "cloud":
-            return thing["tip"].attrs.get("length")
-        case "configuration":
-            return design_of(thing).length
-    return None
+    kind = _kind(thing)
+    if kind == "cloud":
+        return thing["tip"].attrs.get("length")
+    if kind == "configuration":
+        return design_of(thing).length
+    arms = {"arm": "length", "set": "arm.length", "equilibria": "rod.arm.length"}
+    return attrgetter(arms[kind])(thing) if kind in arms else None
 
 
 def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
     if key is None:
         return []
-    marks = [("unstable", css_color(np.array(UNSTABLE) / 255))] if key.unstable else []
+    marks = [(label, css_color(rgb)) for label, rgb in key_entries(key)]
     if isinstance(key, BundleKey):
-        named = zip(key.labels, key.colors / 255, strict=True)
-        swatches = [(label, css_color(rgb)) for label, rgb in named]
-        return [Swatches([*swatches, *marks], key.title)]
+        return [Swatches(marks, key.title)]
     scale = color_map(key)
     shares = np.linspace(0.0, 1.0, 17)
     colors = [css_color(rgb[:3]) for rgb in scale.cmap(shares)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,16 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.picture.projection import View, is_mirrored, project, view_axes
+from softreach.picture.projection import View, on_paper
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import figure_style, panel_arguments, small_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
+from softreach.support.arguments import POSITIVE, as_given, as_number
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
+from softreach.support.quantity import round_below
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,6 @@ _BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
 _ARROW = 26  # length of the arrow of gravity [points]
 _SHORTEST_ARROW = 0.1  # part of a direction in the paper, below which an arrow says nothing
 _LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
-_ABOVE = 4  # the order of lines over images
 _LARGEST = 0.2  # L, the longest half axis if the force is not given
 _CORNERS = 120
 _COLOR = "tab:orange"
@@ -83,7 +82,9 @@ def plot_equilibria(
     rings = [k for k, ring in enumerate(equilibria.is_ring) if ring]
     circles = {k: counted.of(_circle(equilibria, k)) for k in rings}
     with figure_style(ax):
-        rim = _rim(float(arm.profile.radius(0.0)))
+        turn = np.linspace(0.0, 2.0 * np.pi, 65)
+        rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+        rim *= _BASE * float(arm.profile.radius(0.0))
         rim = counted.of(equilibria.rod.pose.to_world(rim))
         points = [rim, *(arm_points(arm, shape, counted) for shape in shapes), *circles.values()]
         panel = Panel.opened(np.concatenate(points), counted, ax, view, box)
@@ -91,10 +92,10 @@ def plot_equilibria(
         draw_arms(panel, arm, followed, range(arm.bundles))
         for k, circle in circles.items():
             color = _STABLE if stable[k] else _UNSTABLE
-            _line(panel, circle, color=color, linestyle=":", linewidth=0.8)
+            panel.plot(circle, color=color, linestyle=":", linewidth=0.8, solid_capstyle="round")
         for k, shape in enumerate(shapes):
-            _line(panel, counted.of(shape["position"].values), **_style(equilibria, k))
-        _line(panel, rim, color="0.2", linewidth=2.0)
+            panel.plot(counted.of(shape["position"].values), **_style(equilibria, k))
+        panel.plot(rim, color="0.2", linewidth=2.0, solid_capstyle="round")
         _gravity_arrow(panel, equilibria)
         _add_legend(panel.ax, own_figure=ax is None)
     return panel.ax
@@ -108,7 +109,6 @@ def plot_compliance(
     ax: Axes | None = None,
     view: View = "front",
     force: float | None = None,
-    rest: bool = False,
     box: ArrayLike | None = None,
     unit: Unit = None,
 ) -> Axes:
@@ -123,7 +123,6 @@ def plot_compliance(
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
         force: Size of the force [N]; None for a round one.
-        rest: Whether to draw the arm at rest too.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
         unit: As in `plot_arm`.
 
@@ -134,7 +133,7 @@ def plot_compliance(
         InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
         MissingExtra: matplotlib is not installed.
     """
-    arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
+    arm = a_manipulator("arm", arm)
     shapes = shapes_of(a_configuration("configuration", configuration))
     values = as_floats("compliance", compliance)
     force = None if force is None else as_number("force", force, POSITIVE)
@@ -144,7 +143,9 @@ def plot_compliance(
         raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
     if len(matrices) != len(shapes):
         raise InvalidInput("compliance", f"{len(matrices)} of them", f"one each of {len(shapes)}")
-    force = _round_force(matrices, arm.length) if force is None else force
+    if force is None:  # that keeps the ellipsoids small
+        softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
+        force = round_below(_LARGEST * arm.length / softest)
     if not 0 < force < np.inf:
         raise InvalidInput("force", force, "> 0 N")
     counted = unit_for(arm.length, unit)
@@ -155,7 +156,7 @@ def plot_compliance(
             surfaces = [arm_points(arm, shape, counted) for shape in shapes]
             half = np.linalg.norm(axes, axis=2)  # of the boxes around the ellipsoids
             box = counted.size * bounding_box(*surfaces, tips - half, tips + half)
-        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box, unit=counted)
+        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=False, box=box, unit=counted)
         for outline in _outlines(tips, axes, view):
             ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
             ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
@@ -168,7 +169,6 @@ def plot_payload_curve(
     *,
     ax: Axes | None = None,
     largest: Sequence[LargestPayload] = (),
-    label: str | None = None,
 ) -> Axes:
     """Draw the share of the reachable volume against the payload, with its errors.
 
@@ -176,7 +176,6 @@ def plot_payload_curve(
         curve: What `payload_curve` gives.
         ax: Axes to draw in; None for a new figure.
         largest: Payloads to mark, from `PayloadCurve.largest_payload`.
-        label: What a legend calls the curve.
 
     Returns:
         The axes, payloads in kg.
@@ -189,7 +188,7 @@ def plot_payload_curve(
     mass, share = zip(*sorted(points), strict=True)
     with figure_style(ax):
         ax = small_axes(3.4, 2.6) if ax is None else ax
-        (line,) = ax.plot(mass, share, linewidth=1.2, label=label)
+        (line,) = ax.plot(mass, share, linewidth=1.2)
         style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
         ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)
         for point in largest:
@@ -198,8 +197,6 @@ def plot_payload_curve(
             ax.plot(point.payload, point.share, "o", markersize=4, mfc="white", color="0.3")
         ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
         ax.set(xlim=(0.0, None), ylim=(0.0, None))
-        if label is not None:
-            ax.legend(loc="upper right")
     return ax
 
 
@@ -211,14 +208,9 @@ def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
         "color": _FOLLOWED if follows else _STABLE if stable else _UNSTABLE,
         "linestyle": "-" if stable else "--",
         "linewidth": 1.4 if stable or follows else 1.0,
+        "solid_capstyle": "round",
         "label": f"{kind}, the posture" if follows else kind,
     }
-
-
-def _line(panel: Panel, points: Array, **style: Any) -> None:
-    right, up, _ = project(points, panel.view).T
-    mirror = -1 if is_mirrored(panel.view) else 1
-    panel.ax.plot(mirror * right, up, zorder=_ABOVE, solid_capstyle="round", **style)
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:
@@ -231,30 +223,24 @@ def _circle(equilibria: AllEquilibria, k: int) -> Array:
     return pose.to_world(turned)
 
 
-def _rim(radius: float) -> Array:
-    angle = np.linspace(0.0, 2.0 * np.pi, 65)
-    return _BASE * radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-
-
 def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
     if equilibria.solver is None:
         return
     tables = equilibria.solver.tables
-    right, up, _ = view_axes(panel.view) @ equilibria.rod.pose.directions_to_world(tables.axes[0])
+    right, up = on_paper(equilibria.rod.pose.directions_to_world(tables.axes[0]), panel.view)
     if np.hypot(right, up) < _SHORTEST_ARROW:
         return
-    mirror = -1 if is_mirrored(panel.view) else 1
     panel.ax.annotate(
         "g" if any(tables.loads.gravity) else "force",
         xy=(0.09, 0.86),
         xycoords="axes fraction",
-        xytext=(-_ARROW * mirror * right, -_ARROW * up),
+        xytext=(-_ARROW * right, -_ARROW * up),
         textcoords="offset points",
         ha="center",
         va="center",
         fontsize=8,
         arrowprops={"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0},
-        zorder=_ABOVE,
+        zorder=4,
     )
 
 
@@ -276,18 +262,8 @@ def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
     """Outlines of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     circle = np.array([np.cos(turn), np.sin(turn)])
-    mirror = np.array([-1.0 if is_mirrored(view) else 1.0, 1.0])[:, None]
-    centers = project(tips, view)[:, :2, None]
     outlines = []
-    for center, matrix in zip(centers, axes, strict=True):
-        left, half, _ = np.linalg.svd(project(matrix.T, view).T[:2], full_matrices=False)
-        outlines.append(mirror * (center + (left * half) @ circle))
+    for tip, matrix in zip(tips, axes, strict=True):
+        left, half, _ = np.linalg.svd(on_paper(matrix.T, view).T, full_matrices=False)
+        outlines.append(on_paper(tip, view)[:, None] + (left * half) @ circle)
     return outlines
-
-
-def _round_force(matrices: Array, length: float) -> float:
-    """The largest of 1, 2, 5, 10, ... [N] that keeps the ellipsoids small."""
-    softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
-    most = _LARGEST * length / softest
-    power = 10.0 ** math.floor(math.log10(most))
-    return max(power * digit for digit in (1.0, 2.0, 5.0) if power * digit <= most * (1 + 1e-9))

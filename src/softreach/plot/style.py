@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import SurfaceMesh
@@ -39,15 +41,9 @@ _RC: dict[str, Any] = {
     "font.size": 8,
     "legend.fontsize": 7,
     "legend.frameon": False,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "xtick.color": "0.25",
-    "ytick.color": "0.25",
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5,
 }
+_TICKS = {"labelsize": 7, "color": "0.25", "major.width": 0.6, "major.size": 2.5}
+_RC |= {f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.items()}
 # names that others gave, such as $x_1$ or 50 %, are no mathematics and no LaTeX
 _TEXT: dict[str, Any] = {"text.parse_math": False, "text.usetex": False}
 # text stays text in vector files, so that a journal can set it in its own type
@@ -56,6 +52,8 @@ LENGTH = POSITIVE._replace(unit="m")
 PLACE = Range(unit="m")
 SIZE = Range(0.0, 1e3, "pixels", open_low=True)
 WIDTH = Range(1.0, 100.0, "inches")
+PAGE = 6.9
+"""Width of figures of several panels, a page's [inch]."""
 
 
 def pyplot() -> Any:
@@ -85,6 +83,36 @@ def figure_style(ax: Axes | None = None) -> AbstractContextManager[None]:
 def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
     """Axes in a new figure of that size [inch], by default a journal's column wide."""
     return pyplot().subplots(figsize=(width, height), layout="constrained")[1]
+
+
+def place_panels(
+    width: float,
+    columns: Sequence[float],
+    rows: Sequence[float],
+    around: tuple[float, float, float, float],
+    gaps: tuple[float, float] = (0.0, 0.0),
+) -> tuple[Figure, NDArray[np.object_]]:
+    """A figure of panels at one scale, shape (rows, columns).
+
+    Args:
+        width: Of the figure [inch].
+        columns: What each shows in width, from left to right, in one unit with the rows.
+        rows: What each shows in height, from top to bottom.
+        around: Left, right, bottom and top of all panels [inch].
+        gaps: Between columns, and between rows [inch].
+    """
+    left, right, bottom, top = around
+    scale = (width - left - right - gaps[0] * (len(columns) - 1)) / sum(columns)
+    wide, high = scale * np.array(columns), scale * np.array(rows)
+    height = bottom + high.sum() + gaps[1] * (len(rows) - 1) + top
+    figure = pyplot().figure(figsize=(width, height))
+    panels = np.empty((len(rows), len(columns)), object)
+    for row, column in np.ndindex(panels.shape):
+        x = left + wide[:column].sum() + column * gaps[0]
+        y = bottom + high[row + 1 :].sum() + (len(rows) - 1 - row) * gaps[1]
+        place = np.array([x, y, wide[column], high[row]]) / [width, height, width, height]
+        panels[row, column] = figure.add_axes(tuple(place))
+    return figure, panels
 
 
 def save_figure(
@@ -124,6 +152,16 @@ def save_figure(
             }
             options = encodings.get(suffix, {})
             root.savefig(file, dpi=DPI, format=suffix[1:], **options)
+
+
+def legend_above(ax: Axes, columns: int = 3, **more: Any) -> None:
+    """A legend over the upper edge of axes."""
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, **more)
+
+
+def remark(ax: Axes, text: str) -> None:
+    """Small words above axes, at the left."""
+    ax.set_title(text, fontsize=7, color="0.25", loc="left")
 
 
 def write_note(ax: Axes, text: str, right: float, up: float) -> None:

@@ -11,6 +11,7 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.clouds import FAINT
+from softreach.support.quantity import round_below
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -138,9 +139,7 @@ def scale_bar(pixels_per_length: float, room: float, length: float) -> ScaleBar:
         room: Pixels that the bar may take.
         length: L [m].
     """
-    longest = room / pixels_per_length
-    power = 10.0 ** math.floor(math.log10(longest))
-    bar = max(step * power for step in (1, 2, 5) if step * power <= longest * (1 + 1e-9))
+    bar = round_below(room / pixels_per_length)
     return ScaleBar(bar * pixels_per_length, f"{bar:.12g} L = {_meters(bar * length)}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,23 +165,15 @@ def _caption(state: StudioState, reach: Reach) -> list[str]:
 def _draw_key(
     figure: Figure, key: BundleKey | ScalarKey, place: tuple[float, float], ink: str
 ) -> None:
-    from matplotlib.patches import Patch
-
-    from softreach.plot.coloring import BundleKey, color_map
+    from softreach.plot.coloring import BundleKey, color_map, draw_entries
 
     top, height = place
     if isinstance(key, BundleKey):
-        patches: list[Any] = [
-            Patch(facecolor=tuple(rgb / 255), label=label)
-            for label, rgb in zip(key.labels, key.colors, strict=True)
-        ]
-        figure.legend(
-            handles=patches, loc="center", bbox_to_anchor=(0.5, top), ncols=len(patches),
-            fontsize=8.5, frameon=False, labelcolor=ink,
-        )  # fmt: skip
+        look = {"ncols": len(key.labels), "fontsize": 8.5, "frameon": False, "labelcolor": ink}
+        entries = zip(key.labels, key.colors / 255, strict=True)
+        draw_entries(figure, entries, loc="center", bbox_to_anchor=(0.5, top), **look)
         return
     bar = figure.add_axes((0.25, top, 0.5, 0.22 * height))
-    extend = "both" if key.clipped else "neither"
-    figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=extend)
+    figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=key.extend)
     bar.tick_params(labelsize=8, colors=ink)
     bar.set_title(key.label, fontsize=8.5, color=ink, pad=3)

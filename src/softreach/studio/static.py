@@ -23,7 +23,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, written_name
 from softreach.atlas.space import DesignSpace
 from softreach.geometry.surface import Surface
-from softreach.picture.page import packed, packed_keys, script_text, web_page
+from softreach.picture.page import packed, script_text, web_page
 from softreach.picture.thumbnail import Skin
 from softreach.plot.axes import bounding_box
 from softreach.plot.coloring import COLORMAP
@@ -201,7 +201,7 @@ def _content(arm: Manipulator, unit: LengthUnit) -> dict[str, Any]:
     return {
         "numbers": numbers,
         "box": box.tolist(),
-        "keys": packed_keys(scene.keys),
+        "keys": [key._asdict() for key in scene.keys],
         "note": ". ".join([*scene.notes[:1], *_errors(reached, scene, box)]),
         "parts": [packed(part, box) for part in scene.parts],
     }

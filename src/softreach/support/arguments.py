@@ -29,7 +29,6 @@ __all__ = [
     "as_instance",
     "as_integer",
     "as_mapping",
-    "as_name_or_index",
     "as_names",
     "as_number",
     "as_one_of",
@@ -102,14 +101,6 @@ def as_mapping(name: str, value: object, each: Callable[[str, Any], Any]) -> dic
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: each(f"{name}[{key!r}]", item) for key, item in value.items()}
     raise InvalidInput(name, as_given(value), "a dictionary whose keys are names")
-
-
-def as_name_or_index(name: str, value: object) -> str | int:
-    """Text or a whole number; which there are is known elsewhere."""
-    key = plain(value)
-    if isinstance(key, str | int) and not isinstance(key, bool):
-        return key
-    raise InvalidInput(name, as_given(value), "a name or an index")
 
 
 def as_instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> Any:

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BODY", "STEEL", "Color", "activation_colors", "bundle_color", "material_fill"]
+__all__ = [
+    "BEST",
+    "BODY",
+    "MET",
+    "MISSED",
+    "STEEL",
+    "Color",
+    "activation_colors",
+    "bundle_color",
+    "eight_bit",
+    "material_fill",
+]
 
 Color = tuple[float, float, float]
 
@@ -14,6 +25,15 @@ BODY: Color = (0.87, 0.85, 0.82)
 
 STEEL: Color = (0.55, 0.68, 0.82)
 """The surface of a hull or reachable set."""
+
+MET: Color = (0.13, 0.55, 0.25)
+"""What meets its requirements."""
+
+MISSED: Color = (0.80, 0.12, 0.12)
+"""What misses them."""
+
+BEST: Color = (0.90, 0.50, 0.05)
+"""The best designs of a search."""
 
 # The paper's red, green, blue and yellow come first; lightness differs along the list, so that the
 # order survives most color deficiencies and gray print.
@@ -51,6 +71,12 @@ _BLOCK = 1 << 15  # samples at a time: temporary arrays stay in the cache
 def material_fill(index: int) -> tuple[Color, str]:
     """Color and hatch of a material in sections; they repeat after six."""
     return _MATERIALS[index % len(_MATERIALS)]
+
+
+def eight_bit(color: Color) -> tuple[int, int, int]:
+    """A color in channels from 0 to 255."""
+    red, green, blue = (round(255 * channel) for channel in color)
+    return red, green, blue
 
 
 def bundle_color(index: int) -> Color:

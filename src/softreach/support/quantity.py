@@ -14,6 +14,8 @@ __all__ = [
     "read_number",
     "read_quantity",
     "read_whole_number",
+    "round_above",
+    "round_below",
     "sizes_in",
     "unit_names",
 ]
@@ -47,12 +49,12 @@ def quantity(value: float, unit: str = "", error: float = math.nan, digits: int 
     Args:
         value: The number.
         unit: What it counts.
-        error: How far off it may be, same unit; without one the value has six digits.
+        error: How far off it may be, same unit; without one the value has five digits.
         digits: Number of digits of the error.
     """
     if math.isfinite(value) and 0 < error < math.inf:
         return f"{_with_error(value, error, digits)} {unit}".rstrip()
-    return f"{value:.6g} {unit}".rstrip()
+    return f"{value:.5g}{unit if unit == '°' else f' {unit}'}".rstrip()
 
 
 def _with_error(value: float, error: float, digits: int) -> str:
@@ -63,6 +65,18 @@ def _with_error(value: float, error: float, digits: int) -> str:
     decimals = max(0, digits - 1 - math.floor(math.log10(error / scale)))
     text = f"{value / scale:.{decimals}f} ± {error / scale:.{decimals}f}"
     return f"({text})e{power}" if power else text
+
+
+def round_below(value: float) -> float:
+    """The largest of 1, 2, 5, 10, ... and of 0.5, 0.2, ... up to a value above 0."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9))
+
+
+def round_above(value: float) -> float:
+    """The least of 1, 2, 5, 10, ... and of 0.5, 0.2, ... from a value on; 0 from 0."""
+    power = 10.0 ** math.floor(math.log10(value)) if value else 0.0
+    return next(step * power for step in (1, 2, 5, 10) if value <= step * power)
 
 
 def read_number(text: str) -> float:

@@ -24,6 +24,7 @@ __all__ = [
     "in_lengths",
     "lengths_in",
     "read_length",
+    "readable",
     "readable_unit",
 ]
 
@@ -150,6 +151,19 @@ def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, flo
     if unit == "Pa":
         return next((pair for pair in _PRESSURES.items() if abs(value) >= pair[1]), ("Pa", 1.0))
     return ("" if unit == "1" else unit), 1.0
+
+
+def readable(value: float, unit: str, length: LengthUnit, error: float = math.nan) -> str:
+    """A number as people read it, to the first digit of its error: "12.5 mm", "20.3°".
+
+    Args:
+        value: The number.
+        unit: Its SI unit; "1" for none.
+        length: Unit of lengths, areas and volumes.
+        error: How far off it may be, same unit as the number.
+    """
+    name, size = readable_unit(unit, value, length)
+    return quantity(value / size, name, error / size)
 
 
 def read_length(text: str, length: float | None = None) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
-from softreach.plot.slice import plot_slice
+from softreach.plot.sets import plot_slice
 from softreach.studio.multiplicity import counts_at
 from softreach.studio.plots.plot import Picture, Plot, complete_reach, pixels
 from softreach.studio.reach import Reach

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.support import palette
+from softreach.support.palette import eight_bit
+
 if TYPE_CHECKING:
     from viser import SceneApi
 
@@ -16,7 +19,7 @@ __all__ = ["COLORS", "draw_needs"]
 
 Array = NDArray[np.float64]
 
-REACHED, MISSED, UNDECIDED = (0, 150, 90), (215, 30, 50), (200, 130, 0)
+REACHED, MISSED, UNDECIDED = eight_bit(palette.MET), eight_bit(palette.MISSED), (200, 130, 0)
 """Colors of places, RGB; a ball is reached and a cross missed, for who cannot tell them apart."""
 COLORS = {"met": REACHED, "missed": MISSED, "undecided": UNDECIDED}
 """Colors of verdicts."""

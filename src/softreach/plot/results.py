@@ -1,0 +1,385 @@
+"""Pictures of results: errors of a calibration, and the designs of a search."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
+from softreach.plot.axes import bounding_box, draw_box, view_extent
+from softreach.plot.lengths import Unit, unit_for
+from softreach.plot.style import (
+    figure_style,
+    legend_above,
+    pyplot,
+    remark,
+    write_note,
+)
+from softreach.support.arguments import as_given
+from softreach.support.arrays import Array, Mask
+from softreach.support.errors import InvalidInput
+from softreach.support.palette import BEST, MET, MISSED
+from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WIDTH = 7.2  # inches
+_SPACE, _ROW = 3.6, 1.75  # heights of the upper part and of each row of inputs [inch]
+_COLUMNS = 3
+_FAR = 4.0  # times the 95 % quantile, beyond which places would squash all others
+_MILLIMETER = LengthUnit("mm", 1e-3)  # of inputs
+_MEASURED = "0.45"
+_ABOVE, _LINE, _ENDS = 2.5, 0.24, 0.75  # heights of panels, of a parameter, and around these [inch]
+_COARSE: dict[str, Any] = {"marker": "o", "s": 14, "facecolors": "none", "linewidths": 0.7}
+_FINAL: dict[str, Any] = {"marker": "D", "s": 24, "color": BEST, "linewidths": 0, "zorder": 4}
+_OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": MISSED, "linewidths": 0.8, "zorder": 3}
+_MOST_LINES = 200
+
+
+class _HasDataset(Protocol):
+    def to_dataset(self) -> xr.Dataset: ...
+
+
+def _dataset_of(name: str, result: _HasDataset, maker: str, variable: str) -> xr.Dataset:
+    of_maker = hasattr(result, "to_dataset") and not isinstance(result, type)
+    data = result.to_dataset() if of_maker else None
+    if data is None or variable not in getattr(data, "variables", {}):
+        raise InvalidInput(name, as_given(result), f"what `{maker}` returned")
+    return data
+
+
+def plot_calibration(
+    calibration: _HasDataset, *, view: View = "oblique", unit: Unit = None
+) -> Figure:
+    """Draw how far measured and predicted places of the markers are apart.
+
+    In space, with a line from each measured place to the predicted one; the distances by marker, in
+    the order in which samples were taken, and against each input. Samples held out of the fit are
+    hollow; what is too far off for the axes is counted in a corner.
+
+    Args:
+        calibration: What `calibrate` returned.
+        view: The direction of sight of the picture in space, as in `plot_cloud`.
+        unit: Unit of lengths, m, cm, mm or L; None for mm, or m for arms from 1 m.
+
+    Raises:
+        InvalidInput: Unknown view or unit, or no calibration.
+        MissingExtra: matplotlib is not installed.
+    """
+    data = _dataset_of("calibration", calibration, "calibrate", "residual")
+    view_angles(view)
+    length = float(data.attrs["length"])
+    shown = _Errors(data, unit_for(length, handy_unit(length) if unit is None else unit))
+    inputs = shown.moving_inputs
+    rows = math.ceil(len(inputs) / _COLUMNS)
+    with figure_style():
+        size = (_WIDTH, _SPACE + _ROW * rows)
+        figure = pyplot().figure(figsize=size, layout="constrained")
+        heights = [_SPACE, _ROW * rows][: 1 + (rows > 0)]
+        parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+        upper = parts[0]
+        grid = upper.add_gridspec(2, 2, width_ratios=[1.25, 1.0])
+        _draw_places(upper.add_subplot(grid[:, 0]), shown, view)
+        _draw_markers(upper.add_subplot(grid[0, 1]), shown)
+        _draw_order(upper.add_subplot(grid[1, 1]), shown)
+        if rows:
+            axes = parts[1].subplots(rows, min(_COLUMNS, len(inputs)), sharey=True, squeeze=False)
+            for ax, k in zip(axes.flat, inputs, strict=False):
+                _draw_input(ax, shown, k)
+            for ax in axes[:, 0]:
+                ax.set_ylabel(shown.label)
+            for ax in list(axes.flat)[len(inputs) :]:
+                ax.set_axis_off()
+    return figure
+
+
+class _Errors:
+    def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
+        self.data, self.unit, self.label = data, unit, unit.label("error")
+        self.markers = [str(name) for name in data["marker"].values]
+        moving = np.ptp(data["input_value"].values, axis=0) > 0
+        self.moving_inputs: list[int] = np.flatnonzero(moving).tolist()
+        self.measured = unit.of(data["measured"].values)
+        residual = unit.of(data["residual"].values)
+        self.predicted = self.measured + residual
+        self.distance = np.linalg.norm(residual, axis=2)
+        self.held = data["held_out"].values
+        known = self.distance[np.isfinite(self.distance)]
+        limit = _FAR * float(np.quantile(known, 0.95)) if known.size else 1.0
+        self.top = min(1.08 * float(known.max(initial=0.0)), limit) or 1.0
+        colors = pyplot().get_cmap("tab10")
+        self.colors = [colors(k % 10) for k in range(data.sizes["marker"])]
+
+    def scatter(self, ax: Axes, x: Array, marker: int) -> None:
+        size = {"s": 9 if len(x) < 300 else 4, "linewidths": 0.6, "zorder": 3}
+        color: Any = self.colors[marker]
+        for rows, face in ((~self.held, color), (self.held, "none")):
+            ax.scatter(x[rows], self.distance[rows, marker], color=face, edgecolors=color, **size)
+
+    def frame(self, ax: Axes) -> None:
+        ax.set_ylim(0.0, self.top)
+        far = int((self.distance > self.top).sum())
+        if far:
+            write_note(ax, f"{far} beyond", 0.98, 0.96)
+
+
+def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
+    from matplotlib.collections import LineCollection
+
+    near = np.isfinite(shown.distance) & (shown.distance <= shown.top)
+    measured, predicted = shown.measured[near], shown.predicted[near]
+    box = bounding_box(measured, predicted)
+    colors = [shown.colors[k] for k in np.nonzero(near)[1]]
+    here, there = on_paper(measured, view), on_paper(predicted, view)
+    lines = LineCollection(list(np.stack([here, there], axis=1)), colors=colors, linewidths=0.7)
+    lines.set_zorder(2)
+    ax.add_collection(lines)
+    size = 10 if len(here) < 1000 else 3
+    ax.scatter(*here.T, s=size, color=_MEASURED, linewidths=0, zorder=3, label="measured")
+    ax.scatter(*there.T, s=size, facecolors="none", edgecolors=colors, linewidths=0.7, zorder=4)
+    ax.scatter([], [], s=10, facecolors="none", edgecolors="0.2", linewidths=0.7, label="predicted")
+    left, right, low, high = view_extent(box, view)
+    mirror = -1 if is_mirrored(view) else 1
+    ax.set(xlim=(mirror * left, mirror * right), ylim=(low, high), aspect="equal")
+    if plane := plane_of(view):
+        ax.set(xlabel=shown.unit.label(plane[0]), ylabel=shown.unit.label(plane[1]))
+    else:
+        draw_box(ax, box, view, shown.unit)
+    legend_above(ax, 2, handletextpad=0.2)
+
+
+def _draw_markers(ax: Axes, shown: _Errors) -> None:
+    rng = np.random.default_rng(0)
+    for k in range(len(shown.markers)):
+        shown.scatter(ax, k + 0.25 * (2.0 * rng.random(len(shown.distance)) - 1.0), k)
+        for rows, style in ((~shown.held, "-"), (shown.held, ":")):
+            own = shown.distance[rows, k]
+            if np.isfinite(own).any():
+                rms = float(np.sqrt(np.nanmean(own**2)))
+                ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=style, zorder=4)
+    ax.set_xticks(range(len(shown.markers)), shown.markers)
+    if len(shown.markers) > 4:
+        ax.tick_params(axis="x", labelrotation=40)
+    ax.set(ylabel=shown.label, xlim=(-0.6, len(shown.markers) - 0.4))
+    remark(ax, "line: rms" + ("; hollow, dotted: held out" if shown.held.any() else ""))
+    shown.frame(ax)
+
+
+def _draw_order(ax: Axes, shown: _Errors) -> None:
+    rank = shown.data["rank"].values
+    for k in range(len(shown.markers)):
+        shown.scatter(ax, rank, k)
+    runs = shown.data["run"].values[np.argsort(rank)]
+    for end in np.flatnonzero(np.diff(runs)):
+        ax.axvline(end + 0.5, color="0.85", linewidth=0.5, zorder=1)
+    ax.set(xlabel="sample, in order of time", ylabel=shown.label)
+    shown.frame(ax)
+
+
+def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
+    unit, values = str(shown.data["input_unit"].values[k]), shown.data["input_value"].values[:, k]
+    name, size = readable_unit(unit, 1e3, _MILLIMETER)
+    for marker in range(len(shown.markers)):
+        shown.scatter(ax, values / size, marker)
+    label = str(shown.data["input"].values[k])
+    ax.set_xlabel(f"{label} [{name}]" if name else label)
+    shown.frame(ax)
+
+
+def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
+    """Draw what a search came to: designs that were judged, and the best in their ranges.
+
+    Of one objective, its value against the designs that were looked at, with the best so far, and
+    values on coarse sets against those of full accuracy. Of two, designs and the front; of more,
+    the front as lines over all of them. Designs that miss requirements are crosses.
+
+    Args:
+        search: What `search` returned.
+        unit: Unit of lengths and volumes, m, cm, mm or L; None for mm, or m for arms from 1 m.
+
+    Raises:
+        InvalidInput: Unknown unit, or no search.
+        MissingExtra: matplotlib is not installed.
+    """
+    data = _dataset_of("search", search, "search", "objective_value")
+    length = float(data.attrs["length"])
+    name = data.attrs["display_unit"] or handy_unit(length)
+    shown = _Designs(data, unit_for(length, name if unit is None else unit))
+    goals, below = data.sizes["objective"], _ENDS + _LINE * data.sizes["parameter"]
+    with figure_style():
+        figure = pyplot().figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
+        grid = figure.add_gridspec(2, 2, height_ratios=[_ABOVE, below], width_ratios=[1.6, 1.0])
+        if goals == 1:
+            _draw_progress(figure.add_subplot(grid[0, 0]), shown)
+            _draw_fidelities(figure.add_subplot(grid[0, 1]), shown)
+        elif goals:
+            beside = bool((~shown.feasible & ~shown.final).any())
+            ax = figure.add_subplot(grid[0, 0] if beside else grid[0, :])
+            (_draw_front if goals == 2 else _draw_objectives)(ax, shown)
+            if beside:
+                _draw_missed(figure.add_subplot(grid[0, 1]), shown)
+        else:
+            _draw_missed(figure.add_subplot(grid[0, :]), shown)
+        _draw_ranges(figure.add_subplot(grid[1, :]), shown)
+    return figure
+
+
+class _Designs:
+    def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
+        self.data, self.unit = data, unit
+        self.feasible: Mask = data["feasible"].values
+        count = data.sizes["design"]
+        self.final: Mask = np.arange(count) >= count - int(data.attrs["finalists"])
+        self.front: Mask = data["front"].values & self.final
+        self.looked_at, self.senses = data["looked_at"].values, data["sense"].values
+        self.values, self.errors = data["objective_value"].values, data["objective_error"].values
+        self.labels: list[str] = []
+        for k, own in enumerate(data["objective_unit"].values):
+            largest = np.nanmax(np.abs(self.values[:, k]), initial=0.0)
+            name, size = readable_unit(str(own), float(largest), unit)
+            self.values[:, k] /= size
+            self.errors[:, k] = np.nan_to_num(self.errors[:, k] / size)
+            objective, relative = str(data["objective"].values[k]), name.startswith("L")
+            label = f"{objective} / {name}" if relative else f"{objective} [{name}]"
+            self.labels.append(label if name else objective)
+
+
+def _draw_progress(ax: Axes, shown: _Designs) -> None:
+    value, at = shown.values[:, 0], shown.looked_at
+    way, final = shown.feasible & ~shown.final, shown.feasible & shown.final
+    ax.scatter(at[way], value[way], edgecolors=MET, label="on the way", zorder=3, **_COARSE)
+    if way.any():
+        best = np.maximum if shown.senses[0] > 0 else np.minimum
+        so_far = best.accumulate(value[way])
+        ends = [*at[way], shown.looked_at[-1]], [*so_far, so_far[-1]]
+        ax.step(*ends, where="post", color="0.35", lw=0.9, zorder=2, label="best so far")
+    if final.any():
+        bars = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "capsize": 2, "zorder": 4}
+        ax.errorbar(at[final], value[final], shown.errors[final, 0], **bars)
+        ax.scatter(at[final], value[final], label="full accuracy", **_FINAL)
+    out = ~shown.feasible & ~shown.final
+    if out.any():  # which have no value
+        places = {"transform": ax.get_xaxis_transform(), "clip_on": False}
+        ax.scatter(at[out], np.zeros(out.sum()), label="requirements missed", **places, **_OUT)
+    ax.set(xlabel="designs looked at", ylabel=shown.labels[0])
+    legend_above(ax, 4, handletextpad=0.3)
+
+
+def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
+    rows = np.flatnonzero(shown.final & shown.feasible)
+    before = shown.data["coarse_design"].values[rows]
+    rows, before = rows[before >= 0], before[before >= 0]
+    coarse, full = shown.values[before, 0], shown.values[rows, 0]
+    known = np.isfinite(coarse)
+    if not known.any():
+        ax.set_axis_off()
+        return
+    errors = shown.errors[rows[known], 0], shown.errors[before[known], 0]
+    bars = {"fmt": "none", "ecolor": "0.5", "elinewidth": 0.7, "capsize": 2, "zorder": 2}
+    ax.errorbar(coarse[known], full[known], *errors, **bars)
+    ax.scatter(coarse[known], full[known], **_FINAL)
+    first = float(full[known][0])
+    ax.axline((first, first), slope=1.0, color="0.7", lw=0.7, zorder=1)
+    ax.set(xlabel=f"{shown.labels[0]}, coarse", ylabel="full accuracy")
+    remark(ax, "the best, judged again")
+    ax.locator_params(nbins=4)
+
+
+def _draw_front(ax: Axes, shown: _Designs) -> None:
+    way = shown.feasible & ~shown.final
+    ax.scatter(*shown.values[way].T, edgecolors=MET, label="on the way", zorder=3, **_COARSE)
+    rows = np.flatnonzero(shown.front & shown.feasible)
+    if len(rows):
+        points = shown.values[rows]
+        points = points[np.argsort(points[:, 0])]
+        # Between two designs nothing is known to be better than the worse one of each value.
+        where = "post" if shown.senses[0] < 0 else "pre"
+        ax.step(*points.T, where=where, color=BEST, lw=0.9, zorder=2)
+        bars = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zorder": 4}
+        ax.errorbar(*shown.values[rows].T, *shown.errors[rows].T[::-1], **bars)
+        ax.scatter(*shown.values[rows].T, label="front, full accuracy", **_FINAL)
+    words = [
+        f"{label} ({'large' if sense > 0 else 'small'} is better)"
+        for label, sense in zip(shown.labels, shown.senses, strict=True)
+    ]
+    ax.set(xlabel=words[0], ylabel=words[1])
+    legend_above(ax, handletextpad=0.3)
+
+
+def _draw_missed(ax: Axes, shown: _Designs) -> None:
+    """Excess of each design, in their order; infinite ones stand at the upper edge."""
+    way = ~shown.final
+    excess, at = shown.data["excess"].values, shown.looked_at
+    met, never = way & shown.feasible, way & ~np.isfinite(excess)
+    out = way & ~met & ~never
+    if met.any():
+        ax.scatter(at[met], excess[met], edgecolors=MET, label="met", **_COARSE)
+    if out.any():
+        ax.scatter(at[out], excess[out], label="missed", **_OUT)
+    if never.any():
+        top = {"transform": ax.get_xaxis_transform(), "clip_on": False}
+        style = {**_OUT, "marker": "v"}
+        ax.scatter(at[never], np.ones(never.sum()), label="no such arm", **top, **style)
+    ax.set(xlabel="designs looked at", ylabel="requirements missed, sum [-]")
+    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]), top=None if out.any() else 1.0)
+    legend_above(ax, handletextpad=0.3)
+
+
+def _draw_objectives(ax: Axes, shown: _Designs) -> None:
+    """The front over three or more objectives: a line for each design, the better end up."""
+    rows = np.flatnonzero(shown.front & shown.feasible)[:_MOST_LINES]
+    values = shown.values[rows]
+    if not len(rows):
+        ax.set_axis_off()
+        return
+    low, high = values.min(axis=0), values.max(axis=0)
+    shares = (values - low) / np.where(high > low, high - low, 1.0)
+    shares = np.where(shown.senses > 0, shares, 1.0 - shares)
+    colors = pyplot().get_cmap("viridis")(0.9 * shares[:, 0])
+    places = np.arange(values.shape[1])
+    for share, color in zip(shares, colors, strict=True):
+        ax.plot(places, share, "-D", color=color, lw=0.9, ms=3.5)
+    for k, place in enumerate(places):
+        ends = (low[k], high[k]) if shown.senses[k] > 0 else (high[k], low[k])
+        ax.axvline(place, color="0.8", lw=0.6, zorder=0)
+        for end, up, across in ((ends[0], -0.04, "top"), (ends[1], 1.04, "bottom")):
+            ax.text(place, up, f"{end:.4g}", ha="center", va=across, fontsize=7, color="0.25")
+    ax.set_xticks(places, [label.replace(" [", "\n[") for label in shown.labels])
+    ax.set(ylim=(-0.16, 1.16), xlim=(-0.4, places[-1] + 0.4), yticks=[0, 1])
+    ax.set_yticklabels(["worse", "better"])
+
+
+def _draw_ranges(ax: Axes, shown: _Designs) -> None:
+    data = shown.data
+    low, high = data["low"].values, data["high"].values
+    shares = (data["value"].values - low) / np.where(high > low, high - low, 1.0)
+    way, rows = ~shown.final, np.flatnonzero(shown.front)
+    count = len(low)
+    for k in range(count):
+        ax.hlines(k, 0.0, 1.0, color="0.85", lw=0.8, zorder=0)
+        met, out = way & shown.feasible, way & ~shown.feasible
+        small = {"s": 9, "linewidths": 0.5, "alpha": 0.6}
+        ax.scatter(shares[met, k], np.full(met.sum(), k), edgecolors=MET, **{**_COARSE, **small})
+        ax.scatter(shares[out, k], np.full(out.sum(), k), **{**_OUT, **small})
+        ax.scatter(shares[rows, k], np.full(len(rows), k), **_FINAL)
+        for place, end, across in ((-0.01, low[k], "right"), (1.01, high[k], "left")):
+            text = _end_text(shown, k, float(end))
+            ax.text(place, k, text, ha=across, va="center", fontsize=7, color="0.25")
+    ax.set_yticks(range(count), [str(name) for name in data["parameter"].values])
+    ax.tick_params(axis="y", length=0, pad=42)
+    ax.set(xlim=(-0.02, 1.1), ylim=(count - 0.4, -0.6), xticks=[])
+    word = "the best" if len(rows) < 2 else "the front"
+    remark(ax, f"free parameters in their ranges, {word} ◆")
+    ax.spines[:].set_visible(False)
+
+
+def _end_text(shown: _Designs, k: int, end: float) -> str:
+    choices = str(shown.data["choices"].values[k])
+    if choices:
+        return choices.split(", ")[round(end)]
+    return readable(end, str(shown.data["parameter_unit"].values[k]), shown.unit)

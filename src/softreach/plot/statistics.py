@@ -1,0 +1,297 @@
+"""Pictures of what clouds are asked: activation distance D̄, redundancy, curvature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.picture.projection import View, project
+from softreach.plot.axes import Panel, bounding_box
+from softreach.plot.clouds import drawn_tips, plot_cloud, plot_slab
+from softreach.plot.coloring import (
+    ScalarKey,
+    bundle_activations,
+    color_map,
+    color_samples,
+    draw_key,
+    scale_colors,
+)
+from softreach.plot.lengths import Unit, common_unit, unit_of
+from softreach.plot.style import (
+    LENGTH,
+    PAGE,
+    as_axes,
+    figure_style,
+    panel_arguments,
+    place_panels,
+    pyplot,
+    small_axes,
+    write_note,
+)
+from softreach.schema import a_cloud
+from softreach.support.arguments import (
+    POSITIVE,
+    as_dataset,
+    as_flag,
+    as_mapping,
+    as_number,
+    as_one_of,
+)
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_ISOLATED = 190  # light gray
+_LABEL = "mean activation distance D̄"
+_BINS = 60
+_AROUND, _GAPS = (0.75, 0.1, 0.4, 0.55), (0.12, 0.95)  # of panels [inch]
+_a_distance = partial(as_dataset, kind="DataArray")
+_COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
+_SYMBOLS = {"bending": "κ", "torsion": "u₃", "extension": "ζ"}
+_COARSE = 64  # bins of a distribution of curvature
+
+
+def _some_statistics(name: str, value: object) -> xr.Dataset:
+    return as_dataset(name, value, "bending_count", "Z")
+
+
+def plot_distance(
+    cloud: xr.Dataset,
+    distance: xr.DataArray,
+    *,
+    ax: Axes | None = None,
+    view: View = "front",
+    high: float | None = None,
+    key: bool = True,
+    box: ArrayLike | None = None,
+    unit: Unit = None,
+) -> Axes:
+    """Draw the evaluated tips, their color D̄; isolated ones are light gray and behind.
+
+    What is not described here is as in `plot_cloud`.
+
+    Args:
+        cloud: The cloud that D̄ was computed from.
+        distance: D̄ [-] from `activation_distance`; 10,000 points make a clear picture.
+        ax: As in `plot_cloud`.
+        view: As in `plot_cloud`.
+        high: D̄ of the last color; None for the largest here. Give one to compare clouds.
+        key: As in `plot_cloud`.
+        box: As in `plot_cloud`.
+        unit: As in `plot_cloud`.
+
+    Returns:
+        The axes, in that unit.
+
+    Raises:
+        InvalidInput: Unknown view, or no finite tip.
+        MissingExtra: matplotlib is not installed.
+    """
+    cloud, distance = a_cloud("cloud", cloud), _a_distance("distance", distance)
+    high = largest_distance([distance]) if high is None else as_number("high", high, POSITIVE)
+    key, values = as_flag("key", key), distance.values
+    ax, box = panel_arguments(ax, view, box)
+    counted = unit_of(cloud["tip"], unit)
+    tips = drawn_tips(cloud, counted)[distance["sample"].values]
+    with figure_style(ax):
+        panel = Panel.opened(tips, counted, ax, view, box)
+        buffer = panel.buffer(oversample=2)
+        seen = project(tips, view)
+        seen[np.isnan(values), 2] -= 10.0 * np.ptp(panel.box)  # behind all others
+        pixels = max(3.0, buffer.shape[1] / np.sqrt(1.2 * max(len(tips), 1)))
+        buffer.draw_points(seen, scale_colors(values, 0.0, high, _ISOLATED), pixels)
+        panel.show(buffer)
+        if key:
+            draw_key(panel.ax, ScalarKey(_LABEL, 0.0, high))
+    return panel.ax
+
+
+def plot_distance_histograms(distances: Mapping[str, xr.DataArray]) -> Figure:
+    """Draw the distribution of D̄ of several clouds side by side, at one scale.
+
+    Args:
+        distances: D̄ [-] from `activation_distance` by title.
+
+    Returns:
+        The figure, with axes in the order of the titles.
+
+    Raises:
+        InvalidInput: No distances.
+        MissingExtra: matplotlib is not installed.
+    """
+    distances = as_mapping("distances", distances, _a_distance)
+    if not distances:
+        raise InvalidInput("distances", "none", "at least one")
+    with figure_style():
+        shape = {"figsize": (PAGE, 0.37 * PAGE), "layout": "constrained", "squeeze": False}
+        figure, grid = pyplot().subplots(1, len(distances), sharex=True, **shape)
+        edges = np.linspace(0.0, largest_distance(distances.values()), _BINS + 1)
+        for ax, (title, distance) in zip(grid[0], distances.items(), strict=True):
+            _draw_histogram(ax, distance.values, edges)
+            ax.set_title(title)
+        grid[0, 0].set_ylabel("share of points per bin / %")
+    return figure
+
+
+def largest_distance(distances: Iterable[xr.DataArray]) -> float:
+    """The largest finite D̄, 1 if there is none."""
+    finite = [d.values[np.isfinite(d.values)] for d in distances]
+    return max((float(f.max()) for f in finite if len(f)), default=1.0) or 1.0
+
+
+def plot_redundancy(
+    clouds: Mapping[str, xr.Dataset],
+    distances: Mapping[str, xr.DataArray],
+    *,
+    thickness: float | None = None,
+    unit: Unit = None,
+) -> Figure:
+    """Draw clouds, their slabs through the base and D̄ of several designs (figures 4b-d).
+
+    Args:
+        clouds: Clouds by title.
+        distances: D̄ from `activation_distance` by the same titles.
+        thickness: Of the slabs [m]; None as in `plot_slab`.
+        unit: As in `plot_cloud`.
+
+    Returns:
+        The figure: a row for each title with the cloud from the front, colored by |γ| of the last
+        bundle, the slabs from the front and the side, and D̄ from the front, all at one scale.
+
+    Raises:
+        InvalidInput: Other titles, no tip in a slab, or clouds of which only
+            some know L.
+        MissingExtra: matplotlib is not installed.
+    """
+    clouds = as_mapping("clouds", clouds, a_cloud)
+    distances = as_mapping("distances", distances, _a_distance)
+    thickness = None if thickness is None else as_number("thickness", thickness, LENGTH)
+    if not clouds or set(clouds) != set(distances):
+        raise InvalidInput("distances", sorted(distances), f"of the clouds {sorted(clouds)}")
+    units = {title: unit_of(cloud["tip"], unit) for title, cloud in clouds.items()}
+    common_unit([*units.values()])
+    from matplotlib.ticker import MaxNLocator
+
+    box = bounding_box(*(drawn_tips(cloud, units[title]) for title, cloud in clouds.items()))
+    high = largest_distance(distances.values())
+    with figure_style():
+        x, y, z = np.ptp(box, axis=0)
+        figure, rows = place_panels(PAGE, (x, x, y, x), [z] * len(clouds), _AROUND, _GAPS)
+        for (title, cloud), row in zip(clouds.items(), rows, strict=True):
+            coloring = color_samples(cloud, bundle_activations(cloud).shape[1] - 1)
+            rgb, counted = coloring.rgb / 255, units[title]
+            shared = {"box": box * counted.size, "key": False, "unit": counted}
+            plot_cloud(cloud, ax=row[0], color=rgb, **shared)
+            for ax, view in zip(row[1:3], ("front", "side"), strict=True):
+                plot_slab(cloud, ax=ax, view=view, thickness=thickness, color=rgb, **shared)
+            plot_distance(cloud, distances[title], ax=row[3], high=high, **shared)
+            for ax, key in ((row[0], coloring.key), (row[3], ScalarKey("D̄", 0.0, high))):
+                if isinstance(key, ScalarKey):
+                    bar = ax.inset_axes((0.05, 1.05, 0.9, 0.035))
+                    options = {"location": "top", "label": key.label, "ticks": MaxNLocator(4)}
+                    figure.colorbar(color_map(key), cax=bar, **options)
+            for ax in row[1:]:
+                ax.set(ylabel="", yticklabels=[])
+            row[0].set_ylabel(f"{title}\n{row[0].get_ylabel()}")
+    return figure
+
+
+def _draw_histogram(ax: Any, values: Array, edges: Array) -> None:
+    finite = values[np.isfinite(values)]
+    share = 100.0 * np.histogram(finite, edges)[0] / max(len(values), 1)
+    colors = scale_colors(edges[:-1], 0.0, edges[-1]) / 255
+    ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
+    ax.set(xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
+    ax.spines[["top", "right"]].set_visible(False)
+    if len(finite):
+        median = float(np.median(finite))
+        ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
+        text = f"median {median:.3f}\nisolated {1 - len(finite) / len(values):.2%}"
+        write_note(ax, text, 0.98, 0.98)
+
+
+def plot_curvature(
+    statistics: Mapping[str, xr.Dataset],
+    *,
+    ax: Axes | None = None,
+    quantity: str = "bending",
+    unit: Unit = None,
+) -> Axes:
+    """Distributions at the stations of one or two designs (figure 3c); dots are medians.
+
+    Each distribution is drawn to the same width. Curvatures are shown times L, or in 1/m if the
+    statistics do not know L, unless there is a unit.
+
+    Args:
+        statistics: Label -> what `curvature_statistics` returned; the first is drawn to the left
+            of each station and the second to the right.
+        ax: Axes to draw in; None for a new figure.
+        quantity: "bending", "torsion" or "extension".
+        unit: Of lengths: "m", "cm", "mm" or "L"; None for L if the statistics know it, else m.
+
+    Raises:
+        InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
+            the arm, or designs of which only one knows L.
+    """
+    statistics, ax = as_mapping("statistics", statistics, _some_statistics), as_axes(ax)
+    if not 1 <= len(statistics) <= 2:
+        raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
+    as_one_of("quantity", quantity, _SYMBOLS)
+    units = [unit_of(data, unit) for data in statistics.values()]
+    counted = common_unit(units)
+    every = zip(units, statistics.values(), strict=True)
+    places, *others = [own.of(data["Z"].values) for own, data in every]
+    for other in others:
+        if other.shape != places.shape or not np.allclose(other, places):
+            raise InvalidInput("stations", other.tolist(), f"those of the first: {places.tolist()}")
+    symbol, per_length = _SYMBOLS[quantity], quantity != "extension"
+    if per_length:
+        symbol += "L" if counted.relative else f" [1/{counted.name}]"
+    with figure_style(ax):
+        ax = small_axes() if ax is None else ax
+        sides = (-1, 1) if len(statistics) == 2 else (0,)
+        both = zip(statistics.items(), sides, _COLORS, units, strict=False)
+        for (label, data), side, color, own in both:
+            scale = own.size if per_length else 1.0
+            _draw_side(ax, data, quantity, side, color, label, scale)
+        ax.set(xlabel=counted.label("station Z"), ylabel=symbol)
+        digits = ".2g" if counted.relative else ".4g"
+        ax.set_xticks(range(len(places)), [f"{place:{digits}}" for place in places])
+        ax.legend(loc="upper left")
+    return ax
+
+
+def _draw_side(
+    ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str, scale: float
+) -> None:
+    medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
+    for k in range(len(medians)):
+        edges, density = _coarse(data.isel(station=k), quantity)
+        reach = 0.46 * density / density.max()
+        low, high = (k - reach if side <= 0 else k), (k + reach if side >= 0 else k)
+        name = label if k == 0 else None
+        ax.fill_betweenx(
+            edges * scale, low, high, color=color, alpha=0.75, lw=0.3, ec="w", label=name
+        )
+    ax.plot(np.arange(len(medians)) + 0.1 * side, medians, ".", color="k", ms=3, zorder=3)
+
+
+def _coarse(data: xr.Dataset, quantity: str) -> tuple[Array, Array]:
+    """Centers of fewer bins, between the smallest and largest value, and counts per width."""
+    count, edges = data[f"{quantity}_count"].values, data[f"{quantity}_edge"].values
+    used = np.flatnonzero(count)
+    first, last = used[0], used[-1] + 1
+    ends = np.unique(np.linspace(first, last, _COARSE + 1).astype(int))
+    sums = np.add.reduceat(count, ends[:-1])
+    sums[-1] = count[ends[-2] : last].sum()
+    centers = (edges[ends[:-1]] + edges[ends[1:]]) / 2
+    return centers, sums / np.diff(edges[ends])
