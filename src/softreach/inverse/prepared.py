@@ -79,8 +79,7 @@ class PreparedMap:
 
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
-        # Loads make the map steep before an equilibrium is lost.
-        return activation_cells(self.rod, self.cells, int(self.whole.supports_unstable))
+        return activation_cells(self.rod, self.cells)
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
