@@ -8,8 +8,11 @@ import pytest
 from softreach.arm import Loads, designs
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import PathStatus, Status, prepared_map, solve_inverse
+from softreach.inverse.drag import Drag
 from softreach.inverse.path import track_path
 from softreach.rod import tip_map
+from softreach.rod.kinematics import configuration
+from softreach.rod.loaded.all_equilibria import equilibria
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
@@ -137,9 +140,9 @@ def aside() -> Manipulator:
 
 
 @pytest.fixture(scope="module")
-def torn(aside):
-    """A path of tips of a line of activations that ends where the arm snaps, and on as it went: the
-    places, the number of the last stable one, and the path as it was followed."""
+def beyond(aside):
+    """A path of tips into activations at which an arm that is raised from rest has snapped, as it
+    was followed."""
     rod = loaded(aside)
     gamma = np.random.default_rng(0).uniform(*aside.bounds.T, (10_000, 3))
     found = rod.equilibria(gamma)
@@ -148,35 +151,61 @@ def torn(aside):
     start = gamma[near[found.status[near] == TipStatus.STABLE][-1]]
     line = start + np.linspace(0.0, 1.0, 41)[:, None] * (lost - start)
     last = int(np.argmax(rod.status(line) != TipStatus.STABLE)) - 1
-    tips = rod.tips_and_slopes(line[: last + 1])[0]
-    beyond = tips[-1] + np.arange(1, 20)[:, None] * (tips[-1] - tips[-2])
-    path = np.concatenate([tips, beyond])
-    return path, last, track_path(aside, path, line[0])
+    tips = rod.tips(line[: last + 1])
+    ahead = tips[-1] + np.arange(1, 20)[:, None] * (tips[-1] - tips[-2])
+    return track_path(aside, np.concatenate([tips, ahead]), line[0])
 
 
-def test_a_path_into_an_edge_of_stability_ends_there_by_name(aside, torn):
-    rod, (_, last, track) = loaded(aside), torn
-    assert track.attrs["end"] == "unstable"
-    assert (track.status[track.status != PathStatus.FOLLOWED] == PathStatus.UNSTABLE).all()
-    followed = int((track.status == PathStatus.FOLLOWED).sum())
-    assert followed >= last
-    assert 0.0 < float(track.end_length_error) <= 1e-6 * aside.length
-    on_branch = track.activation.values[:followed]
-    assert (rod.status(on_branch) == TipStatus.STABLE).all()
-    end = track.end_activation.values
-    assert rod.status(end[None])[0] == TipStatus.STABLE
-    # beyond, where the Jacobian at the end leads, there is none to go to, or it is elsewhere
-    path = track.position.values
-    ahead = (path[followed] - path[followed - 1]) / np.linalg.norm(path[1] - path[0])
-    tip, slope = (x[0] for x in rod.tips_and_slopes(end[None]))
-    step = 1e-4 * aside.length * ahead / np.linalg.norm(ahead)
-    there = rod.equilibria((end + np.linalg.solve(slope, step))[None])
-    missed = np.linalg.norm(there.tips[0] - tip - step)
-    assert there.status[0] != TipStatus.STABLE or missed > 0.1 * np.linalg.norm(step)
+def equilibrium_at(arm, activation, place):
+    """Status and margin of the one of all equilibria that has its tip at a place."""
+    every = equilibria(arm, activation)
+    off = np.linalg.norm(every.tips - place, axis=1)
+    assert off.min() <= 1e-5 * arm.length
+    return every.status[off.argmin()], every.margin[off.argmin()]
 
 
-def test_the_end_of_a_path_is_where_its_length_says(aside, torn):
-    path, _, track = torn
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    at = [np.interp(float(track.end_length), lengths, x) for x in path.T]
-    assert np.allclose(at, track.end_position, atol=1e-9 * aside.length)
+def test_a_path_goes_on_where_the_arm_is_held_that_would_snap_on_its_way_from_rest(aside, beyond):
+    status = loaded(aside).status(beyond.activation.values)
+    assert (status == TipStatus.SNAPS).any()
+    assert beyond.attrs["end"] == ""
+    assert float(beyond.tip_error.max()) <= 1e-10 * aside.length
+    for k in np.flatnonzero(status == TipStatus.SNAPS)[::4]:
+        there = equilibrium_at(aside, beyond.activation.values[k], beyond.position.values[k])
+        assert there[0] == TipStatus.STABLE
+
+
+def test_a_dragged_arm_stays_in_the_posture_in_which_it_was_left(aside, beyond):
+    drag, activation = Drag(aside), tuple(beyond.activation.values[0])
+    for place in beyond.position.values[1::3]:
+        dragged = drag.to(activation, place)
+        assert dragged is not None
+        assert dragged.gap == 0.0
+        assert np.allclose(dragged.rod.tips([dragged.activation])[0], dragged.tip, atol=1e-9)
+        shape = configuration(dragged.rod, dragged.activation, 2)
+        assert np.allclose(shape.position.values[-1], place, atol=1e-6 * aside.length)
+        activation = dragged.activation
+
+
+SNAPPING = [
+    ([-0.1917, -1.3761, -2.2939], [-0.8108, 0.4103, 0.4174]),
+    ([-3.9838, -3.581, -3.4293], [-0.6227, -0.4284, 0.6547]),
+]
+
+
+@pytest.mark.parametrize(("start", "ahead"), SNAPPING)
+def test_a_path_ends_by_name_where_its_posture_loses_its_stability(start, ahead):
+    arm = designs.lce_arm().replace(loads=Loads(gravity=(9.81, 0.0, 0.0), payload=0.015))
+    begin, ahead = tip_map(arm).tips([start])[0], np.array(ahead) / np.linalg.norm(ahead)
+    track = track_path(arm, begin + np.linspace(0.0, 0.08, 5)[:, None] * ahead, start)
+    assert track.attrs["end"] == "snaps"
+    assert (track.status[track.status != PathStatus.FOLLOWED] == PathStatus.SNAPS).all()
+    assert 0.0 < float(track.end_length_error) <= 1e-6 * arm.length
+    length = float(track.end_length)
+    assert np.allclose(begin + length * ahead, track.end_position, atol=1e-9 * arm.length)
+    # just before, by the search for all equilibria, it is stable and about to lose that
+    shares = np.array([0.9, 0.99, 0.999])
+    before = track_path(arm, begin + length * np.append(0.0, shares)[:, None] * ahead, start)
+    at = zip(before.activation.values[1:], before.position.values[1:], strict=True)
+    status, margins = zip(*(equilibrium_at(arm, *each) for each in at), strict=True)
+    assert set(status) == {TipStatus.STABLE}
+    assert margins[0] > 2 * margins[1] > 10 * margins[2]

@@ -12,7 +12,7 @@ from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
 from softreach.cli.options import AsJson, Design, Unit, points_in, refuse
 from softreach.cli.values import WHOLE, activation_text
-from softreach.support.errors import InvalidInput, counted
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -94,7 +94,6 @@ def _record(solution: Solution, lengths: Lengths) -> dict[str, object]:
         "nearest_activation": solution.nearest_activation.tolist(),
         **lengths.record("gap", solution.gap),
         **lengths.record("gap_bound", solution.gap_bound),
-        "unstable": solution.unstable,
     }
 
 
@@ -111,9 +110,6 @@ def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
         quality = f"residual {apart}, condition {condition:.3g}, margin {margin:.3g}"
         quality = quality if gamma.size else f"residual {apart}"
         console.line(f"  {activation_text(arm, gamma)}  ({quality})")
-    if solution.unstable:
-        left_out = counted(solution.unstable, "activation")
-        console.line(f"  {left_out} left out because the arm is unstable there")
     if not len(solution):
         least = lengths.text(solution.gap_bound, ".4g")
         bound = f", proved to be at least {least}" if solution.gap_bound else ""

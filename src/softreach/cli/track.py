@@ -65,9 +65,9 @@ def track(
 def _end(tracked: xr.Dataset, lengths: Lengths) -> str:
     end = tracked.attrs["end"]
     at = f"{lengths.text(float(tracked.end_length), '.7g')} of path"
-    if end == "unstable":
+    if end == "snaps":
         error = lengths.text(float(tracked.end_length_error), ".1g")
-        return f"{at} (± {error}), where the arm loses its stability"
+        return f"{at} (± {error}), where the arm snaps"
     ends = {
         "": "the end of the path",
         "fold": f"{at}, where the branch turns back (a fold)",

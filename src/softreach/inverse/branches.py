@@ -67,7 +67,7 @@ _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is loo
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
-    """All roots inside the bounds, sorted by target; those of loaded arms stable or not.
+    """All roots inside the bounds, sorted by target.
 
     Sets of targets are solved together, each on a thread of its own.
 
@@ -80,7 +80,7 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
         return no_roots(prepared.rod)
     prepared.prepare_branches(count)
     sets = _sets(spatial_order(request.targets), _set_size(prepared, count))
-    if prepared.branch_map.supports_unstable or len(sets) == 1:
+    if prepared.rod.supports_unstable or len(sets) == 1:
         parts = [_branches_of(prepared, request, chosen) for chosen in sets]
     else:
         parts = list(
@@ -98,7 +98,7 @@ def _sets(order: Index, size: int) -> list[Index]:
 
 def _set_size(prepared: PreparedMap, count: int) -> int:
     """Number of targets to solve together: enough of them for kernels, enough sets for threads."""
-    if prepared.branch_map.supports_unstable:
+    if prepared.rod.supports_unstable:
         return _LARGEST_LOADED  # work enough to be shared out among threads
     return min(_LARGEST, max(_SMALLEST, -(-count // (_SHARES * parallel.thread_count()))))
 
@@ -128,7 +128,7 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
 
 def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     """Steps 5 and 8: damped Newton from every start; the roots that are within the bounds."""
-    rod, goal = prepared.branch_map, request.targets[starts.target]
+    rod, goal = prepared.rod, request.targets[starts.target]
     low, high = rod.box.low.copy(), rod.box.high.copy()
     search = _search(goal, _improved(rod, goal, starts))
     for _ in range(_MOST_ITERATIONS):
@@ -145,14 +145,12 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     trial, goal = search.trial[converged], goal[converged]
     gamma = rod.box.clip(trial)
-    tips, stable = placed(rod, gamma)
     roots = Roots(
         starts.target[converged],
         gamma,
         search.slope[converged],
-        np.linalg.norm(tips - goal, axis=1),
+        np.linalg.norm(placed(rod, gamma) - goal, axis=1),
         starts.cell[converged],
-        stable,
     )
     within = roots.residual <= request.residual
     over = ~within & (gamma != trial).any(axis=1)
@@ -171,8 +169,7 @@ def _moved_to_bounds(rod: TipMap, request: Request, roots: Roots, goal: Array) -
     if not len(goal):
         return roots
     gamma, _, slope, residual = descend(rod, goal, roots.gamma, request.residual)
-    stable = placed(rod, gamma)[1]
-    roots = roots._replace(gamma=gamma, slope=slope, residual=residual, stable=stable)
+    roots = roots._replace(gamma=gamma, slope=slope, residual=residual)
     return rows(roots, residual <= request.allowance)
 
 

@@ -15,54 +15,47 @@ from softreach.kernels.image.activation_mesh import (
     interpolation_errors,
 )
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, rows
 
 _REACH = 1.5  # widths of a cell within which a root is looked for
 _MOST = 16  # searches for one target
 _AT_ONCE = 1 << 20  # pairs of a target and a vertex
 _CORNERS = corner_bits(3)
-_EVEN = 0.3  # ratio of det J at a cell's corners below which the cell is cut in eight
 _TORN = 0.05  # interpolation error in L beyond which corners are taken to be on different branches
-_MOST_CELLS = 300_000
 _LEAF = 24  # a node with no more tetrahedra is not divided
 _MOST_LEVELS = 10
 _MOST_ITEMS = 8_000_000
 _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 
 
-def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[ActivationMesh, TornCells]:
+def activation_cells(rod: TipMap, cells: int) -> tuple[ActivationMesh, TornCells]:
     """Cells of the activation box with tips and Jacobians at their corners; those without apart.
 
     Args:
         rod: A tip map of three bundles, each free to move.
         cells: Cells along each axis of the box.
-        depth: Most halvings of a cell where det J is uneven or changes sign.
     """
-    lattice = _Lattice(rod, cells << depth)
-    axis, width = np.arange(cells) << depth, 1 << depth  # in steps of the finest lattice
-    low = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
-    kept: list[Index] = []
-    total = len(low)
-    for level in range(depth + 1):
-        corner = lattice.vertices(low[:, None] + width * _CORNERS)
-        uneven = _uneven(lattice.det[corner]) if level < depth else np.zeros(len(low), bool)
-        if total + 7 * int(uneven.sum()) > _MOST_CELLS:
-            uneven[:] = False
-        kept.append(corner[~uneven])
-        total += 7 * int(uneven.sum())
-        width //= 2
-        low = (low[uneven, None] + width * _CORNERS).reshape(-1, 3)
-    corner = np.concatenate(kept)
-    mesh, torn = _mesh(lattice, corner), np.zeros(len(corner), bool)
+    place = np.stack(np.unravel_index(np.arange((cells + 1) ** 3), (cells + 1,) * 3), -1)
+    gamma = rod.box.from_cube(place / cells)
+    vertices = _Vertices(gamma, *rod.tips_and_slopes(gamma))
+    low = place[(place < cells).all(axis=1), None]
+    corner = (low + _CORNERS) @ np.array([(cells + 1) ** 2, cells + 1, 1])
+    mesh = _mesh(rod, vertices, corner)
+    torn = np.zeros(len(corner), bool)
     if rod.supports_unstable:
-        torn = ~np.isfinite(lattice.det[corner]).all(axis=1)
+        torn = np.isnan(vertices.tip[corner, 0]).any(axis=1)
         torn |= mesh.interpolation_error > _TORN * rod.length
     if torn.any():
-        mesh = _mesh(lattice, corner[~torn])
+        mesh = _mesh(rod, vertices, corner[~torn])
     vertex = np.unique(corner[torn])
-    vertex = vertex[np.isfinite(lattice.det[vertex])]
-    found = lattice.gamma[vertex], lattice.tip[vertex], lattice.slope[vertex]
-    return mesh, TornCells.at(*found, rod.box.widths / cells)
+    found = rows(vertices, vertex[np.isfinite(vertices.tip[vertex, 0])])
+    return mesh, TornCells.at(found, rod.box.widths / cells)
+
+
+class _Vertices(NamedTuple):
+    gamma: Array
+    tip: Array
+    slope: Array
 
 
 def image_tree(mesh: ActivationMesh) -> SpaceTree:
@@ -122,12 +115,12 @@ class TornCells(NamedTuple):
     """Inverses of ∂r/∂γ there, in widths of a cell [1/m], shape (n, 3, 3)."""
 
     @classmethod
-    def at(cls, gamma: Array, tip: Array, slope: Array, widths: Array) -> TornCells:
-        """Vertices (n, 3) with ∂r/∂γ [m], of cells of these widths, shape (3,)."""
-        inverse = np.empty_like(slope)
-        if len(slope):
-            inverse[:] = np.linalg.pinv(slope * widths)
-        return cls(gamma, tip, inverse)
+    def at(cls, vertices: _Vertices, widths: Array) -> TornCells:
+        """Vertices of cells of these widths, shape (3,)."""
+        inverse = np.empty_like(vertices.slope)
+        if len(inverse):
+            inverse[:] = np.linalg.pinv(vertices.slope * widths)
+        return cls(vertices.gamma, vertices.tip, inverse)
 
     def starts(self, targets: Array) -> tuple[Index, Array]:
         """Number of the target and activation of each start, sorted by target."""
@@ -149,52 +142,15 @@ class TornCells(NamedTuple):
         return np.nonzero(near)[0], vertex[near]
 
 
-def _uneven(det: Array) -> Mask:
-    """Cells in which det J changes sign or nearly so: there the map folds or is about to."""
-    small, large = np.abs(det).min(axis=1), np.abs(det).max(axis=1)
-    return (det.min(axis=1) * det.max(axis=1) <= 0) | (small < _EVEN * large)
-
-
-class _Lattice:
-    """Vertices asked for so far, each computed once, found by their place on the finest lattice."""
-
-    def __init__(self, rod: TipMap, cells: int) -> None:
-        self.rod, self.side = rod, cells + 1
-        self.key = np.empty(0, np.int64)
-        self.gamma, self.tip = np.empty((0, 3)), np.empty((0, 3))
-        self.slope, self.det = np.empty((0, 3, 3)), np.empty(0)
-
-    def vertices(self, place: Index) -> Index:
-        """Numbers of the vertices at lattice places (..., 3), computing those that are new."""
-        key = (place[..., 0] * self.side + place[..., 1]) * self.side + place[..., 2]
-        unique, inverse = np.unique(key, return_inverse=True)
-        known = np.isin(unique, self.key, assume_unique=True)
-        self._compute(unique[~known])
-        order = np.argsort(self.key)
-        number = order[np.searchsorted(self.key, unique, sorter=order)]
-        return number[inverse].reshape(key.shape)
-
-    def _compute(self, key: Index) -> None:
-        place = np.stack(np.unravel_index(key, (self.side,) * 3), -1)
-        gamma = self.rod.box.from_cube(place / (self.side - 1))
-        tip, slope = self.rod.tips_and_slopes(gamma)
-        self.key = np.concatenate([self.key, key])
-        self.gamma = np.concatenate([self.gamma, gamma])
-        self.tip = np.concatenate([self.tip, tip])
-        self.slope = np.concatenate([self.slope, slope])
-        with np.errstate(invalid="ignore"):  # where there is no equilibrium
-            self.det = np.concatenate([self.det, np.linalg.det(slope)])
-
-
-def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:
+def _mesh(rod: TipMap, vertices: _Vertices, corner: Index) -> ActivationMesh:
     error, remainder = np.empty(len(corner)), np.empty(len(corner))
-    interpolation_errors(lattice.gamma, lattice.tip, lattice.slope, corner, error, remainder)
-    error += 1e-9 * lattice.rod.length  # rounding must not put a target between two tetrahedra
-    change = np.sqrt(((lattice.slope[corner[:, 7]] - lattice.slope[corner[:, 0]]) ** 2).sum((1, 2)))
+    interpolation_errors(*vertices, corner, error, remainder)
+    error += 1e-9 * rod.length  # rounding must not put a target between two tetrahedra
+    slope = vertices.slope
+    change = np.sqrt(((slope[corner[:, 7]] - slope[corner[:, 0]]) ** 2).sum((1, 2)))
     for bit in (1, 2, 4):
-        step = lattice.slope[corner[:, bit]] - lattice.slope[corner[:, 0]]
+        step = slope[corner[:, bit]] - slope[corner[:, 0]]
         change += np.sqrt((step**2).sum((1, 2)))
-    vertices = lattice.gamma, lattice.tip, lattice.slope
     return ActivationMesh(*vertices, corner, error, remainder, change)
 
 

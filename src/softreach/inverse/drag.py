@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import PathStatus, PreparedMap, prepared_map
-from softreach.inverse.path import Continuation
+from softreach.inverse.path import BranchPoint, Continuation
+from softreach.rod.tip_map import TipMap
+from softreach.rod.view import View
 from softreach.workspace.search import CLOSELY, nearest_tips
 
 __all__ = ["Drag", "Dragged"]
@@ -30,6 +32,8 @@ class Dragged(NamedTuple):
     """Place of the tip then [m], shape (3,)."""
     gap: float
     """Distance from there to the target [m]; 0 where the tip follows."""
+    rod: TipMap
+    """The tip map of the arm in the posture in which this leaves it."""
 
 
 class Drag:
@@ -46,39 +50,47 @@ class Drag:
         self._rod = self._prepared.rod
         self._tracker = Continuation(self._rod, _RESIDUAL * self._rod.length)
         self._side = 0.0
+        self._last: tuple[tuple[float, ...], BranchPoint] | None = None  # where it was left
 
     def to(self, activation: tuple[float, ...], target: Array) -> Dragged | None:
         """Drag the tip of the arm in an activation straight to a target [m].
+
+        An arm under loads begins in the posture in which the last step left it, if that ended in
+        this activation, else in that to which it comes from rest.
 
         Returns:
             None where the arm has no stable equilibrium to begin with.
         """
         box, measures = self._prepared.whole.box, self._prepared.measures
-        gamma = self._rod.box.clip((np.asarray(activation) / measures)[box.free])
-        point = self._tracker.at(gamma)
+        if self._last is not None and self._last[0] == activation:
+            point = self._last[1]
+        else:
+            gamma = self._rod.box.clip((np.asarray(activation) / measures)[box.free])
+            point = self._tracker.at(gamma).kept()
         if not np.isfinite(point.slope).all():
             return None
         self._side = self._sign(point.slope) or self._side
         if box.dimension >= 3:
             end = self._tracker.follow(point, point.tip, target)
+            point = end.point
             if end.status == PathStatus.FOLLOWED:
-                return self._dragged(end.point.gamma, target)
-            gamma = end.point.gamma
-        return self._dragged(self._nearest(gamma, target), target)
+                return self._dragged(point, target)
+        return self._dragged(self._nearest(point, target), target)
 
-    def _nearest(self, gamma: Array, target: Array) -> Array:
-        """The activation around here that brings the tip nearest to the target."""
-        slope = self._tracker.at(gamma).slope
-        starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, slope)]))
+    def _nearest(self, point: BranchPoint, target: Array) -> BranchPoint:
+        """The place around here that brings the tip nearest to the target."""
+        gamma, rod = point.gamma, point.rod
+        starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, point.slope)]))
         targets = np.tile(target, (len(starts), 1))
-        ends = nearest_tips(self._rod, starts, targets, self._tracker.residual, CLOSELY).gamma
-        tips, slopes = self._rod.tips_and_slopes(ends)
+        ends = nearest_tips(rod, starts, targets, self._tracker.residual, CLOSELY).gamma
+        tips, slopes = rod.tips_and_slopes(ends)
         gaps = np.linalg.norm(tips - target, axis=1)
         gaps = np.where(np.isfinite(gaps), gaps, np.inf)
         best = gaps <= gaps.min() + self._tracker.residual
         other_side = [self._side * self._sign(slope) < 0 for slope in slopes]
         away = np.linalg.norm((ends - gamma) / self._rod.box.scales, axis=1)
-        return ends[np.lexsort((away, other_side, ~best))[0]]
+        best_end = np.lexsort((away, other_side, ~best))[0]
+        return BranchPoint(ends[best_end], tips[best_end], slopes[best_end], rod).kept()
 
     def _beside_fold(self, gamma: Array, slope: Array) -> list[Array]:
         """Starts on both sides of a fold: on it, no small change brings the tip nearer."""
@@ -97,10 +109,11 @@ class Drag:
         sizes = np.linalg.svd(scaled, compute_uv=False)
         return float(np.sign(np.linalg.det(scaled))) if sizes[2] > 1e-6 * sizes[0] else 0.0
 
-    def _dragged(self, gamma: Array, target: Array) -> Dragged:
+    def _dragged(self, point: BranchPoint, target: Array) -> Dragged:
         rod = self._prepared.whole
-        activation = rod.box.with_fixed(gamma[None])[0] * self._prepared.measures
-        tip = self._tracker.at(gamma).tip
-        gap = float(np.linalg.norm(tip - target))
+        activation = rod.box.with_fixed(point.gamma[None])[0] * self._prepared.measures
+        gap = float(np.linalg.norm(point.tip - target))
         within = tuple(float(value) for value in activation)
-        return Dragged(within, tip, 0.0 if gap <= self._tracker.allowance else gap)
+        self._last, held = (within, point), point.rod
+        held = held.base if isinstance(held, View) else held
+        return Dragged(within, point.tip, 0.0 if gap <= self._tracker.allowance else gap, held)

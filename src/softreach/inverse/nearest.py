@@ -104,7 +104,7 @@ class Reached(NamedTuple):
 
 
 def _nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
-    tip = placed(rod, gamma)[0]
+    tip = placed(rod, gamma)
     return Nearest(gamma, tip, np.linalg.norm(tip - targets, axis=1))
 
 

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.descent import descend
 from softreach.inverse.request import allowance, as_activations, as_residual, as_targets
-from softreach.inverse.roots import placed
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
@@ -29,7 +28,6 @@ _LONGEST = 0.1  # predicted change of activation in one substep, in ranges
 _SHORTEST = 1e-10  # substep at which a branch is at its end, in L
 _SHORTEST_TORN = 1e-7  # the same where stability is lost: there the tip moves without limit
 _CORRECTION = 0.25  # against the prediction, beyond which the branch may have been left
-_FOLDED = 1e-3  # smallest singular value at the end of a branch that is a fold, in L
 _AT_BOUND = 1e-9  # in ranges
 _MOST_CORRECTIONS = 10
 _SINGULAR = 1e-10  # singular values below this part of the largest do not count
@@ -47,8 +45,9 @@ def track_path(
 
     Each substep is predicted by the Jacobian and corrected by Newton's method; it is halved while
     the correction is large, while det J changes sign (three free bundles), while a bound is
-    overstepped or while there is no stable equilibrium. With more free bundles the change of
-    activation is least in every substep, and bundles wait at their bounds.
+    overstepped or while the arm snaps. With more free bundles the change of
+    activation is least in every substep, and bundles wait at their bounds. The posture of an arm
+    under loads is continued along the path, from that to which the start leads from rest.
 
     Args:
         arm: A design with three free bundles or more, or its tip map.
@@ -65,7 +64,7 @@ def track_path(
         branch, and `status` (`PathStatus`); `end_activation` and `end_position` are the last on
         the branch, `end_length` the length of path up to there and `end_length_error` how much
         farther the branch may go [m]; the attributes name how it ended: `end` ("" if the whole
-        path is followed, else `fold`, `bound`, `unstable` or `no_start`), `end_bundle` and
+        path is followed, else `fold`, `bound`, `snaps` or `no_start`), `end_bundle` and
         `end_bound`.
 
     Raises:
@@ -101,8 +100,8 @@ class PathStatus(IntEnum):
     """Beyond a bound: too few bundles could move on within theirs."""
     NO_START = 3
     """The first point cannot be reached, or not from the start given."""
-    UNSTABLE = 4
-    """Beyond a loss of stability: there the arm leaps to another equilibrium as the load grows."""
+    SNAPS = 4
+    """Beyond a loss of stability: there the arm under loads snaps to another posture."""
 
 
 _MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathStatus)
@@ -115,18 +114,19 @@ class Continuation:
         """Set up for tips within `residual` [m] of their points, or as near as tips can tell."""
         self.rod, self.box, self.residual = rod, rod.box, residual
         self.allowance = allowance(rod, residual)
-        self._torn = False  # whether the last correction met a place without a stable equilibrium
+        self._torn = False  # whether the last correction met a place where the arm snaps
 
-    def at(self, gamma: Array) -> BranchPoint:
-        """The tip map linearized at an activation (m,)."""
-        tips, slopes = self.rod.tips_and_slopes(gamma[None])
-        return BranchPoint(gamma, tips[0], slopes[0])
+    def at(self, gamma: Array, rod: TipMap | None = None) -> BranchPoint:
+        """A tip map linearized at an activation (m,), by default that of postures from rest."""
+        rod = rod or self.rod
+        tips, slopes = rod.tips_and_slopes(gamma[None])
+        return BranchPoint(gamma, tips[0], slopes[0], rod)
 
     def corrected_start(self, gamma: Array, target: Array) -> BranchPoint | None:
         """The activation corrected to a first target, if it can be within the bounds."""
-        start = self._corrected(gamma, target, self.box.is_free)
+        start = self._corrected(self.rod, gamma, target, self.box.is_free)
         if start is None or (self.box.excess(start.gamma) > _AT_BOUND).any():
-            return self._within_bounds(gamma, target[None])
+            return self._within_bounds(self.rod, gamma, target[None])
         return self._clipped(start)
 
     def follow(self, point: BranchPoint, begin: Array, end: Array) -> BranchEnd:
@@ -148,12 +148,12 @@ class Continuation:
                 return substep.end._replace(done=done, error=shortest * distance)
             torn = torn or substep.torn
             if substep.point is not None:
-                point, done, part = substep.point, 1.0 if last else done + part, 2 * part
+                point, done, part = substep.point.kept(), 1.0 if last else done + part, 2 * part
                 torn = False
             elif part * substep.shorten < (shortest_torn if torn else shortest):
                 if (beside := self._beside(point, end)) is not None:
                     return BranchEnd(PathStatus.FOLLOWED, beside, done=1.0)
-                why = PathStatus.UNSTABLE if torn or self._leaps(point) else PathStatus.FOLD
+                why = PathStatus.SNAPS if torn else PathStatus.FOLD
                 return BranchEnd(why, point, done=done, error=part * distance)
             else:
                 part *= substep.shorten
@@ -171,7 +171,7 @@ class Continuation:
             if not blocked.any():
                 if size > _LONGEST:
                     return _Substep(shorten=0.9 * _LONGEST / size)
-                corrected = self._corrected(ahead, target, moving)
+                corrected = self._corrected(point.rod, ahead, target, moving)
                 if corrected is None:
                     return _Substep(shorten=0.5, torn=self._torn)
                 if self._left_branch(point, ahead, corrected):
@@ -191,25 +191,28 @@ class Continuation:
     def _beside(self, point: BranchPoint, target: Array) -> BranchPoint | None:
         """The point of the branch that is at a place as far as tips can tell; None if none is."""
         # All of the way there has to be as near to the reachable set: half of it is looked at.
-        beside = self._within_bounds(point.gamma, np.array([0.5 * (point.tip + target), target]))
+        targets = np.array([0.5 * (point.tip + target), target])
+        beside = self._within_bounds(point.rod, point.gamma, targets)
         if beside is None or self._left_branch(point, beside.gamma, beside):
             return None
         far = np.abs(beside.gamma - point.gamma) > _LONGEST * self.box.scales
         return None if far.any() else beside
 
-    def _within_bounds(self, gamma: Array, targets: Array) -> BranchPoint | None:
+    def _within_bounds(self, rod: TipMap, gamma: Array, targets: Array) -> BranchPoint | None:
         """Nearest to the last of some places (k, 3), if all are as near as tips can tell."""
         start = np.tile(gamma, (len(targets), 1))
-        ends = descend(self.rod, targets, start, self.residual)
+        ends = descend(rod, targets, start, self.residual)
         if not (ends.residual <= self.allowance).all():
             return None
-        return BranchPoint(ends.gamma[-1], ends.tip[-1], ends.slope[-1])
+        return BranchPoint(ends.gamma[-1], ends.tip[-1], ends.slope[-1], rod)
 
-    def _corrected(self, gamma: Array, target: Array, moving: Mask) -> BranchPoint | None:
+    def _corrected(
+        self, rod: TipMap, gamma: Array, target: Array, moving: Mask
+    ) -> BranchPoint | None:
         """Newton's method with the least-norm step of the moving bundles; None if it fails."""
         least, self._torn = np.inf, False
         for _ in range(_MOST_CORRECTIONS):
-            point = self.at(gamma)
+            point = self.at(gamma, rod)
             if not np.isfinite(point.slope).all():
                 self._torn = True
                 return None
@@ -235,16 +238,9 @@ class Continuation:
             return False
         return bool(np.linalg.det(point.slope) * np.linalg.det(corrected.slope) <= 0)
 
-    def _leaps(self, point: BranchPoint) -> bool:
-        """True if a branch ends here though no fold is near: an arm under loads leaps."""
-        if not self.rod.supports_unstable:
-            return False
-        sizes = np.linalg.svd(point.slope * self.box.scales, compute_uv=False)
-        return bool(sizes[2] > _FOLDED * self.rod.length)
-
     def _clipped(self, point: BranchPoint) -> BranchPoint:
         gamma = self.box.clip(point.gamma)
-        return point if np.array_equal(gamma, point.gamma) else self.at(gamma)
+        return point if np.array_equal(gamma, point.gamma) else self.at(gamma, point.rod)
 
     def _at_bound(self, gamma: Array) -> Mask:
         return self.box.excess(gamma) >= -2 * _AT_BOUND
@@ -267,6 +263,12 @@ class BranchPoint(NamedTuple):
     """Tip [m], shape (3,)."""
     slope: Array
     """∂r/∂γ [m], shape (3, m)."""
+    rod: TipMap
+    """The tip map, whose posture it is."""
+
+    def kept(self) -> BranchPoint:
+        """The same, to go on from this posture."""
+        return self._replace(rod=self.rod.continued_from(self.gamma[None]))
 
 
 class BranchEnd(NamedTuple):
@@ -292,7 +294,7 @@ class _Substep(NamedTuple):
     shorten: float = 1.0
     end: BranchEnd | None = None
     torn: bool = False
-    """True if it met a place without a stable equilibrium."""
+    """True if it met a place where the arm snaps."""
 
 
 def _least_norm(slope: Array, moving: Mask) -> Array:
@@ -312,20 +314,20 @@ def _best_start(
 
 def _followed(
     tracker: Continuation, first: BranchPoint, points: Array
-) -> tuple[list[Array], BranchEnd]:
-    """Activations of the free bundles at the points that the branch leads to, and its end."""
-    end = BranchEnd(PathStatus.FOLLOWED, first)
-    followed = [first.gamma]
+) -> tuple[list[BranchPoint], BranchEnd]:
+    """The points that the branch leads to, and its end."""
+    end = BranchEnd(PathStatus.FOLLOWED, first.kept())
+    followed = [end.point]
     for k in range(1, len(points)):
         end = tracker.follow(end.point, points[k - 1], points[k])
         if end.status != PathStatus.FOLLOWED:
             break
-        followed.append(end.point.gamma)
+        followed.append(end.point)
     return followed, end
 
 
 def _dataset(
-    rod: TipMap, points: Array, followed: list[Array], end: BranchEnd | None
+    rod: TipMap, points: Array, followed: list[BranchPoint], end: BranchEnd | None
 ) -> xr.Dataset:
     import xarray as xr
 
@@ -339,8 +341,9 @@ def _dataset(
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""
     if end is not None:
-        activation[:n] = box.with_fixed(np.array(followed))
-        error[:n] = np.linalg.norm(placed(rod, activation[:n])[0] - points[:n], axis=1)
+        activation[:n] = box.with_fixed(np.array([point.gamma for point in followed]))
+        tips = np.array([point.tip for point in followed])
+        error[:n] = np.linalg.norm(tips - points[:n], axis=1)
         end_activation, end_position = box.with_fixed(end.point.gamma[None])[0], end.point.tip
         if end.status == PathStatus.BOUND:
             bundle, bound = box.names[box.free[end.bundle]], "upper" if end.upper else "lower"

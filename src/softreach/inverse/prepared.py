@@ -68,11 +68,6 @@ class PreparedMap:
         return self.rod if self.rod.supports_unstable else coarsened(self.rod, _COARSE)
 
     @lazy
-    def branch_map(self) -> TipMap:
-        """The same with unstable equilibria, to say which activations end in one."""
-        return free_bundles(self.whole)
-
-    @lazy
     def proves(self) -> bool:
         """True if what a cell of activations reaches is bounded; of loaded arms it is not."""
         return bool(np.isfinite(self.whole.farthest()))
@@ -84,14 +79,13 @@ class PreparedMap:
 
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
-        # Loads make the map steep before an equilibrium is lost.
-        return activation_cells(self.branch_map, self.cells, int(self.whole.supports_unstable))
+        return activation_cells(self.rod, self.cells)
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
         self._searched[0] += count
         divided = len(self.mesh.corner) and self._searched[0] > _FEW
-        for name in ("rod", "branch_map", "_cut", "tree")[: 4 if divided else 3]:
+        for name in ("rod", "_cut", "tree")[: 3 if divided else 2]:
             getattr(self, name)
 
     @property

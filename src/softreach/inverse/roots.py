@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +9,8 @@ import numpy as np
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import newton
-from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
-from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask, joined_by, rows
+from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, joined_by, rows
 
 _EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
 """Seeds near the target, most starts from them, their least distance in ranges."""
@@ -39,24 +37,21 @@ class Roots(NamedTuple):
     """|tip - target| [m], shape (n,)."""
     cell: Index
     """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
-    stable: Mask
-    """Mask of the roots at stable equilibria, shape (n,)."""
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
         return joined_by("target", [self, other]) if len(other.target) else self
 
     def missing(self, targets: int, residual: float = np.inf) -> Index:
-        """Numbers of the targets, of so many, that have no stable root within a residual [m]."""
-        known = self.target[self.stable & (self.residual <= residual)]
+        """Numbers of the targets, of so many, that have no root within a residual [m]."""
+        known = self.target[self.residual <= residual]
         return np.flatnonzero(np.bincount(known, minlength=targets) == 0)
 
 
 def no_roots(rod: TipMap) -> Roots:
     """An empty set of roots."""
     none, m = np.empty(0, np.int64), rod.box.bundles
-    stable = np.empty(0, bool)
-    return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none, stable)
+    return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none)
 
 
 def roots_at(rod: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
@@ -70,26 +65,18 @@ def roots_at(rod: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
     """
     tips, slopes = rod.tips_and_slopes(gamma)
     residual = np.linalg.norm(tips - targets[target], axis=1)
-    nowhere, stable = np.full(len(target), -1), np.isfinite(residual)
-    return Roots(target, gamma, slopes, residual, nowhere, stable)
+    return Roots(target, gamma, slopes, residual, np.full(len(target), -1))
 
 
-def placed(rod: TipMap, gamma: Array) -> tuple[Array, Mask]:
-    """Tips to rounding [m], (n, 3), and whether the arm can be there, (n,).
+def placed(rod: TipMap, gamma: Array) -> Array:
+    """Tips to rounding [m], shape (n, 3).
 
     `TipMap.tips` of loaded arms ends the search for an equilibrium within a part of `tol` that is
     larger than the residual of a root.
     """
     if not rod.supports_unstable:
-        return rod.tips(gamma), np.ones(len(gamma), bool)
-    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, rod.box.bundles))
-    status = np.empty(len(gamma), np.int8)
-    rod.prepare()
-    parallel.run(
-        partial(rod.fill, gamma[b], tips[b], slopes[b], status=status[b])
-        for b in parallel.blocks(len(gamma), BLOCK // 8)
-    )
-    return tips, status == TipStatus.STABLE
+        return rod.tips(gamma)
+    return rod.tips_and_slopes(gamma)[0]
 
 
 def smallest_singular_values(slope: Array) -> Array:

@@ -60,9 +60,6 @@ class Solution:
     gap_bound: float
     """A proved lower bound of the distance to all tips within the bounds [m], more than their
     error; 0 if nothing is proved."""
-    unstable: int
-    """Number of activations found, with three free bundles, that would put the tip of an arm
-    under loads at the target, but in an unstable equilibrium; they are left out."""
 
     def __len__(self) -> int:
         return len(self.activations)
@@ -70,13 +67,12 @@ class Solution:
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.target)
         outcome = self.status.name.lower().replace("_", " ")
-        unstable = f", {self.unstable} unstable left out" if self.unstable else ""
         if not len(self):
             near = f"nearest point {self.gap:.3g} m away"
-            return f"<Solution for ({place}) m: {outcome}, {near}{unstable}>"
+            return f"<Solution for ({place}) m: {outcome}, {near}>"
         count, worst = counted(len(self), "activation"), self.residuals.max()
         summary = f"{count}, largest residual {worst:.1e} m"
-        return f"<Solution for ({place}) m: {outcome}, {summary}{unstable}>"
+        return f"<Solution for ({place}) m: {outcome}, {summary}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,8 +107,6 @@ class Solutions(Sequence[Solution]):
     """Shape (t,) [m]."""
     gap_bounds: Array
     """Proved lower bounds of the distance to all tips, 0 if nothing is proved, shape (t,) [m]."""
-    unstable: Index
-    """Activations found that end in an unstable equilibrium and are left out, shape (t,)."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -171,8 +165,6 @@ class Solutions(Sequence[Solution]):
         if len(self.residuals):
             parts.append(counted(len(self.residuals), "activation"))
             parts.append(f"largest residual {self.residuals.max():.1e} m")
-        if self.unstable.any():
-            parts.append(f"{self.unstable.sum()} unstable left out")
         targets = counted(len(self), "target")
         return f"<Solutions for {targets}{': ' if parts else ''}{', '.join(parts)}>"
 
@@ -189,7 +181,6 @@ class Solutions(Sequence[Solution]):
             nearest_activation=self.nearest_activations[i],
             gap=float(self.gaps[i]),
             gap_bound=float(self.gap_bounds[i]),
-            unstable=int(self.unstable[i]),
         )
 
     def _several(self, chosen: Index) -> Solutions:
@@ -221,7 +212,6 @@ class Solutions(Sequence[Solution]):
                 "nearest_activation": (per_target, self.nearest_activations, units),
                 "gap": ("target", self.gaps, {"units": "m"}),
                 "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
-                "unstable": ("target", self.unstable, {"units": "1"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (per_solution, self.activations, units),
                 "residual": ("solution", self.residuals, {"units": "m"}),
@@ -240,6 +230,5 @@ _PER_TARGET = (
     "nearest_activations",
     "gaps",
     "gap_bounds",
-    "unstable",
 )
 _PER_SOLUTION = ("activations", "residuals", "conditions", "margins")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -129,11 +127,8 @@ def solve_inverse(
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     """All roots, and the nearest points to the targets that have none."""
-    branches = every_branch(prepared, request)
-    count = len(request.targets)
-    unstable = np.bincount(branches.target[~branches.stable], minlength=count)
-    roots = rows(branches, branches.stable)
-    missing = roots.missing(count)
+    roots = every_branch(prepared, request)
+    missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
     bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
@@ -146,15 +141,12 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
         late = distinct(prepared, request, late)
         roots, still = roots.joined(late), np.isin(missing, late.target, invert=True)
         closest, bounds = rows(closest, still), bounds[still]
-    return replace(_solutions(prepared, request, roots, closest, bounds), unstable=unstable)
+    return _solutions(prepared, request, roots, closest, bounds)
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     """Nearest points, or compromises between distance and direction."""
-    roots = None
-    if prepared.dimension == 3:
-        branches = every_branch(prepared, request)
-        roots = rows(branches, branches.stable)
+    roots = every_branch(prepared, request) if prepared.dimension == 3 else None
     closest = nearest(prepared, request, roots)
     return _solutions(prepared, request, no_roots(prepared.rod), closest)
 
@@ -204,7 +196,7 @@ def _solutions(
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
     points = request.targets.copy()
     off = reached[gaps[reached] > request.residual]
-    points[off] = placed(rod, gamma[off])[0]
+    points[off] = placed(rod, gamma[off])
     points[missing], gamma[missing], gaps[missing] = closest.tip, closest.gamma, closest.gap
     proved_gaps[missing] = bounds
     return Solutions(
@@ -222,5 +214,4 @@ def _solutions(
         nearest_activations=prepared.whole.box.with_fixed(gamma),
         gaps=gaps,
         gap_bounds=proved_gaps,
-        unstable=np.zeros(count, np.int64),
     )

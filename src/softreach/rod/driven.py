@@ -6,7 +6,7 @@ At rest they are bent already, or a displacement of a tendon decides its tension
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,6 +102,14 @@ class DrivenRod(DerivedMap):
     def prepare(self) -> None:
         super().prepare()
         self.activations(self.box.low[None])
+
+    def continued_from(self, gamma: Array) -> TipMap:
+        rod = super().continued_from(gamma)
+        if self.lengths is not None:
+            inner = self.lengths.rod.continued_from(self.activations(gamma))
+            assert isinstance(inner, ArmRod)
+            vars(rod).update(driving=self.driving, lengths=replace(self.lengths, rod=inner))
+        return rod
 
     def activations(self, x: Array) -> Array:
         """γ of the inner arm at checked x (n, bundles); NaN where no tensions are found."""

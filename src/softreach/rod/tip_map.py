@@ -163,6 +163,13 @@ class TipMap(ABC):
     def prepare(self) -> None:  # noqa: B027
         """Compute what every sample needs, once for all threads."""
 
+    def continued_from(self, gamma: Array) -> TipMap:
+        """The map of an arm that is in its posture at γ (1, bundles), and moves straight from it.
+
+        Itself for arms without loads, which have one shape at every activation.
+        """
+        return self
+
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         """Smallest ζ, or η, along the arm at activations (n, bundles), shape (n,).
 

@@ -133,6 +133,14 @@ class DerivedMap(TipMap):
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         return self.base.extension_and_turn(gamma)
 
+    def activations(self, x: Array) -> Array:
+        """Activations of the base at checked ones (n, bundles)."""
+        return x
+
+    def continued_from(self, gamma: Array) -> TipMap:
+        base = self.base.continued_from(self.activations(gamma))
+        return self if base is self.base else replace(self, base=base)
+
     def farthest(self) -> float:
         return self.base.farthest()
 

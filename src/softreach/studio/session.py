@@ -28,7 +28,9 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
+    from softreach.arm.manipulator import Manipulator
     from softreach.inverse import Solution
+    from softreach.inverse.drag import Dragged
     from softreach.plot.coloring import BundleKey, ScalarKey
     from softreach.requirements import Check
     from softreach.studio.jobs.calibration import Bench
@@ -181,6 +183,8 @@ class Session:
         """Of the inverse problem."""
         self.drag: TipDrag | None = None
         """Of the tip; None when nobody drags."""
+        self.held: tuple[Manipulator, Dragged] | None = None
+        """An arm, and how the last drag left it."""
         self.is_dragged = False
         """True while a drag of the tip is under way."""
         self.bench: Bench | None = None

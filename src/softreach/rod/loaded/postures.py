@@ -9,7 +9,7 @@ is then polished on the arm itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -185,6 +185,17 @@ class Postures:
                 values[left] = new
         return begin, start
 
+    def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
+        """Postures of an arm that is in one at an activation (1, bundles), of known frame."""
+        return ContinuedPostures(
+            self.solver, self.box, self.side, origin=self, at=gamma, frame=frame
+        )
+
+    @lazy
+    def mirrored(self) -> Postures:
+        """Those of the twin with the other twist."""
+        return Postures(self.solver, self.box, -self.side)
+
     def with_flood(self) -> Postures:
         """The same, with starts from a grid over the box where that is worth it."""
         sizes = grid_sizes(self.box)
@@ -221,3 +232,47 @@ class FloodedPostures(Postures):
         for values, at_rest in zip(start, self.rest, strict=True):
             values[lost] = at_rest[0]
         return follow(self.twin, Path.under_all_loads(begin, gamma), start)
+
+
+@dataclass(frozen=True, eq=False)
+class ContinuedPostures(Postures):
+    """The same along straight lines from a posture that the arm is in, as if it were at rest."""
+
+    origin: Postures = field(kw_only=True)
+    at: Array = field(kw_only=True)
+    """Its activation, shape (1, bundles)."""
+    frame: Array = field(kw_only=True)
+    """How it sees the world, shape (1, component)."""
+
+    def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
+        return replace(self, at=gamma, frame=frame)
+
+    def direct(self, gamma: Array, rows: slice, equilibria: Equilibria) -> None:
+        """Nothing: all are followed."""
+
+    @lazy
+    def rest_activation(self) -> Array:
+        return self.at
+
+    @lazy
+    def _begun(self) -> tuple[Solver, Shots]:
+        """The twin that has this posture, and it; of two that have it that of the side."""
+        for postures in (self.origin, self.origin.mirrored):
+            twin = postures.twin
+            rest = twin.careful(self.at, self.frame)
+            near = turn_between(rest.frame, self.frame) < _POLISHED
+            if (rest.is_found & (rest.margin > 0.0) & near)[0]:
+                break
+        return twin, rest
+
+    @lazy
+    def twin(self) -> Solver:
+        return self._begun[0]
+
+    @lazy
+    def rest(self) -> Shots:
+        return self._begun[1]
+
+    @property
+    def is_held_at_rest(self) -> bool:
+        return True

@@ -142,6 +142,13 @@ class LoadedRod(ArmRod):
     def _prepare(self) -> None:
         self.postures  # noqa: B018
 
+    def continued_from(self, gamma: Array) -> LoadedRod:
+        frame = self.equilibria(gamma).frame
+        postures = self.postures.continued_from(gamma, frame)
+        rod = _ContinuedRod(self.arm, self.tol)
+        vars(rod).update({"origin": self, **vars(self), "postures": postures})
+        return rod
+
     def equilibria(self, activations: ArrayLike) -> Equilibria:
         """Tips with their status, the margin of stability, and how each was found.
 
@@ -255,3 +262,19 @@ class LoadedRod(ArmRod):
         if np.isnan(strains.extension).all():
             raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
         return sampled_range(strains)
+
+
+class _ContinuedRod(LoadedRod):
+    """The same arm with other postures; equal to itself alone, since these count."""
+
+    origin: LoadedRod
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    @lazy
+    def _shape_solver(self) -> Solver:
+        return self.origin._shape_solver

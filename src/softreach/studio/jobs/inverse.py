@@ -121,6 +121,7 @@ class DragTip(Job):
         target = place * state.design.length
         dragged = self._drag_of(state).to(state.activation, target)
         if dragged is not None:
+            session.held = state.design, dragged
             session.drag = None if rests else TipDrag(place, dragged)
             rest = vector(target) if rests else None
             session.update(lambda s: _moved(s, state, dragged, rest), goes_on=True)

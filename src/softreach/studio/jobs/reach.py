@@ -209,8 +209,12 @@ class DrawArm(Job):
             session.tip, session.posture = None, TipStatus.NO_EQUILIBRIUM
             session.scene.remove("/arm")
             return
+        if session.held is not None:
+            design, dragged = session.held
+            if design == state.design and dragged.activation == state.activation:
+                rod = dragged.rod  # in its posture
         with session.client.atomic():
-            tip = session.scene.draw_arm(state.design, state.activation)
+            tip = session.scene.draw_arm(state.design, state.activation, rod=rod)
         session.tip = tip if np.isfinite(tip).all() else None
         if rod.supports_unstable:
             status = TipStatus(rod.status([state.activation])[0])

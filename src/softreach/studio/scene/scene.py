@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from viser import SceneApi
 
     from softreach.plot.coloring import BundleKey, ScalarKey
+    from softreach.rod.tip_map import TipMap
 
 
 Array = NDArray[np.float64]
@@ -142,14 +143,15 @@ class Scene:
         activation: Sequence[float],
         path: str = "/arm",
         length: float | None = None,
+        rod: TipMap | None = None,
     ) -> Array:
         """The body, its fibers and markers; returns the tip. Redrawn by moving what there is.
 
         Nothing is drawn of an arm without equilibrium, and the tip is NaN. Lengths are over
-        `length` [m], by default that of the arm.
+        `length` [m], by default that of the arm; `rod` is its tip map in another posture.
         """
         length = length or arm.length
-        shape = configuration(solvable_rod(arm), np.asarray(activation), _STATIONS)
+        shape = configuration(rod or solvable_rod(arm), np.asarray(activation), _STATIONS)
         return self._draw_shape(arm, shape, path, length)
 
     def draw_rest(self, state: StudioState) -> None:
