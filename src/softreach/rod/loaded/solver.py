@@ -170,18 +170,14 @@ class Solver:
         shapes = shapes_of(at, trace, rows, self._force_at(table, rows), nowhere)
         return shapes.on_base(), margin
 
-    def frames_facing(self, gamma: Array, directions: Array) -> tuple[Array, Array]:
-        """Frames of arms whose tips see gravity along given directions, and their margins.
-
-        As `shapes_facing`, but of arms of any number of segments: frames as in `Equilibria`.
-        """
+    def frames_facing(self, gamma: Array, directions: Array) -> Array:
+        """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
         whole = self._fine._replace(firsts=np.array([0, len(self._fine.lengths)]))
         tables = replace(self.tables, longest=np.inf)
         trace = walk(gamma, tables, directions, whole, trace=True).trace
-        margin = shoot(gamma, tables, directions, whole, whole, MARGIN_ALONE, 0.0, _ALL).margin
         turn = rotation_matrices(trace[:, -1, 12:16])
         seen = trace[:, self._fine.firsts[:-1], :3] @ turn
-        return units(seen.reshape(len(gamma), self.tables.frame_size)), margin
+        return units(seen.reshape(len(gamma), self.tables.frame_size))
 
     def respond(
         self,
