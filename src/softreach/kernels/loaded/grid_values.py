@@ -36,10 +36,12 @@ def interpolate(values, is_smooth, points, sizes, out):
         for i in range(count[0]):
             for j in range(count[1]):
                 row = ((first[0] + i) * sizes[1] + first[1] + j) * sizes[2] + first[2]
-                for k in range(count[2]):
-                    weight = weights[0, i] * weights[1, j] * weights[2, k]
-                    for component in range(out.shape[1]):
-                        out[n, component] += weight * values[row + k, component]
+                weight = weights[0, i] * weights[1, j]
+                for component in range(out.shape[1]):
+                    value = 0.0
+                    for k in range(count[2]):
+                        value += weights[2, k] * values[row + k, component]
+                    out[n, component] += weight * value
 
 
 @inline
