@@ -90,8 +90,8 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
         found = solver.careful(gamma, guess, share)
         with np.errstate(all="ignore"):  # of what is not found
             turn = turn_between(found.frame, guess)
-            off = found.tips - tips[rows] - h[:, None] * moves[rows]
-            off = np.linalg.norm(off, axis=1) / length
+            missed = found.tips - tips[rows] - h[:, None] * moves[rows]
+            off = np.linalg.norm(missed, axis=1) / length
         is_first = steps_known[rows] == 0
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
         most = np.where(is_first, 2.0, 1.0) * allowed
@@ -104,8 +104,9 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
         steps_known[on] += 1
         with np.errstate(all="ignore"):  # of a secant's error, to half of what is allowed
             wanted = 0.5 * (np.sqrt(1.0 + 4.0 * allowed / change) - 1.0)
-        wanted = np.where(good, np.clip(wanted, 0.5, 4.0), np.where(wanted > 0.1, 0.4, 0.25))
-        step[rows] = h * wanted
+        step[rows] = h * np.where(
+            good, np.clip(wanted, 0.5, 4.0), np.where(wanted > 0.1, 0.4, 0.25)
+        )
         ended[rows] = ~good & (step[rows] < _SHORTEST)
     shots = Shots(tips, frame, margin, start.is_found & (place >= 1.0))
     return Followed(shots, ended)

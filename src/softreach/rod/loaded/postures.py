@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = ["Postures"]
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TWIST = 1e-4  # [rad], of the twin over its length
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
