@@ -46,7 +46,6 @@ def interpolate(values, is_smooth, points, sizes, out):
 
 @inline
 def _weigh(weights, x, count):
-    """Lagrange's weights of the first nodes 0, 1, 2, 3 at x."""
     if count == 4:
         weights[0] = (x - 1.0) * (x - 2.0) * (3.0 - x) / 6.0
         weights[1] = x * (x - 2.0) * (x - 3.0) / 2.0

@@ -175,8 +175,7 @@ class Solver:
         whole = self._fine._replace(firsts=np.array([0, len(self._fine.lengths)]))
         tables = replace(self.tables, longest=np.inf)
         trace = walk(gamma, tables, directions, whole, trace=True).trace
-        turn = rotation_matrices(trace[:, -1, 12:16])
-        seen = trace[:, self._fine.firsts[:-1], :3] @ turn
+        seen = trace[:, self._fine.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
         return units(seen.reshape(len(gamma), self.tables.frame_size))
 
     def respond(
