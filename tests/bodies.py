@@ -12,6 +12,7 @@ from numpy.polynomial import chebyshev
 
 from softreach.arm import Loads, Manipulator
 from softreach.arm.tables import tables
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import Body
@@ -31,7 +32,7 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
 def by_lines(solver: Solver, gamma: np.ndarray) -> Equilibria:
     """Postures found along lines from rest alone."""
     equilibria = solver.empty(len(gamma))
-    solver.postures.by_line(gamma, np.arange(len(gamma)), equilibria)
+    Postures.of(solver).by_line(gamma, np.arange(len(gamma)), equilibria)
     return equilibria
 
 

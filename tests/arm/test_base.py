@@ -13,7 +13,7 @@ import softreach as sr
 from softreach.arm import PointLoad
 from softreach.arm.base import POINTS
 from softreach.arm.design_file.keys import keys_of
-from softreach.arm.parameters import changed, find_parameter, written_parameters
+from softreach.arm.parameters import Written, changed, find_parameter
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber
@@ -216,7 +216,7 @@ def test_payload_and_gravity_are_parameters(trunk):
 
 
 def test_parameters_of_loads_are_written_as_the_keys_of_files(trunk):
-    written = written_parameters(rubber(trunk, sr.Loads()))
+    written = Written.of(rubber(trunk, sr.Loads())).written
     names = {name.partition("[")[0] for name in written if name.startswith("loads.")}
     keys = {f"loads.{key}" for key in keys_of(sr.Loads)}
     assert names == keys - {"loads.point_loads"}

@@ -19,11 +19,11 @@ from softreach.arm.along import Samples
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.parameters import (
+    Written,
     changed,
     find_parameter,
     parameters,
     shifted,
-    written_parameters,
 )
 from softreach.arm.profile import PiecewiseTaper
 from softreach.arm.section import Ring, Section, name_faults
@@ -442,7 +442,7 @@ def test_a_value_that_is_no_number_is_refused_by_the_name_of_the_parameter(trunk
 
 
 def test_written_names_carry_their_unit_before_the_place_in_a_series():
-    written = written_parameters(made_arm())
+    written = Written.of(made_arm()).written
     wanted = (
         "length_m bore_ratio profile.radii_m[1] rings[0].material.young_modulus_pa "
         "rings[skin].material.density_kg_m3 left.helical_angle.values_deg[2] left.lower[1] "

@@ -16,6 +16,7 @@ from softreach.rod.free import FreeRod
 from softreach.rod.loaded import all_equilibria as equilibria_by_degree
 from softreach.rod.loaded import following
 from softreach.rod.loaded import steps as loaded_steps
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, LoadTables
@@ -328,7 +329,7 @@ def test_a_search_that_is_cut_short_is_undecided(heavy, monkeypatch):
     gamma = np.array([[-0.72288394, -0.72127314, -4.22473062]])
     monkeypatch.setattr(following, "_MOST_STEPS", 1)
     found = heavy.solver.empty(1)
-    heavy.solver.postures.by_line(gamma, np.array([0]), found)
+    Postures.of(heavy.solver).by_line(gamma, np.array([0]), found)
     assert found.status[0] == TipStatus.UNDECIDED
     assert np.isnan(found.tips).all()
 

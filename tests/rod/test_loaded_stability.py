@@ -14,6 +14,7 @@ from softreach.arm import Manipulator, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.all_equilibria import equilibria
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
 from softreach.rod.rods import tip_map
@@ -74,7 +75,7 @@ def test_tapered_columns_buckle_where_ritz_has_them_buckle(taper, payload):
     critical = column.buckling_gravity(1.0, of_column.bending, of_column.mass, payload=payload)
     for share, status in ((0.9995, TipStatus.STABLE), (1.0005, TipStatus.UNSTABLE)):
         fallen = arm.replace(loads=arm.loads.replace(gravity=(0, 0, -share * critical)))
-        found = solver_of(fallen, body).find(rest[None])
+        found = Postures.of(solver_of(fallen, body)).find(rest[None])
         assert found.status[0] == status
         np.testing.assert_allclose(found.tips[0], [0, 0, 1], atol=1e-9)
 
@@ -93,7 +94,7 @@ def test_tapered_columns_buckle_where_ritz_has_them_buckle(taper, payload):
 def test_of_the_reported_equilibria_the_stable_ones_are_minima_of_energy(load, gravity, more):
     arm = weighed(CYLINDER, load, gravity, **more)
     gamma, solver = np.concatenate([SYMMETRIC, ANY]), solver_of(arm)
-    found = solver.find(gamma)
+    found = Postures.of(solver).find(gamma)
     assert (found.status != TipStatus.NO_EQUILIBRIUM).all()
     stations = chain_of(arm, gamma[0], 64).joints
     moments = solver.shapes(gamma, stations, found).moment
@@ -159,7 +160,7 @@ def hanging_tentacle(payload):
 def test_a_hanging_arm_leans_to_a_side_where_its_plane_of_symmetry_loses_its_stability():
     """At a pitchfork: continuously, and to the other side with the other twist."""
     rod = tip_map(hanging_tentacle(0.02), 1e-8)
-    postures = rod.base.solver.postures
+    postures = Postures.of(rod.base.solver)
     planar = postures.find(np.array([[6.25, 6.25]]))
     assert planar.status[0] == TipStatus.STABLE
     assert abs(planar.tips[0, 1]) < 1e-9

@@ -273,21 +273,23 @@ def linear_response(
     n, bundles = state.gamma.shape
     if measures is None:
         measures = np.zeros((*table.length.shape, 4, 0))
-    job = _Job(
-        table,
-        state,
-        _at_rest_and_per_activation(table, changes),
-        np.ascontiguousarray(measures),
-        np.einsum("c,nca->na", table.lever, state.tip_directors),
-        _tipping(table, state, changes),
-        np.searchsorted(table.stations[:, 1], np.sort(table.asked)),
-    )
+    measures = np.ascontiguousarray(measures)
+    change = _at_rest_and_per_activation(table, changes)
+    lever = np.einsum("c,nca->na", table.lever, state.tip_directors)
+    tipping = _tipping(table, state, changes)
+    marks = np.searchsorted(table.stations[:, 1], np.sort(table.asked))
     asked, columns = len(table.asked), bundles + len(changes)
     moves, turns = np.zeros((2, n, asked, 3, columns))
     works = np.zeros((n, measures.shape[-1], columns))
-    parallel.run(
-        partial(job.respond, block, moves, turns, works) for block in parallel.blocks(n, _TOGETHER)
-    )
+
+    def fill(rows: slice) -> None:
+        for k in range(rows.start, rows.stop):
+            answers = moves[k], turns[k], works[k]
+            per_arm = _per_arm(table, change, state.gamma[k], state.directors[k], state.moment[k])
+            given = measures, lever[k], table.weight, tipping[k], marks
+            respond(*per_arm, *given, *answers)
+
+    parallel.run(partial(fill, block) for block in parallel.blocks(n, _TOGETHER))
     back = np.argsort(np.argsort(table.asked, kind="stable"), kind="stable")
     return Response(moves[:, back], turns[:, back], works)
 
@@ -342,70 +344,49 @@ def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) ->
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Job:
-    table: NodeTables
-    state: RodState
-    changes: _Changes
-    measures: Array
-    lever: Array
-    tipping: Array
-    marks: NDArray[np.intp]
-
-    def respond(self, rows: slice, moves: Array, turns: Array, works: Array) -> None:
-        for row in range(rows.start, rows.stop):
-            self._respond(row, moves[row], turns[row], works[row])
-
-    def _respond(self, row: int, moves: Array, turns: Array, works: Array) -> None:
-        table, change = self.table, self.changes
-        gamma, d = self.state.gamma[row], self.state.directors[row]
-        moment, length = self.state.moment[row], table.length
-        whole = np.append(gamma, 1.0)
-        axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
-        thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
-        squeeze = axial * thrust  # n3/K0
-        growth = length * (1.0 + table.growth @ gamma)
-        stretch = length * (1.0 + table.extension @ gamma) + growth * squeeze
-        bend = table.curvature @ gamma + bending * moment
-        each = length[..., None]
-        grown, stretched = change.growth @ whole, change.stretch @ whole
-        bent = change.curvature @ gamma + change.compliance[..., 1:, :] * moment[..., None]
-        turning = np.concatenate(
-            [
-                (each * table.growth)[:, :, None] * bend[..., None]
-                + growth[..., None, None] * table.curvature,
-                grown[:, :, None] * bend[..., None] + growth[..., None, None] * bent,
-            ],
-            axis=-1,
-        )
-        pushing = np.concatenate(
-            [
-                each * (table.extension + table.growth * squeeze[..., None]),
-                stretched
-                + grown * squeeze[..., None]
-                + growth[..., None] * change.compliance[..., 0, :] * thrust[..., None],
-            ],
-            axis=-1,
-        )
-        yielding = np.zeros((*table.force.shape, turning.shape[-1]))
-        yielding[..., len(gamma) :] = change.force
-        respond(
-            growth,
-            stretch,
-            np.ascontiguousarray(bending),
-            np.ascontiguousarray(axial),
-            np.ascontiguousarray(d),
-            np.einsum("kic,kica->kia", moment, d),
-            table.force,
-            turning,
-            pushing,
-            yielding,
-            self.measures,
-            self.lever[row],
-            table.weight,
-            self.tipping[row],
-            self.marks,
-            moves,
-            turns,
-            works,
-        )
+def _per_arm(
+    table: NodeTables, change: _Changes, gamma: Array, d: Array, moment: Array
+) -> tuple[Array, ...]:
+    """What the kernel wants of one arm."""
+    length = table.length
+    whole = np.append(gamma, 1.0)
+    axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
+    thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
+    squeeze = axial * thrust  # n3/K0
+    growth = length * (1.0 + table.growth @ gamma)
+    stretch = length * (1.0 + table.extension @ gamma) + growth * squeeze
+    bend = table.curvature @ gamma + bending * moment
+    each = length[..., None]
+    grown, stretched = change.growth @ whole, change.stretch @ whole
+    bent = change.curvature @ gamma + change.compliance[..., 1:, :] * moment[..., None]
+    turning = np.concatenate(
+        [
+            (each * table.growth)[:, :, None] * bend[..., None]
+            + growth[..., None, None] * table.curvature,
+            grown[:, :, None] * bend[..., None] + growth[..., None, None] * bent,
+        ],
+        axis=-1,
+    )
+    pushing = np.concatenate(
+        [
+            each * (table.extension + table.growth * squeeze[..., None]),
+            stretched
+            + grown * squeeze[..., None]
+            + growth[..., None] * change.compliance[..., 0, :] * thrust[..., None],
+        ],
+        axis=-1,
+    )
+    yielding = np.zeros((*table.force.shape, turning.shape[-1]))
+    yielding[..., len(gamma) :] = change.force
+    return (
+        growth,
+        stretch,
+        np.ascontiguousarray(bending),
+        np.ascontiguousarray(axial),
+        np.ascontiguousarray(d),
+        np.einsum("kic,kica->kia", moment, d),
+        table.force,
+        turning,
+        pushing,
+        yielding,
+    )

@@ -1,4 +1,4 @@
-"""Values between the nodes of an even grid over a box, by multilinear interpolation."""
+"""Values between the nodes of an even grid over a box, cubic where the values are smooth."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ __all__ = ["interpolate"]
 
 
 @kernel
-def interpolate(values, points, low, scale, sizes, out):
-    """Put Σ over the corners of each point's cell into `out`.
+def interpolate(values, is_smooth, points, sizes, out):
+    """Interpolate by Lagrange's polynomials, in smooth cells cubic in each axis, linear in others.
 
     Args:
         values: At the nodes (node, component), the last axis of the grid varying fastest.
-        points: Places (n, axis); outside the grid the nearest cell is continued.
-        low: The first node of every axis (axis,).
-        scale: Cells per unit of every axis, 0 for an axis of one node (axis,).
-        sizes: Nodes of every axis (axis,).
+        is_smooth: Whether cells are, and those beside them (cell,).
+        points: Places in cells from the first node (n, 3); outside the nearest cell is continued.
+        sizes: Nodes of every axis, 1 or at least 4 (3,).
         out: Filled, (n, component).
     """
-    axes = sizes.shape[0]
-    fraction, stride = np.zeros(axes), np.ones(axes, np.int64)
-    for axis in range(axes - 2, -1, -1):
-        stride[axis] = stride[axis + 1] * sizes[axis + 1]
+    weights, first, count = np.zeros((3, 4)), np.zeros(3, np.int64), np.zeros(3, np.int64)
     for n in range(points.shape[0]):
-        at = 0
-        for axis in range(axes):
-            x = (points[n, axis] - low[axis]) * scale[axis]
-            cell = min(max(int(np.floor(x)), 0), max(sizes[axis] - 2, 0))
-            fraction[axis] = x - cell
-            at += cell * stride[axis]
+        cell = 0
+        for axis in range(3):
+            first[axis] = min(max(int(np.floor(points[n, axis])), 0), max(sizes[axis] - 2, 0))
+            cell = cell * max(sizes[axis] - 1, 1) + first[axis]
+        for axis in range(3):
+            count[axis] = min(sizes[axis], 4 if is_smooth[cell] else 2)
+            if count[axis] == 4:
+                first[axis] = min(max(first[axis] - 1, 0), sizes[axis] - 4)
+            _weigh(weights[axis], points[n, axis] - first[axis], count[axis])
         for component in range(out.shape[1]):
             out[n, component] = 0.0
-        for corner in range(1 << axes):
-            weight, node = _corner(corner, at, fraction, stride)
-            for component in range(out.shape[1]):
-                out[n, component] += weight * values[node, component]
+        for i in range(count[0]):
+            for j in range(count[1]):
+                row = ((first[0] + i) * sizes[1] + first[1] + j) * sizes[2] + first[2]
+                weight = weights[0, i] * weights[1, j]
+                for component in range(out.shape[1]):
+                    value = 0.0
+                    for k in range(count[2]):
+                        value += weights[2, k] * values[row + k, component]
+                    out[n, component] += weight * value
 
 
 @inline
-def _corner(corner, at, fraction, stride):
-    """Weight and node of one corner of a cell; never a node outside of the grid."""
-    weight, node = 1.0, at
-    for axis in range(stride.shape[0]):
-        if not corner >> axis & 1:
-            weight *= 1.0 - fraction[axis]
-        elif fraction[axis] == 0.0:
-            weight = 0.0
-        else:
-            weight *= fraction[axis]
-            node += stride[axis]
-    return weight, node
+def _weigh(weights, x, count):
+    if count == 4:
+        weights[0] = (x - 1.0) * (x - 2.0) * (3.0 - x) / 6.0
+        weights[1] = x * (x - 2.0) * (x - 3.0) / 2.0
+        weights[2] = x * (x - 1.0) * (3.0 - x) / 2.0
+        weights[3] = x * (x - 1.0) * (x - 2.0) / 6.0
+    else:
+        weights[0], weights[1] = (1.0, 0.0) if count == 1 else (1.0 - x, x)

@@ -67,7 +67,7 @@ ANSWER = 21 * LANES  # change of M per turn, then that of F, 3 x 3 each
 NODE = 39 * LANES
 
 AT_WORK, FOUND, GIVEN_UP = 0.0, 1.0, 3.0
-_CONTRACTION = 0.6
+_CONTRACTION = 1.0
 
 
 @inline

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from softreach.kernels.loaded.grid_values import interpolate
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.loaded.following import Path, follow, turn_between, units
-from softreach.rod.loaded.shooting import Shots
+from softreach.rod.loaded.following import Path, follow
+from softreach.rod.loaded.shooting import Shots, turn_between, units
 from softreach.rod.loaded.solver import Solver
+from softreach.support.lazy import lazy
 
 __all__ = ["Flood", "grid_sizes"]
 
@@ -28,7 +29,8 @@ _NODES = {1: 33, 2: 33, 3: 17}
 """Nodes per free bundle: at most a few thousand postures."""
 _SAME_FRAME, _SAME_TIP = 0.02, 0.02  # [rad], [L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
-_PARTS = 64  # of a line, at which it is asked for cuts
+_UNEVEN = 1e3  # roughness of whole cells beside others
+PARTS = 64  # of a line, at which it is asked for cuts
 
 
 def grid_sizes(box: ActivationBox) -> tuple[int, ...] | None:
@@ -65,36 +67,57 @@ class Flood:
         """
         return _Flooding(solver, box, sizes).run(rest, start)
 
-    def at(self, gamma: Array) -> tuple[Array, Mask]:
-        """Frames to begin from, and mask of activations where they are known."""
-        sizes, of_nodes = np.array(self.sizes), self.held.frame
-        frames, scale = np.empty((len(gamma), of_nodes.shape[1])), (sizes - 1) / self.box.scales
-        interpolate(of_nodes, gamma, self.box.low, scale, sizes, frames)
-        is_known = self._is_whole_at(gamma)
-        frames[~is_known] = of_nodes[self.held.is_found.argmax()]
-        return units(frames), is_known
+    def at(self, gamma: Array) -> tuple[Array, Array]:
+        """Frames to begin from, and the roughness of cells; infinite where no frame is known."""
+        free, of_nodes, rough = self.box.is_free, self.held.frame, self._rough
+        sizes, places = np.array(self.sizes)[free], self._in_cells(gamma)[:, free]
+        fill = 3 - len(sizes)
+        places = np.pad(places, ((0, 0), (fill, 0)))
+        sizes = np.pad(sizes, (fill, 0), constant_values=1)
+        frames = np.empty((len(gamma), of_nodes.shape[1]))
+        interpolate(of_nodes, rough.ravel() < _UNEVEN, places, sizes, frames)
+        rough = rough[self._cells_at(gamma)]
+        frames[np.isinf(rough)] = of_nodes[self.held.is_found.argmax()]
+        return units(frames), rough
+
+    @lazy
+    def _rough(self) -> Array:
+        """Third differences of frames over each cell and those beside it."""
+        frames, smooth = self.held.frame.reshape(*self.sizes, -1), self.is_whole
+        rough = np.zeros(smooth.shape)
+        for axis, size in enumerate(self.sizes):
+            if size > 1:
+                first = np.clip(np.arange(size - 1) - 1, 0, size - 4)
+                smooth = np.logical_and.reduce([smooth.take(first + k, axis) for k in range(3)])
+                jumps = np.abs(np.diff(frames, 3, axis)).max(axis=-1).take(first, axis)
+                for other, length in enumerate(self.sizes):
+                    if other != axis and length > 1:
+                        jumps = np.maximum(np.delete(jumps, -1, other), np.delete(jumps, 0, other))
+                rough = np.maximum(rough, jumps)
+        return np.where(self.is_whole, np.where(smooth, rough, _UNEVEN), np.inf)
+
+    def nearest(self, gamma: Array) -> tuple[Array, Shots]:
+        """The nearest nodes, and their postures."""
+        last = np.array(self.sizes) - 1
+        place = np.clip(np.round(self._in_cells(gamma)), 0, last)
+        node = np.ravel_multi_index(tuple(place.astype(np.intp).T), self.sizes)
+        return self.box.low + place / np.maximum(last, 1) * self.box.widths, self.held.of(
+            np.atleast_1d(node)
+        )
 
     def clear(self, rest: Array, gamma: Array) -> Array:
         """Shares of the lines from rest up to which they meet no cut, shape (n,)."""
-        clear, goes_on = np.zeros(len(gamma)), np.ones(len(gamma), bool)
-        for t in np.arange(1, _PARTS + 1) / _PARTS:
-            goes_on &= self._is_whole_at(rest + t * (gamma - rest))
-            clear[goes_on] = t
-        return clear
+        t = np.arange(1, PARTS + 1)[:, None, None] / PARTS
+        along = rest + t * (gamma - rest)
+        whole = self.is_whole[self._cells_at(along.reshape(-1, gamma.shape[1]))].reshape(PARTS, -1)
+        return np.logical_and.accumulate(whole).sum(axis=0) / PARTS
 
-    def _is_whole_at(self, gamma: Array) -> Mask:
-        place = (gamma - self.box.low) * ((np.array(self.sizes) - 1) / self.box.scales)
-        cells = np.floor(place).astype(np.intp)
-        cells = np.clip(cells, 0, np.maximum(np.array(self.sizes) - 2, 0))
-        return np.asarray(self.is_whole[tuple(cells.T)])
+    def _in_cells(self, gamma: Array) -> Array:
+        return (gamma - self.box.low) * ((np.array(self.sizes) - 1) / self.box.scales)
 
-
-def from_lines(places: Array, ends: Array, scales: Array) -> Array:
-    """How far places are from the lines from 0 to others, in ranges, shape (n,)."""
-    at, line = places / scales, ends / scales
-    share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
-    off = at - np.clip(share, 0.0, 1.0)[:, None] * line
-    return np.sqrt((off * off).sum(axis=1))
+    def _cells_at(self, gamma: Array) -> tuple[Index, ...]:
+        cells = np.floor(self._in_cells(gamma)).astype(np.intp)
+        return tuple(np.clip(cells, 0, np.maximum(np.array(self.sizes) - 2, 0)).T)
 
 
 class _Flooding:
@@ -152,8 +175,10 @@ class _Flooding:
                 edge = front, to, np.full_like(to, axis), np.full_like(to, way)
                 edges.append(np.stack(edge)[:, inside])
         left, before = np.concatenate(edges, axis=1), self.is_known.copy()
-        at, to = self.gamma[left[0]] - self.rest, self.gamma[left[1]] - self.rest
-        left = left[:, np.argsort(from_lines(at, to, self.box.scales), kind="stable")]
+        at, line = ((self.gamma[nodes] - self.rest) / self.box.scales for nodes in left[:2])
+        share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
+        off = at - np.clip(share, 0.0, 1.0)[:, None] * line  # near the lines from rest first
+        left = left[:, np.argsort(np.sqrt((off * off).sum(axis=1)), kind="stable")]
         while True:
             left = left[:, ~self.is_known[left[1]]]
             _, first = np.unique(left[1], return_index=True)

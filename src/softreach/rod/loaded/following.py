@@ -13,19 +13,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.loaded.shooting import Shots
+from softreach.rod.loaded.shooting import Shots, turn_between, units
 
 if TYPE_CHECKING:
     from softreach.rod.loaded.solver import Solver
 
-__all__ = ["Followed", "Path", "follow", "turn_between", "units"]
+__all__ = ["Followed", "Path", "follow"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _CORRECTION, _CORRECTION_OF_NODES = 0.12, 0.03  # [rad], of one segment and of several
 _TIP = 3.0  # weight of the correction of a tip [rad/L]
-_EASY = 0.3  # of the allowed correction, below which the next step is twice as long
 _SHORTEST = 2.0**-20  # of the path, below which the branch has ended
 _MOST_STEPS = 3000
 
@@ -47,11 +46,6 @@ class Path:
         ones = np.ones(len(begin))
         return cls(begin, end, ones, ones)
 
-    @classmethod
-    def of_loads(cls, gamma: Array) -> Path:
-        """From no load to all of it, at fixed activations."""
-        return cls(gamma, gamma, np.zeros(len(gamma)), np.ones(len(gamma)))
-
     def at(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
         """Activations and shares at places of some paths."""
         gamma = self.begin[rows] + t[:, None] * (self.end[rows] - self.begin[rows])
@@ -64,10 +58,6 @@ class Followed(NamedTuple):
 
     shots: Shots
     """The last equilibrium; found where it is that of the end of the path."""
-    place: Array
-    """Where on the path it is, from 0 to 1, shape (n,)."""
-    slope: Array
-    """Change of the frame per way there, shape (n, component)."""
     has_ended: Mask
     """Mask of branches that end before the path does, shape (n,)."""
 
@@ -84,7 +74,8 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
     n, length = len(path.begin), solver.tables.arm.length
     allowed = _CORRECTION if solver.tables.segments == 1 else _CORRECTION_OF_NODES
     tips, frame, margin = start.tips.copy(), start.frame.copy(), start.margin.copy()
-    place, step = np.zeros(n), np.ones(n)
+    goes_on = np.any(path.begin != path.end, axis=1) | (path.from_share != path.to_share)
+    place, step = np.where(goes_on, 0.0, 1.0), np.ones(n)
     slopes = np.zeros_like(frame) if slope is None else slope.copy()
     moves, steps_known = np.zeros((n, 3)), np.zeros(n, int)
     ended = ~start.is_found
@@ -99,9 +90,8 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
         found = solver.careful(gamma, guess, share)
         with np.errstate(all="ignore"):  # of what is not found
             turn = turn_between(found.frame, guess)
-            off = (
-                np.linalg.norm(found.tips - tips[rows] - h[:, None] * moves[rows], axis=1) / length
-            )
+            missed = found.tips - tips[rows] - h[:, None] * moves[rows]
+            off = np.linalg.norm(missed, axis=1) / length
         is_first = steps_known[rows] == 0
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
         most = np.where(is_first, 2.0, 1.0) * allowed
@@ -112,22 +102,11 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
         tips[on], frame[on], margin[on] = found.tips[good], found.frame[good], found.margin[good]
         place[on] = to[good]
         steps_known[on] += 1
-        step[rows[good & (change < _EASY * allowed)]] *= 2.0
-        off_branch = rows[~good]
-        step[off_branch] = 0.5 * h[~good]
-        ended[off_branch] = step[off_branch] < _SHORTEST
-    shots = Shots(tips, frame, margin, place >= 1.0)
-    return Followed(shots, place, slopes, ended)
-
-
-def units(frames: Array) -> Array:
-    """Frames whose directions have unit length."""
-    axes = frames.reshape(len(frames), frames.shape[1] // 3, 3)
-    size = np.linalg.norm(axes, axis=2, keepdims=True)
-    return (axes / np.maximum(size, 1e-300)).reshape(frames.shape)
-
-
-def turn_between(frames: Array, others: Array) -> Array:
-    """The largest change of a direction [rad], shape (n,)."""
-    change = (frames - others).reshape(len(frames), frames.shape[1] // 3, 3)
-    return np.linalg.norm(change, axis=2).max(axis=1)
+        with np.errstate(all="ignore"):  # of a secant's error, to half of what is allowed
+            wanted = 0.5 * (np.sqrt(1.0 + 4.0 * allowed / change) - 1.0)
+        step[rows] = h * np.where(
+            good, np.clip(wanted, 0.5, 4.0), np.where(wanted > 0.1, 0.4, 0.25)
+        )
+        ended[rows] = ~good & (step[rows] < _SHORTEST)
+    shots = Shots(tips, frame, margin, start.is_found & (place >= 1.0))
+    return Followed(shots, ended)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded.flood import Flood, grid_sizes
-from softreach.rod.loaded.following import Followed, Path, follow, turn_between
+from softreach.rod.loaded.flood import PARTS, Flood, grid_sizes
+from softreach.rod.loaded.following import Followed, Path, follow
 from softreach.rod.loaded.ring import Ring
-from softreach.rod.loaded.shooting import Equilibria, Shots
+from softreach.rod.loaded.shooting import Equilibria, Shots, turn_between
 from softreach.rod.tip_map import TipStatus
 from softreach.support.lazy import lazy
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = ["Postures"]
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TWIST = 1e-4  # [rad], of the twin over its length
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
@@ -56,6 +55,12 @@ class Postures:
     box: ActivationBox
     side: int = 1
 
+    @classmethod
+    def of(cls, solver: Solver) -> Postures:
+        """Those of an arm, by lines from rest."""
+        arm = solver.tables.arm
+        return Postures(solver, ActivationBox.between(arm.bounds, arm.bundle_names))
+
     @lazy
     def twin(self) -> Solver:
         """The solver of the twin."""
@@ -80,7 +85,7 @@ class Postures:
 
     def _hung(self, gamma: Array) -> Followed:
         """Loads put on the twin at fixed activations."""
-        path = Path.of_loads(gamma)
+        path = Path(gamma, gamma, np.zeros(len(gamma)), np.ones(len(gamma)))
         start = self.twin.careful(gamma, None, path.from_share)
         return follow(self.twin, path, start)
 
@@ -101,32 +106,30 @@ class Postures:
         """Newton's method from where the posture may be, at some rows; UNDECIDED where it fails."""
         if not self.is_held_at_rest:
             return
-        guesses, known = self._guesses(gamma[rows])
-        shots = self.solver.quick(gamma[rows], guesses)
-        good = shots.is_found & (shots.margin > _DOUBTFUL) & known
-        if self._begins_near and guesses is not None:
+        at = np.arange(len(gamma))[rows]
+        order, guesses = self._guesses(gamma[at])
+        at = at[order]
+        shots = self.solver.quick(gamma[at], guesses)
+        good = shots.is_found & (shots.margin > _DOUBTFUL)
+        if isinstance(self, FloodedPostures) and guesses is not None:
             good &= turn_between(shots.frame, guesses) < _NEAR_GUESS
-        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
+        self.solver.put(gamma, at, shots._replace(is_found=good), equilibria)
 
-    @property
-    def _begins_near(self) -> bool:
-        return False
-
-    def _guesses(self, gamma: Array) -> tuple[Array | None, Mask]:
-        """Frames of the unloaded arm, or of one that hangs along it; and where they are known."""
-        tables, known = self.solver.tables, np.ones(len(gamma), bool)
+    def _guesses(self, gamma: Array) -> tuple[NDArray[np.intp], Array | None]:
+        """Rows, and frames of the unloaded arm there, or of one that hangs along it."""
+        tables, every = self.solver.tables, np.arange(len(gamma))
         if tables.phase.entire <= _HANGING or tables.axes[0, 2] < _PULLED:
-            return None, known
+            return every, None
         stations = np.append(tables.nodes[::-1], tables.arm.length)
         directors = self._unloaded.frames(gamma, stations).directors[:, ::-1]
         along = directors[:, :, 2]
         if tables.one_direction:
-            return along.reshape(len(gamma), -1), known
+            return every, along.reshape(len(gamma), -1)
         across = np.broadcast_to(tables.axes[1], along.shape)
         across = across - (along * across).sum(axis=2, keepdims=True) * along
         size = np.linalg.norm(across, axis=2, keepdims=True)
         across = np.where(size > 0.1, across / np.maximum(size, 0.1), directors[:, :, 0])
-        return np.concatenate([along, across], axis=2).reshape(len(gamma), -1), known
+        return every, np.concatenate([along, across], axis=2).reshape(len(gamma), -1)
 
     @lazy
     def _unloaded(self) -> FreeRod:
@@ -156,9 +159,7 @@ class Postures:
         """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
         shots = self.solver.careful(gamma[rows], None)
         at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
-        good = shots.is_found & (
-            (shots.margin <= 0.0) | at_rest
-        )  # no stable ones of other branches
+        good = shots.is_found & ((shots.margin <= 0.0) | at_rest)  # no stable ones of others
         self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
 
     def followed(self, gamma: Array) -> Followed:
@@ -211,27 +212,39 @@ class FloodedPostures(Postures):
 
     flood: Flood | None = None
 
-    @property
-    def _begins_near(self) -> bool:
-        return True
-
-    def _guesses(self, gamma: Array) -> tuple[Array | None, Mask]:
+    def _guesses(self, gamma: Array) -> tuple[NDArray[np.intp], Array | None]:
+        """Those of uncut cells, rough ones last: lanes wait for the slowest among them."""
         assert self.flood is not None
-        return self.flood.at(gamma)
+        frames, rough = self.flood.at(gamma)
+        order = np.argsort(rough, kind="stable")[: np.isfinite(rough).sum()]
+        return order, frames[order]
 
     def followed(self, gamma: Array) -> Followed:
-        """The same from where the lines meet the first cut: before, they are on one branch."""
+        """From where the lines meet the first cut; in uncut cells at once, or from a node."""
         assert self.flood is not None
-        rest = self.rest_activation
-        begin = rest + self.flood.clear(rest, gamma)[:, None] * (gamma - rest)
+        rest, uncut = self.rest_activation, np.isfinite(self.flood.at(gamma)[1])
+        way, clear = gamma - rest, np.where(uncut, 1.0, self.flood.clear(rest, gamma))[:, None]
+        begin = np.where(clear < 1.0, rest + clear * way, gamma)
         guesses = self.flood.at(begin)[0]
+        before = self.flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
+        slopes = (1.0 - clear) * PARTS * (guesses - before)
         start = self.twin.careful(begin, guesses)
-        good = start.is_found & (start.margin > 0.0)
-        lost = ~good | (turn_between(start.frame, guesses) > _NEAR_GUESS)
-        begin[lost] = rest
-        for values, at_rest in zip(start, self.rest, strict=True):
+        lost = ~start.is_found | (start.margin <= 0.0)
+        lost |= turn_between(start.frame, guesses) > _NEAR_GUESS
+        nodes, held = self.flood.nearest(gamma)
+        for values, at_nodes, at_rest in zip(start, held, self.rest, strict=True):
             values[lost] = at_rest[0]
-        return follow(self.twin, Path.under_all_loads(begin, gamma), start)
+            values[lost & uncut] = at_nodes[lost & uncut]
+        begin[lost] = np.where(uncut[:, None], nodes, rest)[lost]
+        slopes[lost] = np.where(uncut[:, None], guesses - held.frame, 0.0)[lost]
+        followed = follow(self.twin, Path.under_all_loads(begin, gamma), start, slopes)
+        lost = np.flatnonzero(uncut & ~followed.shots.is_found)
+        if len(lost):
+            by_line = super().followed(gamma[lost])
+            followed.has_ended[lost] = by_line.has_ended
+            for values, new in zip(followed.shots, by_line.shots, strict=True):
+                values[lost] = new
+        return followed
 
 
 @dataclass(frozen=True, eq=False)

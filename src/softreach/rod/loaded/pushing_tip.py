@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.loaded.following import turn_between
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import TipForceTables
 from softreach.rod.tip_map import TipStatus, position_slopes
@@ -83,7 +83,10 @@ class PushingTip:
             near: Response to begin with; None for the posture.
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
-        known = solver.find(sample) if near is None else solver.near(sample, near.equilibrium)
+        if near is None:
+            known = Postures.of(solver).find(sample)
+        else:
+            known = solver.near(sample, near.equilibrium)
         response = solver.respond(sample, known, compliance=True)
         slopes = np.empty_like(response.twists[:, :3])
         position_slopes(response.tips, response.twists, slopes)
@@ -105,7 +108,7 @@ class PushingTip:
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if the force alone, raised from the posture without it, leads there."""
         sample, share, step = gamma[None], 0.0, 0.25
-        held = self._solver(0.0, self.steps).find(sample)
+        held = Postures.of(self._solver(0.0, self.steps)).find(sample)
         while share < 1.0 and step > _SHORTEST:
             to = min(1.0, share + step)
             found = self._solver(to * force, self.steps).near(sample, held)

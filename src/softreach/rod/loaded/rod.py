@@ -129,7 +129,7 @@ class LoadedRod(ArmRod):
     @lazy
     def postures(self) -> Postures:
         """Postures, with starts on a grid over the box where that is worth it."""
-        return self.solver.postures.with_flood()
+        return Postures.of(self.solver).with_flood()
 
     @lazy
     def _shape_solver(self) -> Solver:

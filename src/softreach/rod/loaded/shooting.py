@@ -180,3 +180,16 @@ class Response(NamedTuple):
     """Tangents d3 of the tips [-], shape (n, 3), or (0, 3)."""
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
+
+
+def units(frames: Array) -> Array:
+    """Frames whose directions have unit length."""
+    axes = frames.reshape(len(frames), frames.shape[1] // 3, 3)
+    size = np.linalg.norm(axes, axis=2, keepdims=True)
+    return (axes / np.maximum(size, 1e-300)).reshape(frames.shape)
+
+
+def turn_between(frames: Array, others: Array) -> Array:
+    """The largest change of a direction [rad], shape (n,)."""
+    change = (frames - others).reshape(len(frames), frames.shape[1] // 3, 3)
+    return np.linalg.norm(change, axis=2).max(axis=1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,7 @@ from numpy.typing import NDArray
 from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import tables
 from softreach.kernels.loaded.response import TRACE
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import linear_strains
-from softreach.rod.loaded.following import units
 from softreach.rod.loaded.shapes import Shapes, shapes_of
 from softreach.rod.loaded.shooting import (
     CAREFUL,
@@ -25,6 +22,7 @@ from softreach.rod.loaded.shooting import (
     Shots,
     base_directions,
     shoot,
+    units,
     walk,
 )
 from softreach.rod.loaded.tables import LoadTables, StepTables
@@ -32,9 +30,6 @@ from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support import parallel
 from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    from softreach.rod.loaded.postures import Postures
 
 Array = NDArray[np.float64]
 
@@ -95,18 +90,6 @@ class Solver:
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
         return Equilibria.empty(n, self.tables.frame_size)
-
-    @lazy
-    def postures(self) -> Postures:
-        """Postures of the arm, by lines from rest."""
-        from softreach.rod.loaded.postures import Postures
-
-        arm = self.tables.arm
-        return Postures(self, ActivationBox.between(arm.bounds, arm.bundle_names))
-
-    def find(self, gamma: Array) -> Equilibria:
-        """The postures at activations (n, bundles), on the calling thread."""
-        return self.postures.find(gamma)
 
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
@@ -170,18 +153,13 @@ class Solver:
         shapes = shapes_of(at, trace, rows, self._force_at(table, rows), nowhere)
         return shapes.on_base(), margin
 
-    def frames_facing(self, gamma: Array, directions: Array) -> tuple[Array, Array]:
-        """Frames of arms whose tips see gravity along given directions, and their margins.
-
-        As `shapes_facing`, but of arms of any number of segments: frames as in `Equilibria`.
-        """
+    def frames_facing(self, gamma: Array, directions: Array) -> Array:
+        """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
         whole = self._fine._replace(firsts=np.array([0, len(self._fine.lengths)]))
         tables = replace(self.tables, longest=np.inf)
         trace = walk(gamma, tables, directions, whole, trace=True).trace
-        margin = shoot(gamma, tables, directions, whole, whole, MARGIN_ALONE, 0.0, _ALL).margin
-        turn = rotation_matrices(trace[:, -1, 12:16])
-        seen = trace[:, self._fine.firsts[:-1], :3] @ turn
-        return units(seen.reshape(len(gamma), self.tables.frame_size)), margin
+        seen = trace[:, self._fine.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
+        return units(seen.reshape(len(gamma), self.tables.frame_size))
 
     def respond(
         self,
@@ -218,7 +196,7 @@ class Solver:
         self,
         gamma: Array,
         stations: Array,
-        known: Equilibria | None = None,
+        known: Equilibria,
         *,
         status: NDArray[np.int8] | None = None,
     ) -> Shapes:
@@ -236,7 +214,7 @@ class Solver:
         shapes = Shapes.empty(len(gamma), len(stations))
 
         def fill(block: slice) -> None:
-            equilibria = self.find(gamma[block]) if known is None else known.of(block)
+            equilibria = known.of(block)
             lost = ~has_tip(equilibria.status)
             tips, trace = self._traced(gamma[block], equilibria.frame, lost, table)
             shapes.put(block, shapes_of(tips, trace, rows, self._force_at(table, rows), stations))

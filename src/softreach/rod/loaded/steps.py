@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from softreach.arm.load_number import load_number
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.loaded.phase import LoadPhase
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.steps import enough_for_all_breaks
@@ -81,7 +82,7 @@ def _enough(
         solver = solver_of(steps)
         allowed = tol * solver.tables.arm.length / _SAFETY
         if known is None:
-            known = solver.find(gamma)
+            known = Postures.of(solver).find(gamma)
             held = has_tip(known.status)
             gamma, known = gamma[held], known.of(held)
         equilibria = solver.near(gamma, known)
