@@ -16,6 +16,7 @@ from softreach.arm.loads import Loads
 from softreach.cli.app import run
 from softreach.force_growth import Growth
 from softreach.forces import Stop, blocked_force
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.rods import tip_map
@@ -140,7 +141,7 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
         acting = tuple(np.array(arm.loads.tip_force) - x[-1] * force * d)
         tables = LoadTables(arm, arm.loads.replace(tip_force=acting), rod.body)
         gamma = arm.bounds[:, 0] + x[:-1] * width
-        found = Solver(tables, 2 * rod.steps, rod.tol).find(gamma[None])
+        found = Postures.of(Solver(tables, 2 * rod.steps, rod.tol)).find(gamma[None])
         return (found.tips[0] - place) / arm.length
 
     start = np.append((gamma - arm.bounds[:, 0]) / width, 0.9)

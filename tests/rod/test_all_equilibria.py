@@ -317,7 +317,9 @@ def test_a_smooth_branch_is_not_lost_under_a_little_more_load():
     gamma, found = _TENSION * SMOOTH, []
     for share in shares:
         arm = soft_tendons(share)
-        found.append(Solver(LoadTables(arm, arm.loads, ArmBody(arm)), 16, 1e-6).find(gamma))
+        found.append(
+            Postures.of(Solver(LoadTables(arm, arm.loads, ArmBody(arm)), 16, 1e-6)).find(gamma)
+        )
     assert (np.array([one.status for one in found]) == TipStatus.STABLE).all()
     ways = np.diff([one.tips for one in found], axis=0)
     assert np.linalg.norm(ways, axis=2).max() < 0.01 * arm.length
@@ -408,11 +410,9 @@ def test_every_load_that_is_added_adds_to_the_phase(arm):
 @pytest.mark.parametrize("load", [60.0, 140.0, 300.0])
 def test_a_cantilever_hangs_from_its_base_as_published_however_heavy_its_payload(load):
     """The tip hardly turns any more, and the base must tell when it is found."""
-    found = Solver(
-        LoadTables(held(CYLINDER), Loads(gravity=NOTHING, tip_force=(load, 0, 0)), uniform(1.0)),
-        64,
-        1e-9,
-    ).find(REST)
+    loads = Loads(gravity=NOTHING, tip_force=(load, 0, 0))
+    solver = Solver(LoadTables(held(CYLINDER), loads, uniform(1.0)), 64, 1e-9)
+    found = Postures.of(solver).find(REST)
     assert found.status[0] == TipStatus.STABLE
     np.testing.assert_allclose(found.tips[0, [0, 2]], elastica.tip_loaded(load), atol=1e-7)
 
@@ -473,13 +473,13 @@ def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_on
 
 def test_steps_that_are_not_found_are_not_searched_again(monkeypatch):
     searches = []
-    find = Solver.find
+    find = Postures.find
 
-    def counted(solver, gamma, **asked):
-        searches.append(solver.steps)
-        return find(solver, gamma, **asked)
+    def counted(postures, gamma):
+        searches.append(postures.solver.steps)
+        return find(postures, gamma)
 
-    monkeypatch.setattr(Solver, "find", counted)
+    monkeypatch.setattr(Postures, "find", counted)
     monkeypatch.setattr(loaded_steps, "_MOST_STEPS", 4)
     rod = LoadedRod(weighed(STIFF_TRUNK, 2.5, (9.81, 0.0, 0.0)), 1e-9)
     for _ in range(2):

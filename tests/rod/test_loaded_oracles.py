@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 from softreach.arm import FiberArchitecture, LinearTaper, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
+from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, LoadTables
@@ -32,7 +33,7 @@ def straight(body, loads, length=1.0, steps=32):
 def test_a_tip_force_and_a_moment_bend_an_elastica():
     for load, moment in ((1.0, 0.5), (2.0, 1.0)):
         loads = NOTHING.replace(tip_force=(load, 0, 0), tip_moment=(0, moment, 0))
-        tip = straight(uniform(1.0), loads).find(REST).tips[0]
+        tip = Postures.of(straight(uniform(1.0), loads)).find(REST).tips[0]
         expected = elastica.tip_loaded_with_moment(load, moment)
         np.testing.assert_allclose(tip[[0, 2]], expected, atol=1e-9)
 
@@ -68,7 +69,7 @@ def test_a_bend_of_45_degrees_goes_to_its_published_place():
     arm, gamma = bent_arm(bar.length, 0.01)
     body = uniform(bar.bending(0.0), bar.axial(0.0), bar.torsion(0.0))
     pulled = NOTHING.replace(tip_force=loads.tip_force)
-    tip = Solver(LoadTables(arm, pulled, body), 32, 1e-10).find(gamma).tips[0]
+    tip = Postures.of(Solver(LoadTables(arm, pulled, body), 32, 1e-10)).find(gamma).tips[0]
     np.testing.assert_allclose(tip, bend.TIP, atol=1e-6)
 
 
@@ -162,7 +163,7 @@ def test_all_of_sorosim_s_equilibria_are_those_of_the_branch_and_stable(step):
     """As far as rounded wrenches and the file's strains are right: a thousandth of the length."""
     assert len(sorosim.cases()) == 500
     cases = sorosim.cases()[::step]
-    found = [solver(case.loads).find(REST) for case in cases]
+    found = [Postures.of(solver(case.loads)).find(REST) for case in cases]
     assert {int(one.status[0]) for one in found} == {TipStatus.STABLE}
     tips = np.concatenate([one.tips for one in found]) @ BASE
     apart = np.linalg.norm(tips - [case.place[-1] for case in cases], axis=1)

@@ -212,7 +212,7 @@ of_kinds = pytest.mark.parametrize("loads", KINDS.values(), ids=KINDS.keys())
 
 def tips(arm, loads, young=1e6, gamma=GAMMA):
     arm = rubber(arm, loads, young)
-    return Solver(LoadTables(arm, loads, ArmBody(arm)), 24, 1e-9).find(gamma).tips
+    return Postures.of(Solver(LoadTables(arm, loads, ArmBody(arm)), 24, 1e-9)).find(gamma).tips
 
 
 def changed(loads, change):
@@ -295,7 +295,7 @@ def test_a_payload_is_the_limit_of_a_short_heavy_end():
         edge = PointLoad(station=1.0 - length)  # where steps end
         arm = rubber(MINIMAL, side.replace(point_loads=(edge,)))
         body = HeavyEnd(ArmBody(arm), edge.station, mass / length)
-        found = Solver(LoadTables(arm, arm.loads, body), 24, 1e-9).find(GAMMA).tips
+        found = Postures.of(Solver(LoadTables(arm, arm.loads, body), 24, 1e-9)).find(GAMMA).tips
         apart.append(np.linalg.norm(found - tips(MINIMAL, side.replace(payload=mass)), axis=1))
     assert 1e-5 < apart[0].min() < apart[0].max() < 2e-3
     np.testing.assert_allclose(apart[0] / apart[1], 2.0, rtol=0.02)
