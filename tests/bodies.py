@@ -113,3 +113,8 @@ def _polynomials(values: Callable, ends: list[float]) -> Callable:
 def _coefficients(values: Callable, middle: float, half: float):
     """Of Chebyshev polynomials."""
     return chebyshev.chebinterpolate(lambda x: values(middle + half * x), _DEGREE)
+
+
+def posture_shapes(solver, gamma, stations):
+    """Shapes of the postures of activations."""
+    return solver.shapes(gamma, stations, Postures.of(solver).find(gamma))

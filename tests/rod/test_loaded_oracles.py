@@ -17,7 +17,7 @@ from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, LoadTables
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import oracle_rod, rubber, uniform
+from tests.bodies import oracle_rod, posture_shapes, rubber, uniform
 from tests.oracles import bend, elastica, linear_strains, loaded_rod, sorosim
 
 NOTHING = Loads(gravity=(0.0, 0.0, 0.0))
@@ -44,7 +44,7 @@ def test_a_force_and_a_moment_about_its_direction_wind_a_helix(force):
     loads = NOTHING.replace(tip_force=tuple(helix.force), tip_moment=tuple(helix.moment(1.0)))
     solver = straight(uniform(1.0, axial=30.0, torsion=0.7), loads)
     stations = np.linspace(0.0, 1.0, 6)
-    shapes = solver.shapes(REST, stations)
+    shapes = posture_shapes(solver, REST, stations)
     places = [helix.place(z) for z in stations]
     np.testing.assert_allclose(shapes.frames.position[0], places, atol=1e-9)
     moment = np.einsum("sd,sdc->sc", shapes.moment[0], shapes.frames.directors[0])
@@ -150,7 +150,7 @@ def solver(loads, steps=12):
 
 
 def places(loads):
-    return solver(loads).shapes(REST, STATIONS).frames.position[0] @ BASE
+    return posture_shapes(solver(loads), REST, STATIONS).frames.position[0] @ BASE
 
 
 def of_file(case):
@@ -212,7 +212,7 @@ def left_over(slopes, apart):
 def test_what_is_left_of_the_differences_is_the_rounding_of_places(row):
     """With the wrenches within their rounding, and strains linear on each half as in the file."""
     case = sorosim.cases()[row]
-    shape = solver(case.loads).shapes(REST, linear_strains.centers(STEEL))
+    shape = posture_shapes(solver(case.loads), REST, linear_strains.centers(STEEL))
     curvature = shape.moment[0] / [STEEL.bending(0), STEEL.bending(0), STEEL.torsion(0)]
     linear = linear_strains.places(STEEL, case.loads, curvature, STATIONS)
     apart, slopes = (of_file(case) - linear).ravel(), by_wrenches(case.loads)

@@ -21,7 +21,7 @@ from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidDesign
-from tests.bodies import by_lines, oracle_rod, rubber, uniform
+from tests.bodies import by_lines, oracle_rod, posture_shapes, rubber, uniform
 from tests.oracles import column, elastica, loaded_rod
 
 TRUNK = designs.minimal_trunk()
@@ -84,7 +84,7 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
     found = loaded(loads)
     stations = np.array([0.0, 0.3, 0.5, 0.9, 1.0])
     gamma = GAMMA[:2]
-    shapes = Solver(found.tables, found.steps, 1e-9).shapes(gamma, stations)
+    shapes = posture_shapes(Solver(found.tables, found.steps, 1e-9), gamma, stations)
     tips = found.tips(gamma)
     for k, one in enumerate(gamma):
         expected = loaded_rod.equilibrium(

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.flood import PARTS, Flood, grid_sizes
 from softreach.rod.loaded.following import Followed, Path, follow
@@ -24,7 +25,6 @@ from softreach.rod.tip_map import TipStatus
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
-    from softreach.rod.activation_box import ActivationBox
     from softreach.rod.loaded.solver import Solver
 
 __all__ = ["Postures"]
