@@ -16,7 +16,7 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, LoadTables
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import TipStatus, has_tip
 from tests.bodies import oracle_rod, posture_shapes, rubber, uniform
 from tests.oracles import bend, elastica, linear_strains, loaded_rod, sorosim
 
@@ -238,7 +238,7 @@ def errors(found, gamma):
     """Tip errors where the arm is not about to lose its stability, and the share of these."""
     exact = Solver(found.tables, 4 * found.steps, 1e-10)
     of_rule = found.equilibria(gamma)
-    settled = (of_rule.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(of_rule.margin) > 0.02)
+    settled = has_tip(of_rule.status) & (np.abs(of_rule.margin) > 0.02)
     apart = of_rule.tips[settled] - exact.near(gamma[settled], of_rule.of(settled)).tips
     return np.linalg.norm(apart, axis=1), settled.mean()
 
