@@ -101,7 +101,7 @@ def test_equilibria_are_bodies_if_stable_or_followed_and_lines_if_not():
     assert stable == 1
     assert found.status[found.followed] == 1
     assert names.count("unstable ones") == len(found) - stable - 1
-    assert {"other stable ones", "from the unloaded arm, unstable"} < set(names)
+    assert {"other stable ones", "posture, unstable"} < set(names)
 
 
 def test_what_cannot_be_shown_is_refused_and_pages_end_in_html(trunk, tmp_path):

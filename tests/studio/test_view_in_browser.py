@@ -226,7 +226,9 @@ def test_the_arm_sweeps_until_a_key_and_leaves_nothing_behind(tab, monkeypatch):
     monkeypatch.setattr(session, "is_touched", False)
     draw = session.scene.draw_arm
     monkeypatch.setattr(
-        session.scene, "draw_arm", lambda arm, at, *more: moved.append(at) or draw(arm, at, *more)
+        session.scene,
+        "draw_arm",
+        lambda arm, at, *more, **held: moved.append(at) or draw(arm, at, *more, **held),
     )
     before, tip = (session.state, session.history), session.tip
     sweep(tab, "welcome")
