@@ -137,7 +137,7 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
     d, width, rod = np.array(direction), np.ptp(arm.bounds, axis=1), tip_map(arm)
 
     def gap(x):
-        """The tip by the whole ladder from the unloaded arm, with twice the steps."""
+        """The tip of the posture, with twice the steps."""
         acting = tuple(np.array(arm.loads.tip_force) - x[-1] * force * d)
         tables = LoadTables(arm, arm.loads.replace(tip_force=acting), rod.body)
         gamma = arm.bounds[:, 0] + x[:-1] * width

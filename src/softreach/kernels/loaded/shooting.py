@@ -67,7 +67,6 @@ ANSWER = 21 * LANES  # change of M per turn, then that of F, 3 x 3 each
 NODE = 39 * LANES
 
 AT_WORK, FOUND, GIVEN_UP = 0.0, 1.0, 3.0
-_CONTRACTION = 1.0
 
 
 @inline
@@ -131,7 +130,7 @@ def _newton(w, nodes, count, small):
                 w[DONE + i] = FOUND
             elif size < w[LEFT + i]:
                 _move(nodes, count, i)
-                w[LEFT + i] = _CONTRACTION * size
+                w[LEFT + i] = size
             else:
                 w[DONE + i] = GIVEN_UP
         waiting += w[DONE + i] == AT_WORK

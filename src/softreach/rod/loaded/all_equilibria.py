@@ -29,6 +29,8 @@ from softreach.geometry.sphere_maps import (
 )
 from softreach.rod.driven import inner_rod
 from softreach.rod.kinematics import configuration, shape_dataset, stations_along
+from softreach.rod.loaded.phase import SHOT_AT_ONCE
+from softreach.rod.loaded.ring import NEUTRAL, SYMMETRIC
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.rods import tip_map
@@ -135,14 +137,11 @@ class AllEquilibria:
         return f"{kind}: tip ({tip}) m, margin {self.margin[k]:.3g}{which}"
 
 
-_MOST_PHASE = 20.0  # [rad]; e^20 roundings are 1e-7 rad
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
 _MOST_WALKED = 20_000_000  # steps of one search, which take about a second
 _MOST_STEPS = 512
 _ROUGHLY = 0.01  # [rad]
-_SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
-_NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
 _SAME = 1e-3  # [rad], of equilibria that were found in two ways
 
 
@@ -191,12 +190,12 @@ def equilibria(
         allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
         raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
     posture = loaded.equilibria(at)
-    if loaded.tables.phase.entire > _MOST_PHASE:
+    if loaded.tables.phase.entire > SHOT_AT_ONCE:
         warn("the posture alone is listed: the loads are too heavy for a search of all others")
         return _one_of(rod, gamma, posture.frame[:, :3], posture.margin, complete=False)
     known = posture.frame[has_tip(posture.status), :3]  # as the tip sees it
-    whole = replace(loaded.tables, longest=np.inf)
-    solver = _resolving(Solver(whole, loaded.unloaded_steps, rod.tol), at)
+    solver = Solver(loaded.tables.in_one_segment, loaded.unloaded_steps, rod.tol)
+    solver = _resolving(solver, at)
     solver, roots = _accurate(solver, at, _search(solver, at, known))
     result = _judged(rod, solver, at, roots, known)
     return replace(result, activation=gamma[0])
@@ -249,8 +248,8 @@ def _one_of(
 
 def _search(solver: Solver, gamma: Array, known: Array) -> _Roots:
     """All of them; the known ones are tried first."""
-    image, axis = _image(solver, gamma), solver.tables.axes[0]
-    if is_axisymmetric(image, axis, _SYMMETRIC):
+    image, axis = solver.base_map(gamma), solver.tables.axes[0]
+    if is_axisymmetric(image, axis, SYMMETRIC):
         rings = pole_rings(image, axis, known[0] if len(known) else axis)
         directions = np.concatenate([axis[None], rings.points])
         is_ring = np.arange(len(directions)) > 0
@@ -279,22 +278,12 @@ def _of_roots(roots: Roots, *, complete: bool) -> _Roots:
     return _Roots(roots.points, signs, np.zeros(len(signs), bool), complete)
 
 
-def _image(solver: Solver, gamma: Array) -> Map:
-    """Map from the direction that the tip sees to that which the base would have to see."""
-
-    def image(points: Array) -> Array:  # steps do not keep the length
-        images = solver.base_directions(gamma, np.ascontiguousarray(points))
-        return images / np.linalg.norm(images, axis=1, keepdims=True)
-
-    return image
-
-
 def _resolving(solver: Solver, gamma: Array) -> Solver:
     """With steps halved until the whole map of directions is roughly right."""
     points = icosphere(2)[0]
     while 2 * solver.steps <= _MOST_STEPS:
         finer = solver.halved()
-        apart = _image(solver, gamma)(points) - _image(finer, gamma)(points)
+        apart = solver.base_map(gamma)(points) - finer.base_map(gamma)(points)
         if np.linalg.norm(apart, axis=1).max() <= _ROUGHLY:
             break
         solver = finer
@@ -327,7 +316,7 @@ def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
     """The same with other steps."""
     if roots.is_ring.any():
         return _search(solver, gamma, roots.directions[1:])
-    image, axis = _image(solver, gamma), solver.tables.axes[0]
+    image, axis = solver.base_map(gamma), solver.tables.axes[0]
     return _of_roots(polished_roots(image, axis, roots.directions), complete=roots.complete)
 
 
@@ -342,7 +331,7 @@ def _judged(
 ) -> AllEquilibria:
     axis, many = solver.tables.axes[0], np.repeat(gamma, len(roots.directions), axis=0)
     shapes, margin = solver.shapes_facing(many, roots.directions, np.array([rod.length]))
-    margin = np.where(roots.is_ring & (margin > -_NEUTRAL), 0.0, margin)
+    margin = np.where(roots.is_ring & (margin > -NEUTRAL), 0.0, margin)
     stable = (roots.signs > 0) & np.where(roots.is_ring, margin == 0.0, margin > 0.0)
     places = np.round(shapes.frames.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
     order = np.lexsort((*places.T, -np.round(margin, 6), ~stable))

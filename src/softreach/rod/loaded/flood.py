@@ -105,11 +105,15 @@ class Flood:
             np.atleast_1d(node)
         )
 
+    def is_uncut(self, gamma: Array) -> Mask:
+        """Mask of activations in cells whose edges are all on one branch."""
+        return self.is_whole[self._cells_at(gamma)]
+
     def clear(self, rest: Array, gamma: Array) -> Array:
         """Shares of the lines from rest up to which they meet no cut, shape (n,)."""
         t = np.arange(1, PARTS + 1)[:, None, None] / PARTS
         along = rest + t * (gamma - rest)
-        whole = self.is_whole[self._cells_at(along.reshape(-1, gamma.shape[1]))].reshape(PARTS, -1)
+        whole = self.is_uncut(along.reshape(-1, gamma.shape[1])).reshape(PARTS, -1)
         return np.logical_and.accumulate(whole).sum(axis=0) / PARTS
 
     def _in_cells(self, gamma: Array) -> Array:

@@ -17,10 +17,12 @@ from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, ends_over, tables
 
-__all__ = ["LoadPhase", "load_phase", "phase_stations"]
+__all__ = ["SHOT_AT_ONCE", "LoadPhase", "load_phase", "phase_stations"]
 
 Array = NDArray[np.float64]
 
+SHOT_AT_ONCE = 20.0
+"""Phase up to which one segment is shot [rad]; e^20 roundings are 1e-7 rad."""
 _MOST_PHASE = math.pi / 2.0
 _MOST_STEPS = 1 << 16
 _STATIONS = 65

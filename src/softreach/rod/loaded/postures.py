@@ -10,7 +10,7 @@ is then polished on the arm itself.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,8 @@ __all__ = ["Postures"]
 
 Array = NDArray[np.float64]
 
-TWIST = 1e-4  # [rad], of the twin over its length
+_TWIST = 1e-4  # [rad], of the twin over its length
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
-_NEAR_GUESS = 0.15  # [rad], of what is found from an interpolated frame
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
@@ -54,6 +53,7 @@ class Postures:
     solver: Solver
     box: ActivationBox
     side: int = 1
+    _nearness: ClassVar[float] = np.inf  # [rad], of what is found from guesses
 
     @classmethod
     def of(cls, solver: Solver) -> Postures:
@@ -65,7 +65,7 @@ class Postures:
     def twin(self) -> Solver:
         """The solver of the twin."""
         tables = self.solver.tables
-        twist = self.side * TWIST / tables.arm.length
+        twist = self.side * _TWIST / tables.arm.length
         return replace(self.solver, tables=replace(tables, twist=twist))
 
     @lazy
@@ -111,8 +111,8 @@ class Postures:
         at = at[order]
         shots = self.solver.quick(gamma[at], guesses)
         good = shots.is_found & (shots.margin > _DOUBTFUL)
-        if isinstance(self, FloodedPostures) and guesses is not None:
-            good &= turn_between(shots.frame, guesses) < _NEAR_GUESS
+        if guesses is not None:
+            good &= turn_between(shots.frame, guesses) < self._nearness
         self.solver.put(gamma, at, shots._replace(is_found=good), equilibria)
 
     def _guesses(self, gamma: Array) -> tuple[NDArray[np.intp], Array | None]:
@@ -181,9 +181,7 @@ class Postures:
         for part in _FIRST_PARTS[1:]:
             left = np.flatnonzero(~start.is_found)
             begin[left] = rest + part * (gamma[left] - rest)
-            found = ring.near(self.twin, begin[left])
-            for values, new in zip(start, found, strict=True):
-                values[left] = new
+            start.put(left, ring.near(self.twin, begin[left]))
         return begin, start
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
@@ -203,26 +201,25 @@ class Postures:
         if sizes is None or not self.is_held_at_rest:
             return self
         flood = Flood.over(self.twin, self.box, sizes, self.rest_activation[0], self.rest)
-        return FloodedPostures(self.solver, self.box, self.side, flood)
+        return FloodedPostures(self.solver, self.box, self.side, flood=flood)
 
 
 @dataclass(frozen=True, eq=False)
 class FloodedPostures(Postures):
     """The same with starts from a flooded grid."""
 
-    flood: Flood | None = None
+    flood: Flood = field(kw_only=True)
+    _nearness: ClassVar[float] = 0.15
 
     def _guesses(self, gamma: Array) -> tuple[NDArray[np.intp], Array | None]:
         """Those of uncut cells, rough ones last: lanes wait for the slowest among them."""
-        assert self.flood is not None
         frames, rough = self.flood.at(gamma)
         order = np.argsort(rough, kind="stable")[: np.isfinite(rough).sum()]
         return order, frames[order]
 
     def followed(self, gamma: Array) -> Followed:
         """From where the lines meet the first cut; in uncut cells at once, or from a node."""
-        assert self.flood is not None
-        rest, uncut = self.rest_activation, np.isfinite(self.flood.at(gamma)[1])
+        rest, uncut = self.rest_activation, self.flood.is_uncut(gamma)
         way, clear = gamma - rest, np.where(uncut, 1.0, self.flood.clear(rest, gamma))[:, None]
         begin = np.where(clear < 1.0, rest + clear * way, gamma)
         guesses = self.flood.at(begin)[0]
@@ -230,7 +227,7 @@ class FloodedPostures(Postures):
         slopes = (1.0 - clear) * PARTS * (guesses - before)
         start = self.twin.careful(begin, guesses)
         lost = ~start.is_found | (start.margin <= 0.0)
-        lost |= turn_between(start.frame, guesses) > _NEAR_GUESS
+        lost |= turn_between(start.frame, guesses) > self._nearness
         nodes, held = self.flood.nearest(gamma)
         for values, at_nodes, at_rest in zip(start, held, self.rest, strict=True):
             values[lost] = at_rest[0]
@@ -242,8 +239,7 @@ class FloodedPostures(Postures):
         if len(lost):
             by_line = super().followed(gamma[lost])
             followed.has_ended[lost] = by_line.has_ended
-            for values, new in zip(followed.shots, by_line.shots, strict=True):
-                values[lost] = new
+            followed.shots.put(lost, by_line.shots)
         return followed
 
 

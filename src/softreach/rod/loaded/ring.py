@@ -14,20 +14,22 @@ from numpy.typing import NDArray
 
 from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.rod.free import FreeRod
+from softreach.rod.loaded.phase import SHOT_AT_ONCE
 from softreach.rod.loaded.shooting import Shots
 
 if TYPE_CHECKING:
     from softreach.rod.loaded.solver import Solver
 
-__all__ = ["Ring"]
+__all__ = ["NEUTRAL", "SYMMETRIC", "Ring"]
 
 Array = NDArray[np.float64]
 
 _TURNS = np.pi / 16 * np.array([0, *(sign * k for k in range(1, 17) for sign in (1, -1))])
 """Azimuths beside the one to which the unloaded arm bends, at which the arm is looked for."""
-_NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
-_SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
-_HEAVIEST = 20.0  # [rad] of phase, of single shooting
+NEUTRAL = 1e-5
+"""What tolerances leave of the margin of a ring, which is 0."""
+SYMMETRIC = 1e-6
+"""Of the directions that the base of an axisymmetric arm would have to see [rad]."""
 _STRAIGHT = 1e-8  # [L], aside, of an arm that no activation leans to any side
 
 
@@ -47,23 +49,20 @@ class Ring:
         None where there is none, loads have several directions, or are too heavy for a search.
         """
         tables, axis = solver.tables, solver.tables.axes[0]
-        if not tables.one_direction or tables.phase.entire > _HEAVIEST:
+        if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
             return None
 
-        def image(points: Array) -> Array:
-            images = solver.base_directions(rest, np.ascontiguousarray(points))
-            return images / np.linalg.norm(images, axis=1, keepdims=True)
-
-        if not is_axisymmetric(image, axis, _SYMMETRIC):
+        image = solver.base_map(rest)
+        if not is_axisymmetric(image, axis, SYMMETRIC):
             return None
         rings = pole_rings(image, axis, axis)
         points = rings.points[rings.signs > 0]
-        whole = replace(solver, tables=replace(tables, longest=np.inf))
+        whole = replace(solver, tables=tables.in_one_segment)
         many, tip = np.repeat(rest, len(points), axis=0), np.array([tables.arm.length])
         shapes, margin = whole.shapes_facing(many, points, tip)
-        if not (margin > -_NEUTRAL).any():
+        if not (margin > -NEUTRAL).any():
             return None
-        first = int((margin > -_NEUTRAL).argmax())
+        first = int((margin > -NEUTRAL).argmax())
         frame = solver.frames_facing(rest, points[[first]])[0]
         return cls(frame, float(_azimuth(shapes.frames.position[:, 0], tables.axes)[first]))
 
@@ -82,8 +81,7 @@ class Ring:
             left = np.flatnonzero(bends & ~shots.is_found)
             found = twin.careful(gamma[left], self._turned(there[left] + turn, tables.axes))
             good = found.is_found & (found.margin > 0.0)
-            for values, new in zip(shots, found, strict=True):
-                values[left[good]] = new[good]
+            shots.put(left[good], found.of(good))
         return shots
 
     def _turned(self, angles: Array, axes: Array) -> Array:

@@ -176,20 +176,18 @@ class LoadedRod(ArmRod):
         directions: Array | None = None,
     ) -> None:
         """Put tips, and what else is asked for, into place; each equilibrium is found once."""
-        if slopes is None and twists is None and directions is None:
-            equilibria = self.postures.find(gamma)
-        else:
-            known = self.postures.find(gamma)
-            equilibria = self.solver.respond(gamma, known, directions=directions is not None)
+        known = self.postures.find(gamma)
+        if slopes is not None or twists is not None or directions is not None:
+            response = self.solver.respond(gamma, known, directions=directions is not None)
             if slopes is not None:
-                position_slopes(equilibria.tips, equilibria.twists, slopes)
+                position_slopes(response.tips, response.twists, slopes)
             if twists is not None:
-                twists[:] = equilibria.twists
+                twists[:] = response.twists
             if directions is not None:
-                directions[:] = equilibria.directions
-        tips[:] = equilibria.tips
+                directions[:] = response.directions
+        tips[:] = known.tips
         if status is not None:
-            status[:] = equilibria.status
+            status[:] = known.status
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""

@@ -27,9 +27,14 @@ class Shots(NamedTuple):
     is_found: NDArray[np.bool_]
     """Mask of those that are equilibria, shape (n,)."""
 
-    def of(self, rows: NDArray[np.intp]) -> Shots:
+    def of(self, rows: NDArray[np.bool_ | np.intp]) -> Shots:
         """Some of them."""
         return Shots(self.tips[rows], self.frame[rows], self.margin[rows], self.is_found[rows])
+
+    def put(self, rows: NDArray[np.intp], others: Shots) -> None:
+        """Replace some of them."""
+        for values, new in zip(self, others, strict=True):
+            values[rows] = new
 
 
 class Search(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import tables
+from softreach.geometry.sphere_maps import Map
 from softreach.kernels.loaded.response import TRACE
 from softreach.rod.free import linear_strains
 from softreach.rod.loaded.shapes import Shapes, shapes_of
@@ -127,19 +128,25 @@ class Solver:
         equilibria.tips[squeezed] = np.nan
         equilibria.status[squeezed] = TipStatus.NO_EQUILIBRIUM
 
-    def base_directions(self, gamma: Array, directions: Array) -> Array:
-        """Directions of gravity at the base of one arm (1, bundles), for those at its tip, (n, 3).
+    def base_map(self, gamma: Array) -> Map:
+        """Map from directions of gravity at the tip of one arm (1, bundles) to those at its base.
 
-        Both as the base of the unloaded arm sees them; loads along one direction only.
+        Both (n, 3) as the base of the unloaded arm sees them; loads along one direction only.
         """
-        return base_directions(gamma, self.tables, directions, self._fine)
+
+        def image(points: Array) -> Array:  # steps do not keep the length
+            directions = np.ascontiguousarray(points)
+            images = base_directions(gamma, self.tables, directions, self._fine)
+            return images / np.linalg.norm(images, axis=1, keepdims=True)
+
+        return image
 
     def shapes_facing(
         self, gamma: Array, directions: Array, stations: Array
     ) -> tuple[Shapes, Array]:
         """Shapes of arms whose tips see gravity along given directions, and their margins.
 
-        Nothing is searched: the directions (n, 3), as in `base_directions`, are those of equilibria
+        Nothing is searched: the directions (n, 3), as in `base_map`, are those of equilibria
         of loads along one direction, of arms of one segment.
         """
         edges = self.tables.edges(stations, self.steps)
@@ -156,7 +163,7 @@ class Solver:
     def frames_facing(self, gamma: Array, directions: Array) -> Array:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
         whole = self._fine._replace(firsts=np.array([0, len(self._fine.lengths)]))
-        tables = replace(self.tables, longest=np.inf)
+        tables = self.tables.in_one_segment
         trace = walk(gamma, tables, directions, whole, trace=True).trace
         seen = trace[:, self._fine.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
         return units(seen.reshape(len(gamma), self.tables.frame_size))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -95,6 +95,11 @@ class LoadTables:
     def segments(self) -> int:
         """Segments of the arm, each shot from its tip end."""
         return len(self.nodes) + 1
+
+    @property
+    def in_one_segment(self) -> LoadTables:
+        """The same without nodes."""
+        return replace(self, longest=np.inf)
 
     @lazy
     def axes(self) -> Array:
