@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import from_written, written_name
+from softreach.arm.written import from_written, written_name
 from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN

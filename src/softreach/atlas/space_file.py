@@ -10,7 +10,8 @@ import numpy as np
 
 from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Written, from_written, unknown_parameter
+from softreach.arm.parameters import unknown_parameter
+from softreach.arm.written import Written, from_written
 from softreach.atlas.arguments import column
 from softreach.atlas.space import DesignSpace
 from softreach.support.errors import InvalidDesign, InvalidInput

@@ -116,7 +116,7 @@ class Changes:
             raise InvalidInput(name, value, why)
 
     def _angles(self) -> dict[str, float]:
-        from softreach.arm.parameters import from_written
+        from softreach.arm.written import from_written
 
         angles = {"revolution": self.revolution_deg, "taper": self.taper_deg}
         return {name: from_written(x, "rad") for name, x in angles.items() if x is not None}
@@ -274,7 +274,8 @@ def _values(
     arm: Manipulator, texts: Mapping[str, str], angles: Mapping[str, float] = MappingProxyType({})
 ) -> dict[str, float]:
     """Name of a parameter -> value in its unit, from what was written, and from angles."""
-    from softreach.arm.parameters import Written, find_parameter
+    from softreach.arm.parameters import find_parameter
+    from softreach.arm.written import Written
 
     values = dict(angles)
     if not texts:

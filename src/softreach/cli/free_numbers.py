@@ -12,7 +12,7 @@ from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
-    from softreach.arm.parameters import Written
+    from softreach.arm.written import Written
 
 Free = Annotated[
     list[str],
@@ -27,7 +27,7 @@ _POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 
 def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
-    from softreach.arm.parameters import Written
+    from softreach.arm.written import Written
 
     names = Written.of(arm)
     given = [name.strip() for text in texts for name in text.split(",")]
@@ -40,7 +40,7 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
     Raises:
         InvalidInput: Text that is anything else, or no such number.
     """
-    from softreach.arm.parameters import Written
+    from softreach.arm.written import Written
 
     names, result = Written.of(arm), {}
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"

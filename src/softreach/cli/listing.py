@@ -138,7 +138,7 @@ def parameters(design: Design, /, *, changes: Changes = UNCHANGED, json: AsJson 
     Example: softreach list parameters minimal_trunk
     """
     from softreach.arm.parameters import parameters as parameters_of
-    from softreach.arm.parameters import written_name
+    from softreach.arm.written import written_name
 
     arm = design_from(design, changes)
     records: list[dict[str, Any]] = []

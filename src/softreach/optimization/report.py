@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm.number import unit_suffix
-from softreach.arm.parameters import with_suffix
+from softreach.arm.written import with_suffix
 from softreach.optimization.free_parameters import FreeParameter
 from softreach.optimization.objectives import Goal, Value
 from softreach.optimization.problem import NEAR

@@ -236,8 +236,7 @@ class Search:
         """
         from softreach.optimization.report import table_of
 
-        shown = as_unit(unit, float(str(self.attributes["length"])))
-        return table_of(self, shown, every=as_flag("every", every))
+        return table_of(self, as_unit(unit, self._length), every=as_flag("every", every))
 
     def report(self, unit: str | None = None) -> Report:
         """Numbers, requirements, front and pictures, to be printed, or saved as an .html file.
@@ -247,14 +246,17 @@ class Search:
         """
         from softreach.optimization.report import report_of
 
-        length = float(str(self.attributes["length"]))
-        return report_of(self, self.unit if unit is None else as_unit(unit, length))
+        return report_of(self, self.unit if unit is None else as_unit(unit, self._length))
 
     @property
     def unit(self) -> LengthUnit:
         """Unit of lengths that the design is shown in, or one that is handy."""
-        length = float(str(self.attributes["length"]))
-        return as_unit(str(self.attributes["display_unit"]) or handy_unit(length), length)
+        shown = str(self.attributes["display_unit"]) or handy_unit(self._length)
+        return as_unit(shown, self._length)
+
+    @property
+    def _length(self) -> float:
+        return float(str(self.attributes["length"]))
 
     @property
     def every(self) -> tuple[Candidate, ...]:

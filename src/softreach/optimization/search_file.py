@@ -10,7 +10,8 @@ from typing import Any
 
 from softreach.arm.design_file.keys import key_text, unknown_key
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Written, unknown_parameter
+from softreach.arm.parameters import unknown_parameter
+from softreach.arm.written import Written
 from softreach.atlas.space_file import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.objectives import goals, known_objective
