@@ -179,8 +179,6 @@ def read_noise(text: str) -> float:
 
 def _record(result: Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
-    from softreach.calibration.report import error_rows
-
     repeated = result.repeatability
     return {
         "samples": len(result.data),
@@ -188,8 +186,7 @@ def _record(result: Calibration) -> dict[str, Any]:
         "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
         "numbers": _numbers(result),
         "errors": [
-            {"law": row.law, "samples": row.samples, **_errors(row.errors)}
-            for row in error_rows(result)
+            {"law": row.law, "samples": row.samples, **_errors(row.errors)} for row in result.errors
         ],
         "correlated": [list(pair) for pair in result.correlated],
         "outlier_rows": result.outliers.tolist(),

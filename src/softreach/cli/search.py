@@ -103,7 +103,7 @@ def search(
     Example: softreach search needs.toml --free taper_deg=0:3 --maximize exact_volume -o best
     """
     from softreach import optimization
-    from softreach.optimization.folder import check_folder
+    from softreach.optimization.result import check_folder
     from softreach.optimization.search_file import read_search
     from softreach.requirements.requirements import LONGEST
     from softreach.support import progress

@@ -142,7 +142,7 @@ class Requirements:
 
     def to_toml(self) -> str:
         """The text of a file, from which `from_toml` makes the same."""
-        return written(self)
+        return written(**vars(self))
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a TOML file.

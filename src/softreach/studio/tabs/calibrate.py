@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.calibration.calibration import Calibration
+from softreach.calibration import Calibration
 from softreach.calibration.measurements import read_measurements, read_table
 from softreach.studio import markup
 from softreach.studio.fields import attempt, bind_button
