@@ -378,7 +378,7 @@ class Calibration:
                     title="Pictures",
                     figures=lambda: [(plot_calibration(self, unit=shown), _PICTURE)],
                 ),
-                Section(title="Provenance", rows=origin, is_printed=False),
+                Section(title="Provenance", rows=origin, printed=0),
                 Section(title="The calibrated design", text=arm.to_toml()),
             ],
         )

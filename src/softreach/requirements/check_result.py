@@ -16,6 +16,7 @@ from softreach.schema import AXES, provenance
 from softreach.support.arguments import as_integer
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
+from softreach.support.report import Report, Section
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,18 +123,34 @@ class Check:
         held = np.isfinite(shapes["position"].values).all(axis=(1, 2))
         return shapes.isel(sample=held) if held.any() else None
 
-    def __repr__(self) -> str:
+    def report(self) -> Report:
+        """Verdict, every requirement and a picture, to be printed, or saved as an .html file."""
+        from softreach.plot.arm import plot_check
+
         own = [finding.verdict for finding in self.findings]
         parts = [f"{word}, {own.count(word)} of {len(own)}" for word in ("missed", "undecided")]
-        kept = [part for part in parts if part.split(",")[0] in own]
-        verdict = "; ".join(kept) or f"met, all {len(own)}"
+        kept = [part for part in parts if part.split(",")[0] in own] or [f"met, all {len(own)}"]
         size = self.arm.length_unit.text(self.arm.length)
-        lines = [f"Requirements of an arm of {size}: {verdict}"]
         space = 9 if "undecided" in own else 6
-        width = max((len(finding.name) for finding in self.findings), default=0)
-        for finding in self.findings:
-            lines.append(f"  {finding.word:<{space}}  {finding.name:<{width}}  {finding.text}")
-        return "\n".join(lines)
+        rows = [(f.word.ljust(space), f.name, f.text) for f in self.findings]
+        caption = "The arm at the places that it must reach."
+        return Report(
+            title="Requirements of an arm",
+            verdict=f"Requirements of an arm of {size}: {'; '.join(kept)}",
+            state=self.verdict,
+            sections=[
+                Section(title="Requirements", rows=rows, printed=max(1, len(rows))),
+                Section(
+                    title="Picture",
+                    figures=lambda: [(plot_check(self, unit=self.arm.length_unit).figure, caption)],
+                ),
+                Section(title="The design", text=self.arm.to_toml()),
+                Section(title="The requirements", text=self.requirements.to_toml()),
+            ],
+        )
+
+    def __repr__(self) -> str:
+        return str(self.report())
 
     def to_dataset(self) -> xr.Dataset:
         """Places with their gaps, poses and efforts, and the findings, labeled."""

@@ -22,8 +22,6 @@ REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
 
 _DPI = 160
-_MOST_ROWS = 30
-"""Rows of a table that are printed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,8 +38,8 @@ class Section:
     """Draws figures of matplotlib, each with its caption."""
     text: str = ""
     """Shown as it is, such as a design file."""
-    is_printed: bool = True
-    """Rows and points are among the lines; the rest is on the page alone."""
+    printed: int = 30
+    """Rows among the lines, with the points; with 0 all of it is on the page alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,17 +50,17 @@ class Report:
     verdict: str
     state: str
     """Kind of verdict, by which the page is colored: met, missed, undecided, noise and so on."""
-    facts: Sequence[str]
-    """Remarks on the whole."""
     sections: Sequence[Section]
+    facts: Sequence[str] = ()
+    """Remarks on the whole."""
 
     def __str__(self) -> str:
         lines = [self.verdict, *self.facts]
         for section in self.sections:
-            if section.is_printed:
-                rows = [section.head] * bool(section.head) + list(section.rows[:_MOST_ROWS])
+            if section.printed:
+                rows = [section.head] * bool(section.head) + list(section.rows[: section.printed])
                 lines += columns(rows) if section.rows else ()
-                if (more := len(section.rows) - _MOST_ROWS) > 0:
+                if (more := len(section.rows) - section.printed) > 0:
                     lines.append(f"... and {counted(more, 'more row')}")
                 lines += section.points
         return "\n  ".join(lines)
