@@ -9,7 +9,7 @@ import pytest
 import softreach as sr
 from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section
 from softreach.calibration.free_numbers import free_numbers
-from softreach.support.errors import InvalidInput, SoftreachWarning, no_warnings
+from softreach.support.errors import InvalidInput, NotPossible, SoftreachWarning, no_warnings
 from tests.calibration.arms import (
     MODULUS,
     hanging_tentacle,
@@ -32,7 +32,7 @@ def good():
 
 def refusal(data, free=FREE, arm=ARM, **options):
     """The line by which a calibration refuses."""
-    with no_warnings(), pytest.raises(InvalidInput) as caught:
+    with no_warnings(), pytest.raises((InvalidInput, NotPossible)) as caught:
         sr.calibrate(arm, data, free=free, rivals=False, **options)
     text = str(caught.value)
     assert "\n" not in text
@@ -48,18 +48,24 @@ def with_cell(data, row, column, value):
 
 
 TABLES = {
-    "tensions in mm": (lambda d: d.rename(columns={"t 1_N": "t 1_mm"}), "column t 1_mm = in m"),
-    "no unit": (lambda d: d.rename(columns={"t 1_N": "t 1"}), "such as t 1_N"),
+    "tensions in mm": (
+        lambda d: d.rename(columns={"t 1_N": "t 1_mm"}),
+        "column t 1_mm is in m, and must be in N",
+    ),
+    "no unit": (
+        lambda d: d.rename(columns={"t 1_N": "t 1"}),
+        "must end in its unit, such as t 1_N",
+    ),
     "no such input": (lambda d: d.drop(columns="t 2_N"), "1 column in N for t 2"),
     "no z": (lambda d: d.drop(columns="tool_z_mm"), "z is missing"),
-    "no place": (lambda d: d[["t 1_N", "t 2_N", "t 3_N"]], "places of markers = none"),
+    "no place": (lambda d: d[["t 1_N", "t 2_N", "t 3_N"]], "the data has no places"),
     "NaN input": (lambda d: d.assign(**{"t 1_N": np.nan}), "t 1_N in row 0 = nan"),
     "nothing seen": (
         lambda d: d.assign(**{c: np.nan for c in d if "mm" in c}),
-        "seen in at least one",
+        "no marker was seen",
     ),
     "text": (lambda d: d.assign(tool_x_mm="far"), "column tool_x_mm = could not convert"),
-    "one name twice": (lambda d: pd.concat([d, d[["t 1_N"]]], axis=1), "two of this name"),
+    "one name twice": (lambda d: pd.concat([d, d[["t 1_N"]]], axis=1), "two columns of this name"),
     "no rows": (lambda d: d[:0], "at least one row"),
     "nothing": (lambda d: pd.DataFrame(), "at least one row"),
     "mm called m": (lambda d: d.rename(columns=lambda c: c.replace("mm", "m")), "look at the unit"),
@@ -115,14 +121,14 @@ def test_a_row_that_was_cut_short_is_refused(good, tmp_path):
     lines = good.to_csv(index=False).splitlines()
     lines[4] = lines[4].rpartition(",")[0]
     path.write_text("\n".join(lines))
-    assert "row 3 of the data = 8 cells" in refusal(path)
+    assert "row 3 of the data has 8 cells" in refusal(path)
 
 
 def test_a_header_that_names_a_column_twice_is_refused(good, tmp_path):
     path = tmp_path / "poses.csv"
     text = good.to_csv(index=False)
     path.write_text(text.replace("tool_x_mm", "half_x_mm", 1))
-    assert "two of this name" in refusal(path)
+    assert "two columns of this name" in refusal(path)
 
 
 OPTIONS = {

@@ -121,7 +121,7 @@ def test_searches_of_other_seeds_share_a_storage_and_each_ends_with_the_best_of_
 def test_the_storage_of_another_search_is_refused(tmp_path):
     storage = tmp_path / "search.journal"
     heavy(storage=storage, designs=1, polish=False)
-    with pytest.raises(InvalidInput, match=r"storage = .*another search: remove it, or choose"):
+    with pytest.raises(InvalidInput, match=r"storage = .*belongs to another search: remove it"):
         sr.search(ARM, FREE, NEEDS, minimize="mass", storage=storage, **FAST)
 
 
@@ -244,7 +244,7 @@ def test_an_objective_that_no_design_has_is_said_in_one_line():
         (dict(free={**FREE, "left.offset": "offset"}), "another free parameter"),
         (dict(free={}), "one parameter or more"),
         (dict(free=FREE, maximize="mas"), 'did you mean "mass"'),
-        (dict(free=FREE, maximize="coverage"), "regions among the requirements"),
+        (dict(free=FREE, maximize="coverage"), "the requirements have no regions"),
         (dict(free=FREE, maximize="mass", minimize="mass"), "given once"),
         (dict(free=FREE, designs=0), "whole number"),
         (dict(free=FREE, sampler="luck"), "one of auto, cma"),

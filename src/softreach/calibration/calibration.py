@@ -23,7 +23,7 @@ from softreach.calibration.uncertainty import uncertainty
 from softreach.rod.summary import design_warnings
 from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput, Range, warn
+from softreach.support.errors import InvalidInput, NotPossible, Range, warn
 from softreach.support.progress import Progress, as_progress
 
 __all__ = ["calibrate", "leave_one_run_out"]
@@ -76,7 +76,8 @@ def calibrate(
         progress: Called with 1 for each step of the fit.
 
     Raises:
-        InvalidInput: Data that cannot be read, numbers that it cannot tell apart, or mirrored axes.
+        InvalidInput: Data that cannot be read, or numbers that it cannot tell apart.
+        NotPossible: Mirrored axes, exchanged columns, or no equilibrium at the start.
         InvalidDesign: No such arm can exist.
 
     Warns:
@@ -126,7 +127,7 @@ def calibrate(
 def _held_out(count: int, share: float, seed: int) -> Mask:
     held, out = np.zeros(count, bool), round(share * count)
     if out == count:
-        raise InvalidInput("hold_out", share, f"such that some of {count} samples are left")
+        raise InvalidInput("hold_out", share, f"a share that leaves some of {count} samples")
     held[np.random.default_rng(seed).permutation(count)[:out]] = True
     return held
 
@@ -156,13 +157,14 @@ def leave_one_run_out(
         **options: Others of `calibrate`.
 
     Raises:
-        InvalidInput: Fewer than two runs; else as `calibrate`.
+        NotPossible: Fewer than two runs.
+        InvalidInput: As `calibrate`.
     """
     names = ("inputs", "markers", "run", "order")
     columns = {name: options.pop(name) for name in names if name in options}
     table = read_measurements(arm, data, **columns)
     if not table.has_runs:
-        raise InvalidInput("runs", len(table.run_names), "2 or more: name their column by `run`")
+        raise NotPossible("leaving out a run needs two runs or more: name their column by `run`")
     errors = {}
     for number, name in enumerate(table.run_names):
         out = table.runs == number

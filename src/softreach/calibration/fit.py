@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.calibration.model import MarkerModel, Prediction
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from softreach.support.progress import Progress
 
 __all__ = [
@@ -189,10 +189,9 @@ def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> No
     if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):
         found = _orders(model, model.free.start, predicted, places)
         if found[0].miss < _FAR_BETTER * own:
-            given = f"a miss of {1e3 * own:.3g} mm in the middle"
-            allowed = f"those of right-handed axes in their order: {_said(found)}, which leaves "
-            raise InvalidInput(
-                "columns of the data", given, f"{allowed}{1e3 * found[0].miss:.3g} mm"
+            raise NotPossible(
+                f"the columns of the data fit no arm with right-handed axes: {_said(found)}; "
+                f"the middle then misses by {1e3 * found[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
             )
 
 
@@ -243,13 +242,14 @@ def fitted(
         progress: Called with 1 for each step.
 
     Raises:
-        InvalidInput: Numbers that the data cannot tell, or no equilibrium at the start.
+        InvalidInput: Numbers that the data cannot tell apart.
+        NotPossible: Columns in another order, or no equilibrium at the start.
     """
     problem = _Problem(model, places, progress)
     values = np.clip(model.free.start, *problem.bounds)
     identifiable(model.free, problem.slopes(values))
     if not np.isfinite(problem.residuals(values)).all():
-        raise InvalidInput("arm", "no equilibrium", "one at the start for some sample at least")
+        raise NotPossible("the design that the fit starts from has no equilibrium at any sample")
     rounds = [None, _ROBUST] if robust else [None]
     converged, count = False, 0
     for width in rounds:
@@ -393,7 +393,7 @@ def exchanged_columns(
         other = replace(model, inputs=model.inputs[:, found[0].inputs])
         try:
             error = misses(refitted(other, _ordered(places, found[0].columns)).residuals).rms
-        except InvalidInput:
+        except (InvalidInput, NotPossible):
             continue
         if error < least:
             least, best = error, (_said(found), error)

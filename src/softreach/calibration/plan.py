@@ -18,7 +18,7 @@ from softreach.calibration.model import MarkerModel
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arguments import as_integer, as_names, as_number
-from softreach.support.errors import InvalidInput, Range, did_you_mean
+from softreach.support.errors import InvalidInput, NotPossible, Range, did_you_mean
 from softreach.support.files.text import write_text
 
 __all__ = ["PosePlan", "plan_poses"]
@@ -135,8 +135,8 @@ def plan_poses(
         seed: Of the candidates, and of the order in which to measure.
 
     Raises:
-        InvalidInput: Numbers that no pose can tell apart, fewer poses than these need, or no
-            candidate with a stable equilibrium.
+        InvalidInput: Numbers that no pose can tell apart, or fewer poses than these need.
+        NotPossible: No candidate has a stable equilibrium.
     """
     arm = a_manipulator("arm", arm)
     numbers = free_numbers(arm, free)
@@ -151,8 +151,7 @@ def plan_poses(
     usable = np.isfinite(prediction.slopes).all(axis=(1, 2, 3))
     usable &= prediction.status == TipStatus.STABLE
     if not usable.any():
-        allowed = "activations at which the arm has a stable equilibrium"
-        raise InvalidInput("arm", "none in its activation box", allowed)
+        raise NotPossible("the arm has no stable equilibrium in its activation box")
     inputs = inputs[usable]
     slopes = prediction.slopes[usable].reshape(len(inputs), -1, len(numbers))
     identifiable(numbers, slopes.reshape(-1, len(numbers)))

@@ -17,7 +17,7 @@ from softreach.optimization.deviations import (
 from softreach.requirements.requirements import Requirements, Target, with_payload
 from softreach.support import parallel
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, NotPossible
 from softreach.workspace.gradient import volume_gradient
 from softreach.workspace.moving_boundary import MovingBoundary
 from softreach.workspace.reach import reachable_set
@@ -55,7 +55,7 @@ class FirstOrder:
                 raise
             return None, None
         if not isinstance(solid, ReachableSolid):
-            raise InvalidInput("payloads", f"{payload:g} kg", "such that the set has a volume")
+            raise NotPossible(f"with {payload:g} kg at its tip the arm reaches no volume")
         return solid, MovingBoundary.of(solid, deviations_of(arm, self.sigmas).parameters)
 
     @property

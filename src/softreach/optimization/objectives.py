@@ -175,7 +175,7 @@ def goals(
     }
     for goal in result:
         if goal.objective.asks and not has[goal.objective.asks]:
-            allowed = f"asked with {goal.objective.asks} among the requirements"
+            allowed = f"left out: the requirements have no {goal.objective.asks}"
             raise InvalidInput("objective", goal.name, allowed)
     return tuple(result)
 

@@ -26,7 +26,7 @@ from softreach.requirements.requirements import Requirements
 from softreach.rod.bending import bending_over_bounds
 from softreach.rod.rods import in_steps, tip_map
 from softreach.support.arguments import as_instance, as_number
-from softreach.support.errors import InvalidInput, Range, no_warnings
+from softreach.support.errors import InvalidInput, NotPossible, Range, no_warnings
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSet, ReachableSolid, reachable_set
@@ -65,7 +65,8 @@ def check(
         The findings, which print themselves.
 
     Raises:
-        InvalidInput: Arguments of another kind, or requirements that ask for nothing.
+        InvalidInput: Arguments of another kind.
+        NotPossible: Empty requirements.
         InvalidDesign: A payload or a limit of mass needs a modulus or a density that is not there.
 
     Warns:
@@ -75,8 +76,9 @@ def check(
     needs = as_instance("requirements", requirements, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.2))
     if not (needs.targets or needs.keeps or needs.limits.given or needs.measures):
-        allowed = "a target, a region to keep to, a limit or a measure, or several"
-        raise InvalidInput("requirements", "nothing that an arm could miss", allowed)
+        raise NotPossible(
+            "the requirements are empty: add a target, a region to keep to, a limit or a measure"
+        )
     return checked(arm, needs, accuracy, sets_to(accuracy), as_progress(progress))
 
 

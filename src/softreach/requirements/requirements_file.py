@@ -12,7 +12,7 @@ from softreach.atlas.metrics import known_metric
 from softreach.inverse.request import positions_in
 from softreach.requirements.parts import LIMIT_UNITS, LONGEST, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
-from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, SoftreachError
 from softreach.support.files.text import read_text
 from softreach.support.files.toml import (
     WRONG,
@@ -199,6 +199,8 @@ class _Reader(FaultReader):
         try:
             made = kind(**values)
             return WRONG if wrong else made
+        except NotPossible as error:
+            return self._refuse(path, None, str(error))
         except InvalidInput as error:
             field = error.name.partition(" ")[0].partition("[")[0]
             key = next((key for key in raw if key.startswith(field)), "")

@@ -1,4 +1,4 @@
-"""Free memory, and checks of what is asked of it."""
+"""Free memory, and the refusal of what needs more."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, did_you_mean
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, NotPossible, did_you_mean
 
 __all__ = [
     "WRONG",
@@ -99,6 +99,8 @@ class FaultReader:
             return make()
         except InvalidInput as error:
             return self._refuse(path, value, f"must be {error.allowed}")
+        except NotPossible as error:
+            return self._refuse(path, value, str(error))
 
     def _check_keys(
         self, raw: Mapping[str, Any], path: str, shown: Iterable[str], known: Iterable[str] = ()
