@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.calibration.baselines import constant_curvature, quadratic
-from softreach.calibration.errors import Misses, misses
+from softreach.calibration.errors import PlacementErrors, misses
 from softreach.calibration.fit import Fit, exchanged_columns, fitted, started
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
@@ -147,7 +147,7 @@ def _rivals(
 
 def leave_one_run_out(
     arm: Manipulator, data: Any, *, free: Sequence[str], **options: Any
-) -> dict[str, Misses]:
+) -> dict[str, PlacementErrors]:
     """Errors of each run by a fit to all others: what to expect of a motion that is new.
 
     Args:

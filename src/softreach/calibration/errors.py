@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from softreach.calibration.measurements import Measurements
 
-__all__ = ["Misses", "Repeatability", "Verdict", "judged", "misses", "repeatability"]
+__all__ = ["PlacementErrors", "Repeatability", "Verdict", "judged", "misses", "repeatability"]
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _SLIPS = 0.03
 """Share of samples far off that may be slips."""
 
 
-class Misses(NamedTuple):
+class PlacementErrors(NamedTuple):
     """Distances between predicted and measured places [m]."""
 
     median: float
@@ -51,13 +51,13 @@ class Misses(NamedTuple):
         return f"rms {rms} mm ({share:.2g} % of L), median {median}, mean {mean}, 95 % below {most}"
 
 
-def misses(residuals: Array) -> Misses:
+def misses(residuals: Array) -> PlacementErrors:
     """Of residuals of places (..., 3); those without a number do not count."""
     distance = np.linalg.norm(residuals, axis=-1).ravel()
     distance = distance[np.isfinite(distance)]
     if not len(distance):
-        return Misses(np.nan, np.nan, np.nan, np.nan, 0)
-    return Misses(
+        return PlacementErrors(np.nan, np.nan, np.nan, np.nan, 0)
+    return PlacementErrors(
         float(np.median(distance)),
         float(distance.mean()),
         float(np.sqrt((distance**2).mean())),

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import unit_suffix
 from softreach.calibration.errors import (
-    Misses,
+    PlacementErrors,
     Repeatability,
     Verdict,
     judged,
@@ -60,8 +60,8 @@ class Rival(NamedTuple):
     name: str
     numbers: int
     """Number of fitted parameters."""
-    train: Misses
-    held_out: Misses
+    train: PlacementErrors
+    held_out: PlacementErrors
 
 
 class ErrorRow(NamedTuple):
@@ -70,7 +70,7 @@ class ErrorRow(NamedTuple):
     law: str
     samples: str
     """Those of which the errors are."""
-    errors: Misses
+    errors: PlacementErrors
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,24 +115,24 @@ class Calibration:
         return self._model(self.data).of_arm(self.arm).places - self.data.places
 
     @property
-    def train(self) -> Misses:
+    def train(self) -> PlacementErrors:
         """Errors of the samples of the fit."""
         return misses(self.residuals[~self.held])
 
     @property
-    def held_out(self) -> Misses:
+    def held_out(self) -> PlacementErrors:
         """Errors of the samples that it did not see."""
         return misses(self.residuals[self.held])
 
     @property
-    def by_marker(self) -> dict[str, Misses]:
+    def by_marker(self) -> dict[str, PlacementErrors]:
         """Errors of each marker: of held-out samples, or of all if none is held out."""
         rows = self.held if self.held.any() else ~self.held
         each = enumerate(self.data.marker_names)
         return {name: misses(self.residuals[rows, k]) for k, name in each}
 
     @cached_property
-    def before(self) -> Misses:
+    def before(self) -> PlacementErrors:
         """Errors of the design before, moved onto the fitted samples as it is.
 
         Of samples held out, or of all if none is.
@@ -179,7 +179,7 @@ class Calibration:
         pairs = np.argwhere(np.triu(np.abs(matrix) > _CORRELATED, 1)).tolist()
         return [(names[a], names[b], float(matrix[a, b])) for a, b in pairs]
 
-    def errors_on(self, data: Any, **columns: Any) -> Misses:
+    def errors_on(self, data: Any, **columns: Any) -> PlacementErrors:
         """Errors of the calibrated arm on other measurements."""
         return misses(self.residuals_on(data, **columns))
 

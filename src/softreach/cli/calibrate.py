@@ -26,7 +26,7 @@ from softreach.cli.values import NUMBER, WHOLE, as_read, pairs_in
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from softreach.calibration import Calibration, Misses
+    from softreach.calibration import Calibration, PlacementErrors
 
 _COLUMNS = Group("Columns of the data, where their names do not tell", sort_key=1)
 
@@ -218,6 +218,6 @@ def _numbers(result: Calibration) -> list[Mapping[str, Any]]:
     ]
 
 
-def _errors(errors: Misses) -> dict[str, float]:
+def _errors(errors: PlacementErrors) -> dict[str, float]:
     keys = ("median_m", "mean_m", "rms_m", "below_95_percent_m", "places")
     return dict(zip(keys, errors, strict=True))

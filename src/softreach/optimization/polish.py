@@ -114,7 +114,7 @@ def _solved(program: _Program, first: Array) -> Array:
 
     point = program.point(first)
     constraints = []
-    for kind, parts in (("eq", point.equations), ("ineq", point.rooms)):
+    for kind, parts in (("eq", point.equations), ("ineq", point.inequalities)):
         if parts:
             fun, jac = program.asked(kind, stacked), program.asked(kind, stacked_slopes)
             constraints.append({"type": kind, "fun": fun, "jac": jac})
@@ -228,10 +228,10 @@ class _Program:
             return np.zeros(len(unknowns))
 
     def asked(self, kind: str, what: Callable[[Sequence[Part]], Array]) -> Callable[[Array], Array]:
-        """Function of unknowns: values or derivatives of equations ("eq") or rooms ("ineq")."""
+        """Values or derivatives of equations ("eq") or inequalities ("ineq") by the unknowns."""
 
         def values(unknowns: Array) -> Array:
             point = self.point(unknowns)
-            return what(point.equations if kind == "eq" else point.rooms)
+            return what(point.equations if kind == "eq" else point.inequalities)
 
         return values

@@ -32,7 +32,7 @@ _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
 @dataclass(eq=False)
 class Point:
-    """A design with its poses: cost, equations and rooms, each with all derivatives.
+    """A design with its poses: cost, equations and inequalities, each with all derivatives.
 
     Unknowns are the real parameters over their ranges, then the poses in the unit cube of the free
     inputs, one for each payload and place.
@@ -63,7 +63,7 @@ class Point:
         return tuple(part for part in self._tips if part.within == 0.0)
 
     @lazy
-    def rooms(self) -> tuple[Part, ...]:
+    def inequalities(self) -> tuple[Part, ...]:
         """Quantities kept above 0: limits, measures, regions, other goals."""
         near = (_near_place(part) for part in self._tips if part.within > 0.0)
         return (*near, *self._rules(), *self._shares(), *self._of_design(), *self._other_goals())
@@ -234,7 +234,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Part:
-    """Equations or rooms of one requirement, whose derivatives are made when asked for."""
+    """Equations or inequalities of one requirement, whose derivatives are made when asked for."""
 
     name: str
     """Of the requirement."""

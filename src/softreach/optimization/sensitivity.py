@@ -256,7 +256,7 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     size = float(np.linalg.norm(slope))
     bounds = [
         _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
-        for part in point.rooms
+        for part in point.inequalities
         for k in np.flatnonzero(part.value <= _ACTIVE)
     ]
     bounds += _ends(problem, point)

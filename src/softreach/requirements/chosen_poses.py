@@ -75,7 +75,7 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     except InvalidInput as error:
         if error.name != "loads":
             raise
-        return _fallen(rules, places)
+        return _without_equilibrium(rules, places)
     best = _best(rules, solutions)
     broken = (best.excess.sum(axis=1) > 0.0) & (solutions.statuses == Status.REACHED)
     if (tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
@@ -102,7 +102,7 @@ def descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     tips = stable_tips(rod).tips(gamma)
     known = np.isfinite(tips).all(axis=1)
     if not known.any():
-        return _fallen(rules, places)
+        return _without_equilibrium(rules, places)
     gamma, tips = gamma[known], tips[known]
     near = KDTree(tips).query(places, k=min(_NEIGHBORS, len(tips)))[1].reshape(count, -1)
     owner = np.repeat(np.arange(count), near.shape[1])
@@ -165,8 +165,8 @@ def effort_scales(arm: Manipulator) -> Array:
     return np.where(largest > 0.0, largest, 1.0)
 
 
-def _fallen(rules: PoseRules, places: Array) -> Posed:
-    """Poses of an arm that no activation holds under its loads: none counts as near."""
+def _without_equilibrium(rules: PoseRules, places: Array) -> Posed:
+    """Poses of an arm that no activation holds under its loads: its tip is near no place."""
     arm, count = rules.arm, len(places)
     away = np.linalg.norm(places - arm.base.position, axis=1) + arm.length
     gamma = np.tile(rules.rod.box.low, (count, 1))
