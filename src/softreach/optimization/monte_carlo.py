@@ -11,7 +11,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
-from softreach.optimization.first_order import TOL, FirstOrder, region_places
+from softreach.optimization.deviations import TOL, FirstOrder, region_places
 from softreach.requirements.requirements import Requirements, Target, with_payload
 from softreach.rod.rods import tip_map
 from softreach.sampling import sample_cube

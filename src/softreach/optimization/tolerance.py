@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.optimization.deviations import Spread, deviations_of
-from softreach.optimization.first_order import FirstOrder
+from softreach.optimization.deviations import FirstOrder, Spread, deviations_of
 from softreach.optimization.monte_carlo import ArmsMade, arms_made, tried, with_places, with_region
 from softreach.requirements.requirements import Requirements
 from softreach.rod.rods import tip_map

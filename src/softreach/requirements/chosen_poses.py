@@ -11,7 +11,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.prepared import prepared_map
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
-from softreach.requirements.check_result import TOL
 from softreach.requirements.poses import PoseRules
 from softreach.rod.bending import some_corners
 from softreach.rod.rods import tip_map
@@ -23,8 +22,9 @@ from softreach.support.errors import InvalidInput, no_warnings
 from softreach.support.progress import Progress
 from softreach.workspace.search import nearest_tips
 
-__all__ = ["Chooser", "Posed", "chosen", "descended", "effort_scales", "solved"]
+__all__ = ["TOL", "Chooser", "Posed", "chosen", "descended", "effort_scales", "solved"]
 
+TOL = 1e-6  # over L: a place that is reached to the error of the tips is reached
 _BLOCK = 32_768  # places at once: bounds the memory
 _FAMILY = 32  # activations tried for a place of an arm with more than three free bundles
 _MOST_TRIED = 4_096  # places for which they are

@@ -24,10 +24,6 @@ __all__ = [
 WRONG: Any = object()
 """In place of a value that has faults."""
 
-_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
-_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{64}}")
-"""A key of so many parts with dots, which takes the parser as many steps as the square of them."""
-
 
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
     """The tables of TOML text.
@@ -39,8 +35,6 @@ def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]
     Raises:
         ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
     """
-    if _LONG_KEY.search(text):
-        raise ValueError("a key has more than 64 parts with dots")
     try:
         tables = tomllib.loads(text, parse_float=number)
         if not _fit_64_bits(tables):
