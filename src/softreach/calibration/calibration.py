@@ -26,12 +26,8 @@ from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, NotPossible, Range, warn
 from softreach.support.progress import Progress, as_progress
 
-__all__ = ["calibrate", "leave_one_run_out"]
-
-_LEAVES = 3.0
-"""Factor by which a number has left its design."""
-_POOR = 0.1
-"""Error over the motion of the markers from which columns may be exchanged."""
+_LEAVES = 3.0  # factor by which a number has left its design
+_POOR = 0.1  # error over the motion of the markers from which columns may be exchanged
 
 
 def calibrate(

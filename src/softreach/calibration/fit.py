@@ -13,32 +13,18 @@ from numpy.typing import NDArray
 from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.calibration.model import MarkerModel, Prediction
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from softreach.support.progress import Progress
 
-__all__ = [
-    "SAME",
-    "Fit",
-    "exchanged_columns",
-    "fitted",
-    "identifiable",
-    "robust_width",
-    "started",
-]
-
-Array = NDArray[np.float64]
-
 SAME = 1e-7
 """Smallest singular value over the largest, in scales of the numbers, that data can tell."""
-_IDLE = 1e-9
-"""Motion of markers in L, or over that of the other numbers, that is rounding."""
-_ROBUST = 3.0
-"""Residuals beyond so many widths count less than their squares."""
+_IDLE = 1e-9  # motion of markers in L, or over that of the other numbers, that is rounding
+_ROBUST = 3.0  # residuals beyond so many widths count less than their squares
 _FINE, _COARSE = 1e-7, 1e-3
 """Least share by which a step must improve: of the last round, of those before."""
 _MOST = 60
-_SAMPLES = 100
-"""Samples by which exchanges are compared."""
+_SAMPLES = 100  # samples by which exchanges are compared
 _PROMISING, _BETTER = 0.8, 0.5
 """Error over that of the columns as they are: before a fit, and after it."""
 _ALIKE, _FAR_BETTER = 1.2, 0.35
@@ -57,7 +43,7 @@ class Fit:
     """Predicted minus measured places [m], NaN where none was seen, (n, marker, 3)."""
     weights: Array
     """Of each marker of each sample in the fit: 1, less for outliers; (n, marker)."""
-    at_bound: NDArray[np.bool_]
+    at_bound: Mask
     """Numbers that end at a bound, shape (number,)."""
     evaluations: int
     converged: bool

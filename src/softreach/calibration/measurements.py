@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_text
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import (
     InvalidInput,
     NotPossible,
@@ -34,10 +35,6 @@ from softreach.support.quantity import sizes_in
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["Measurements", "read_measurements", "read_table"]
-
-Array = NDArray[np.float64]
 
 _SIZES = {
     name.lower(): (unit, size) for unit in ("m", "N", "Pa") for name, size in sizes_in(unit).items()
@@ -57,10 +54,8 @@ _MOST_ROWS = 2_000_000
 _MOST_BYTES = 1000 * MEGABYTE
 _WIDEST = 4.0
 """Distance of a place from the middle of all, in lengths of the arm, that is no pose of it."""
-_HARD = 100.0
-"""Inputs beyond the bounds of the design, in them, that are a wrong unit or a slip."""
-_SLACK = 0.01
-"""Of the largest tension: a negative one that is the zero of a load cell."""
+_HARD = 100.0  # inputs beyond the bounds of the design, in them, that are a wrong unit or a slip
+_SLACK = 0.01  # of the largest tension: a negative one that is the zero of a load cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +96,7 @@ class Measurements:
         """True if the source said which samples belong together."""
         return len(self.run_names) > 1
 
-    def of(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
+    def of(self, rows: NDArray[np.intp] | Mask) -> Measurements:
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
         rank = np.empty(len(self), np.intp)

@@ -18,24 +18,17 @@ from softreach.calibration.model import MarkerModel
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arguments import as_integer, as_names, as_number
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, NotPossible, Range, did_you_mean
 from softreach.support.files.text import write_text
 
-__all__ = ["PosePlan", "plan_poses"]
-
-Array = NDArray[np.float64]
-
-_CORNERS = 10
-"""Free inputs up to which all corners of their box are candidates."""
-_APART = 0.5
-"""Distance of two poses in the box at least, over the mean distance of so many points."""
+_CORNERS = 10  # free inputs up to which all corners of their box are candidates
+_APART = 0.5  # distance of two poses in the box at least, over the mean distance of so many points
 _TRUSTED = 2.0
 """Largest reaction of a pose to the numbers that counts in full, over the median of all."""
 _ROUNDS = 50
-_GAIN = 1e-6
-"""Least gain of the logarithm of the determinant for which a pose is exchanged."""
-_START = 1e-9
-"""Information on each number before the first pose, over that of all candidates."""
+_GAIN = 1e-6  # least gain of the logarithm of the determinant for which a pose is exchanged
+_START = 1e-9  # information on each number before the first pose, over that of all candidates
 _WRITTEN = {"m": ("mm", 1e3), "Pa": ("kPa", 1e-3), "N": ("N", 1.0)}
 
 
@@ -238,7 +231,7 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
     return np.array(chosen, np.intp)
 
 
-def _within(at: Array, place: int, room: float) -> NDArray[np.bool_]:
+def _within(at: Array, place: int, room: float) -> Mask:
     """Candidates that are too near to one that is chosen, itself among them."""
     result = np.linalg.norm(at - at[place], axis=1) < room
     result[place] = True

@@ -40,10 +40,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Calibration", "ErrorRow", "Rival"]
-
-_OUTLIER = 5.0
-"""Robust widths from which a sample is listed."""
+_OUTLIER = 5.0  # robust widths from which a sample is listed
 _CORRELATED = 0.95
 _MOST_ROWS = 10
 _ERRORS = ("rms", "median", "95 % below", "rms / L")

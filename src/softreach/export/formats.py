@@ -17,16 +17,6 @@ from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, format_of
 
-__all__ = [
-    "format_file",
-    "load_library",
-    "write_by_suffix",
-    "write_ply_mesh",
-    "write_ply_points",
-    "write_vtk",
-    "write_vtu",
-]
-
 _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
 

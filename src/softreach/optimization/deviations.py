@@ -23,12 +23,8 @@ from softreach.workspace.moving_boundary import MovingBoundary
 from softreach.workspace.reach import reachable_set
 from softreach.workspace.solid import ReachableSolid
 
-__all__ = ["TOL", "Deviations", "FirstOrder", "Spread", "deviations_of", "region_places"]
-
-_QUANTILE = 0.05
-"""Share of arms that are worse than the number given for them."""
-_NORMAL = 1.6448536269514722
-"""The 95 % quantile of the normal distribution."""
+_QUANTILE = 0.05  # share of arms that are worse than the number given for them
+_NORMAL = 1.6448536269514722  # the 95 % quantile of the normal distribution
 _AGREEMENT = 3.0  # standard errors
 _SIGMA = Range(0.0)
 TOL = 1e-6  # of tips at targets, in L

@@ -20,15 +20,6 @@ from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.lazy import lazy
 from softreach.support.quantity import read_quantity
 
-__all__ = [
-    "FreeParameter",
-    "FreeParameters",
-    "Tie",
-    "Values",
-    "free_parameters",
-    "known_parameters",
-]
-
 Values = Mapping[str, float | str]
 """Free parameter -> its value [SI unit], or the chosen name."""
 

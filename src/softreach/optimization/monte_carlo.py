@@ -23,8 +23,6 @@ from softreach.workspace.reach import reachable_set
 from softreach.workspace.search import nearest_tips
 from softreach.workspace.solid import ReachableSolid
 
-__all__ = ["ArmsMade", "arms_made", "tried", "with_places", "with_region"]
-
 _POOL = 1 << 17  # places of space among which those are that are followed
 _FOLLOWED = 1 << 13  # near the boundary, and as many away from it
 _NEAR = 4.0  # deviations of the boundary

@@ -27,17 +27,6 @@ if TYPE_CHECKING:
 
     from softreach.workspace import ReachableSet
 
-__all__ = [
-    "OBJECTIVES",
-    "SETS",
-    "DesignCase",
-    "Goal",
-    "Objective",
-    "Value",
-    "goals",
-    "known_objective",
-]
-
 SETS = {
     "exact_volume": "volume",
     "exact_convex_volume": "convex_volume",

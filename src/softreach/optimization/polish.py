@@ -18,8 +18,6 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
-__all__ = ["Polished", "can_polish", "point_of", "polished"]
-
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
 MOST_DESIGNS = 60

@@ -19,8 +19,6 @@ from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
 from softreach.support.errors import InvalidDesign, InvalidInput
 
-__all__ = ["NEAR", "Candidate", "Fidelity", "Problem"]
-
 NEAR = 0.1
 """Relative distance within which objectives at the ends of polishes agree."""
 

@@ -19,8 +19,6 @@ from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 
-__all__ = ["Point"]
-
 EFFORTS = ("mean_effort", "worst_effort")
 _FAR = 0.1  # over L or relative: room beyond which a rule is not differentiated
 _ROOM = 0.98  # of the distance within which a tip must come to a place

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Search", "check_folder"]
-
 _AT_END = 1e-3  # of a range
 _FOUND = "# Found by a search of softreach"
 _FILES = ("best.toml", "front.csv", "candidates.csv", "report.html")

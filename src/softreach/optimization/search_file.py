@@ -21,8 +21,6 @@ from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean
 from softreach.support.files.toml import WRONG, FaultReader, tables_of
 from softreach.workspace.reach import ACCURACIES
 
-__all__ = ["SearchFile", "read_search"]
-
 _OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
     "designs": lambda name, value: as_integer(name, value, 1, 1_000_000),
     "seed": lambda name, value: as_integer(name, value, 0, 2**31),

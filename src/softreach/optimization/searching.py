@@ -33,8 +33,6 @@ from softreach.support.arrays import Array
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES
 
-__all__ = ["search"]
-
 _BATCH = 4  # designs asked together, whatever the number of threads, so that this changes nothing
 _COARSER = 10.0  # times the accuracy, on the way
 _COARSEST = 0.03

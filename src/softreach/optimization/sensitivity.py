@@ -27,8 +27,6 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Multiplier", "Sensitivity", "VarianceShares", "sensitivity"]
-
 _ACTIVE = 1e-3  # room below which a requirement may decide
 _AT_END = 1e-6  # of a range
 _CONFIDENCE = 0.95

@@ -22,8 +22,6 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     import optuna
 
-__all__ = ["SAMPLERS", "Sampler", "Study"]
-
 Sampler = Literal["auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random"]
 SAMPLERS = ("auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random")
 
@@ -31,10 +29,8 @@ _NAME = "softreach"
 _MISSED = 1e12
 """Cost of a design that misses requirements by 1: more than any objective has, as only the order
 matters to the samplers."""
-_NEVER = 1e15
-"""Cost of what cannot exist."""
-_WARM = 10
-"""Designs that CMA-ES begins from at least: the best tenth of them must be one or more."""
+_NEVER = 1e15  # cost of what cannot exist
+_WARM = 10  # designs that CMA-ES begins from at least: the best tenth of them must be one or more
 _JUDGED, _KEY, _PROBLEM = "judged", "asked", "problem"
 
 

@@ -23,8 +23,6 @@ from softreach.workspace.reach import ACCURACIES
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["TargetTolerance", "Tolerance", "tolerance"]
-
 _MOST = 1_000_000
 
 

@@ -41,8 +41,6 @@ from softreach.workspace import ReachableSet, ReachableSolid, reachable_set
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Check", "Coverage", "Sets", "check", "checked", "quick_check", "sets_to"]
-
 _LEAST_PLACES = 64  # in a region to be covered
 _MOST_PLACES = 100_000
 _ROUGH_TOL = 1e-4  # of tips on the way of a search, in L

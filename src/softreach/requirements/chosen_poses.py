@@ -22,8 +22,6 @@ from softreach.support.errors import InvalidInput, no_warnings
 from softreach.support.progress import Progress
 from softreach.workspace.search import nearest_tips
 
-__all__ = ["TOL", "Chooser", "Posed", "chosen", "descended", "effort_scales", "solved"]
-
 TOL = 1e-6  # over L: a place that is reached to the error of the tips is reached
 _BLOCK = 32_768  # places at once: bounds the memory
 _FAMILY = 32  # activations tried for a place of an arm with more than three free bundles

@@ -32,8 +32,6 @@ from softreach.support.errors import InvalidInput, NotPossible, counted
 from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
-__all__ = ["Box", "HalfSpace", "Mesh", "Region", "Sphere"]
-
 Triple = tuple[float, float, float]
 
 _STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])

@@ -29,8 +29,6 @@ from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.text import read_text, write_text
 
-__all__ = ["Requirements"]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Requirements:

@@ -25,8 +25,6 @@ from softreach.support.files.toml import (
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
 
-__all__ = ["read", "written"]
-
 _KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
 """At the top, beside payloads; `search` is read by the search of designs."""
 _EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa"}

@@ -23,8 +23,7 @@ __all__ = [
     "SoftreachWarning",
 ]
 
-_LONGEST = 300
-"""Characters of a value that an error shows."""
+_LONGEST = 300  # characters of a value that an error shows
 
 
 def counted(number: int, noun: str) -> str:

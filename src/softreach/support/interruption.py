@@ -9,8 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-__all__ = ["INTERRUPTED", "check_stopped", "run_stoppable"]
-
 INTERRUPTED = "interrupted: nothing half-written was left behind"
 
 _came: list[int] = []  # signals that asked this process to end

@@ -10,8 +10,6 @@ from pathlib import Path
 
 from softreach.support.errors import InvalidInput
 
-__all__ = ["check_memory", "free_memory", "return_memory"]
-
 _UNKNOWN = 4e9  # where the system does not say
 _NOTICED = 1e8  # bytes; below, the system is not asked
 _CONTROL_GROUP = Path("/sys/fs/cgroup")

@@ -18,8 +18,6 @@ from typing import Any, TypeVar
 
 from softreach.support.interruption import check_stopped
 
-__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count", "threads_here", "undivided"]
-
 Result = TypeVar("Result")
 
 _here = threading.local()

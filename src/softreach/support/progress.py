@@ -10,8 +10,6 @@ from contextlib import contextmanager, suppress
 
 from softreach.support.arguments import as_function
 
-__all__ = ["Progress", "as_progress", "bar", "hidden", "silent"]
-
 hidden = False
 """No bars and no lines; `softreach --quiet` sets it."""
 

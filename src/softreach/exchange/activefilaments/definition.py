@@ -25,8 +25,6 @@ from softreach.support.errors import InvalidDesign, InvalidInput, Range
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.text import MEGABYTE, read_text, write_text
 
-__all__ = ["FILAMENT_SCRIPT", "design_script", "read_design", "write_design"]
-
 FILAMENT_SCRIPT: Formats = {".jl": FileFormat()}
 """Format of `write_design`."""
 

@@ -27,19 +27,6 @@ from typing import Any
 
 from softreach.support.errors import InvalidInput, NotWritten, warn
 
-__all__ = [
-    "MARK",
-    "Foreign",
-    "StrPath",
-    "check_place",
-    "mend",
-    "place_to_read",
-    "replacing",
-    "replacing_folder",
-    "sync",
-    "writing",
-]
-
 MARK = ".softreach-"
 """Beginning of the names of what is being written, and of its two names at the end."""
 

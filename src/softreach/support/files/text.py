@@ -15,8 +15,6 @@ from softreach.support.files.formats import TABLES, format_of
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["MEGABYTE", "read_text", "text_of", "write_table", "write_text"]
-
 MEGABYTE = 1_000_000
 
 

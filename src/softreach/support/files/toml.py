@@ -10,17 +10,6 @@ from typing import Any
 
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, NotPossible, did_you_mean
 
-__all__ = [
-    "WRONG",
-    "FaultReader",
-    "document_of",
-    "inline_table",
-    "key_text",
-    "tables_of",
-    "unknown_key",
-    "value_text",
-]
-
 WRONG: Any = object()
 """In place of a value that has faults."""
 
