@@ -159,7 +159,7 @@ def leave_one_run_out(
     names = ("inputs", "markers", "run", "order")
     columns = {name: options.pop(name) for name in names if name in options}
     table = read_measurements(arm, data, **columns)
-    if not table.has_runs:
+    if len(table.run_names) < 2:
         raise NotPossible("leaving out a run needs two runs or more: name their column by `run`")
     errors = {}
     for number, name in enumerate(table.run_names):

@@ -164,7 +164,6 @@ def _ordered(places: Array, order: NDArray[np.intp]) -> Array:
 
 
 def _said(found: list[_Order]) -> str:
-    """Exchanges that nothing tells apart from the first."""
     alike = [order.text for order in found if order.miss <= _ALIKE * found[0].miss]
     return f"{' or '.join(alike[:4])} seem to be exchanged, or counted the other way round"
 

@@ -91,11 +91,6 @@ class Measurements:
         """Number of markers."""
         return self.places.shape[1]
 
-    @property
-    def has_runs(self) -> bool:
-        """True if the source said which samples belong together."""
-        return len(self.run_names) > 1
-
     def of(self, rows: NDArray[np.intp] | Mask) -> Measurements:
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
@@ -285,7 +280,6 @@ def _refuse_short(text: str) -> None:
 
 
 def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:
-    """The column that is given, or the first of the usual names."""
     if given is not None:
         if given not in columns:
             raise _missing(what, given, columns)

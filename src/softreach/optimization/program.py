@@ -102,7 +102,6 @@ class Point:
 
     @lazy
     def _tips(self) -> list[Part]:
-        """Tip less place over L of each pose."""
         needs, parts = self.design.problem.requirements, []
         within = needs.within
         for number, (rod, cube) in enumerate(self._by_payload()):
@@ -193,7 +192,6 @@ class Point:
                 yield self._limit(target.name, -1.0, share, target.share, slope)
 
     def _of_design(self) -> Iterator[Part]:
-        """Limits and measures that follow from the design or its set."""
         needs = self.design.problem.requirements
         asked = [
             (name, sense, limit)

@@ -253,11 +253,6 @@ class Search:
         self.report(unit).save(place / "report.html", overwrite=overwrite)
 
     def _design_text(self, each: Candidate) -> str:
-        """A design file whose first lines say where it comes from.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
         arm = self.problem.parameters.arm(each.values)
         pairs = zip(self.goals, each.objectives, strict=bool(each.objectives))
         lines = [
@@ -355,7 +350,6 @@ class Search:
         return str(self.report())
 
     def _repr_html_(self) -> str:
-        """The best design beside the text, for notebooks."""
         from html import escape
 
         from softreach.arm.skin import arm_card

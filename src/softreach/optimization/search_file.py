@@ -239,7 +239,6 @@ class _Reader(FaultReader):
         return WRONG if made is WRONG else list(values)
 
     def _range(self, names: Written, path: str, key: str, value: Any) -> Any:
-        """(low, high), or the text of a tie."""
         if isinstance(value, str) and ":" not in value:
             return value
         ends = value.split(":") if isinstance(value, str) else value

@@ -475,7 +475,6 @@ def _triple(name: str, value: object) -> Triple:
 
 
 def _check_closed(faces: Any, name: str) -> None:
-    """Refuse triangles that leave a hole or do not face the same way."""
     if not len(faces):
         raise NotPossible(f"{name} has no triangles")
     ways = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)

@@ -290,7 +290,6 @@ def _all_keys(numbers: Mapping[str, str]) -> list[str]:
 
 
 def _keys(name: str, unit: str) -> dict[str, str]:
-    """Keys of a number, and the units that they say."""
     units = {each.lower(): each for each in unit_names(unit) if each.isascii()} if unit else {}
     units |= {"over_length": "L"} if unit == "m" else {}
     return {name: ""} | {f"{name}_{suffix}": symbol for suffix, symbol in units.items()}

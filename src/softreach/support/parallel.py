@@ -162,7 +162,6 @@ def _pool(threads: int) -> Iterator[Submit[Any]]:
 
 
 def _drain(pending: set[Future[object]]) -> set[Future[object]]:
-    """Wait for one task at least, raise what it raised, and return those still to come."""
     done, rest = wait(pending, return_when=FIRST_COMPLETED)
     for future in done:
         future.result()

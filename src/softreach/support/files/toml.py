@@ -104,7 +104,6 @@ class FaultReader:
     def _tables(
         self, document: Mapping[str, Any], key: str
     ) -> Iterator[tuple[dict[str, Any], str]]:
-        """The tables of a list, and their paths."""
         raw = document.get(key, [])
         if not isinstance(raw, list):
             self._refuse(key, raw, f"must be tables: write [[{key}]]")
