@@ -43,12 +43,12 @@ def things(trunk):
     plt.close(figure)
 
 
-TABLES = ("ply", "csv", "parquet", "npz", "mat", "vtu", "vtk")
+TABLES = ("ply", "csv", "parquet", "npz", "mat", "vtu")
 CLOUD, MESH = (lambda things: (export_cloud, things["cloud"])), lambda _: (export_mesh, TETRAHEDRON)
 WRITERS = {
     "cloud.zarr": lambda things: (sr.save_cloud, things["cloud"]),
     **{f"cloud.{suffix}": CLOUD for suffix in TABLES},
-    **{f"mesh.{suffix}": MESH for suffix in ("ply", "stl", "obj", "glb", "vtu", "vtk")},
+    **{f"mesh.{suffix}": MESH for suffix in ("ply", "stl", "obj", "glb", "vtu")},
     "arm.stl": lambda things: (export_arm, things["arm"], things["shape"]),
     **{
         f"figure.{suffix}": lambda things: (save_figure, things["figure"])
@@ -277,7 +277,7 @@ UNWRITABLE = {
     f"cloud {TRUNK} --out notes.csv": "must be a file name ending in .zarr",
     f"cloud {TRUNK} --out folder.zarr --overwrite": "never replaced",
     f"volume {TRUNK} --out a.txt": SURFACES,
-    f"reach {TRUNK} --out a.png --out a.txt": ".vtk, .png, .pdf, .svg",
+    f"reach {TRUNK} --out a.png --out a.txt": ".vtu, .png, .pdf, .svg",
     f"show {TRUNK} --out notes.png": THERE,
     f"equilibria {TRUNK} --out notes.png": THERE,
     "payload lce_arm --gravity up --out notes.png": THERE,
@@ -328,7 +328,7 @@ MISSING = {
     "atlas figures a.zarr": ("matplotlib", lacks("matplotlib", "plot")),
     f"volume {TRUNK} --out a.glb": ("trimesh", lacks("trimesh", "export")),
     "export cloud.zarr a.csv": ("pyarrow", lacks("pyarrow", "export")),
-    "export cloud.zarr a.vtk": ("meshio", lacks("meshio", "export")),
+    "export cloud.zarr a.vtu": ("meshio", lacks("meshio", "export")),
     f"reach {TRUNK} --out a.stl --out a.png": (
         "trimesh matplotlib skimage",
         "trimesh and matplotlib and scikit-image; install them with: "

@@ -49,9 +49,9 @@ def export(
 ) -> None:
     """Convert a cloud or an arm for other programs.
 
-    A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu .vtk).
+    A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
-    .glb .vtu .vtk), or the source of a filament of ActiveFilaments.jl (.jl).
+    .glb .vtu), or the source of a filament of ActiveFilaments.jl (.jl).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
     """

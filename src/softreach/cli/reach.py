@@ -42,7 +42,7 @@ def reach(
     out: Annotated[
         list[Path] | None,
         out_option(
-            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), draw slices (.png .pdf .svg), or "
+            "Write the boundary (.ply .stl .obj .glb .vtu), draw slices (.png .pdf .svg), or "
             "the set as a web page that turns (.html). May be repeated."
         ),
     ] = None,

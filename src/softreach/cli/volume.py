@@ -37,7 +37,7 @@ def volume(
     sampling: Sampling = SAMPLING,
     changes: Changes = UNCHANGED,
     out: Annotated[
-        Path | None, out_option("Write the α-shape here: .ply .stl .obj .glb .vtu .vtk")
+        Path | None, out_option("Write the α-shape here: .ply .stl .obj .glb .vtu")
     ] = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
