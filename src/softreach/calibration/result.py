@@ -203,9 +203,9 @@ class Calibration:
         return prediction.places, np.sqrt(np.maximum(square, 0.0))
 
     def draws(self, count: int = 32, seed: int = 0) -> list[Manipulator]:
-        """Arms as likely as the data leaves them, for bands of whatever is computed from an arm.
+        """Arms as likely as the data leaves them, for bands of any quantity of an arm.
 
-        Numbers that the data does not tell stay as they are.
+        Numbers that the data does not determine stay as they are.
         """
         rng = np.random.default_rng(as_integer("seed", seed))
         root = np.linalg.svd(self.uncertainty.covariance, hermitian=True)

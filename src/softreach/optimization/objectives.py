@@ -35,7 +35,7 @@ SETS = {
 """Goals and measures of the reachable set, and what they are called there."""
 
 _COARSE, _FINE = 1 << 12, 1 << 15
-"""Samples of a cloud, for what is asked of one, of coarse and of fine cases."""
+"""Samples of the cloud of coarse and of fine cases."""
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
 
@@ -49,7 +49,7 @@ class Value(NamedTuple):
 
 @dataclass(eq=False)
 class DesignCase:
-    """A design under requirements, and what is asked of it at one accuracy, each computed once."""
+    """A design under requirements at one accuracy; its sets, cloud and check are computed once."""
 
     arm: Manipulator
     requirements: Requirements

@@ -191,7 +191,7 @@ class _Program:
         return parameters.moved(self._start.values, np.clip(reals, low, high))
 
     def point(self, unknowns: Array) -> Point:
-        """All that is asked at some unknowns; a design that poses alone differ at is made once."""
+        """The program at some unknowns; designs that differ in their poses alone are made once."""
         key = unknowns.tobytes()
         if key not in self._points:
             count = len(self._problem.parameters.real)

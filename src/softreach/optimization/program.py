@@ -230,7 +230,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Part:
-    """Equations or inequalities of one requirement, whose derivatives are made when asked for."""
+    """Equations or inequalities of one requirement, whose derivatives are computed at their first use."""
 
     name: str
     """Of the requirement."""

@@ -141,11 +141,9 @@ class _Reader(FaultReader):
         bases = {}
         for name in names:
             file = self._folder / name
-            try:
-                bases[name] = self._design_from(str(file) if of_file and file.is_file() else name)
-            except InvalidInput as error:
-                self._refuse(path, name, f"must be {error.allowed}")
-        return bases
+            place = str(file) if of_file and file.is_file() else name
+            bases[name] = self._tried(path, name, partial(self._design_from, place))
+        return {name: arm for name, arm in bases.items() if arm is not WRONG}
 
     def parameters(
         self, bases: Mapping[str, Manipulator]

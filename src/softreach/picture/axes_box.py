@@ -31,7 +31,7 @@ class Edge(NamedTuple):
 
 
 class Side(NamedTuple):
-    """Side from which a box is seen, as far as its drawing depends on it."""
+    """Side from which a box is seen: all that its drawing depends on."""
 
     visible: tuple[int, int, int]
     """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""

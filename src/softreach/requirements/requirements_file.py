@@ -220,14 +220,7 @@ class _Reader(FaultReader):
     ) -> Any:
         """A number, or several, in SI units under a key with or without its unit; None without.
 
-        Args:
-            raw: The table.
-            path: Its path.
-            name: The key without a unit.
-            unit: SI unit; "" for none.
-            several: A list, in lists if need be.
-            needed: Its absence is a fault.
-            plain: Numbers may go without their unit, which is known.
+        `several` are in lists; `plain` ones may go without their unit.
         """
         known = _keys(name, unit)
         keys = [key for key in known if key in raw]

@@ -11,11 +11,11 @@ from typing import Any
 
 INTERRUPTED = "interrupted: nothing half-written was left behind"
 
-_came: list[int] = []  # signals that asked this process to end
+_came: list[int] = []  # signals to end this process
 
 
 def check_stopped() -> None:
-    """Raise KeyboardInterrupt if a signal has asked for the end; called once an item.
+    """Raise KeyboardInterrupt after a signal to end; called once an item.
 
     Python loses an exception that a handler of signals raises while a finalizer runs.
     """

@@ -1,4 +1,4 @@
-"""Attributes that are computed when first asked for, without a lock."""
+"""Attributes that are computed at their first use, without a lock."""
 
 from __future__ import annotations
 

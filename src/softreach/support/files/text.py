@@ -19,7 +19,7 @@ MEGABYTE = 1_000_000
 
 
 def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
-    """The text of a file in UTF-8, its lines ended by line feeds whatever ended them.
+    """The text of a file in UTF-8, with a line feed at the end of each line.
 
     Args:
         name: What errors call the file.
