@@ -230,7 +230,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Part:
-    """Equations or inequalities of one requirement, whose derivatives are computed at their first use."""
+    """Equations or inequalities of one requirement, differentiated when they are used first."""
 
     name: str
     """Of the requirement."""
