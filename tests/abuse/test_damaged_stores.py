@@ -23,9 +23,10 @@ from softreach import schema
 from softreach.atlas import DamagedStore, atlas_cloud, build_atlas, open_atlas, verify_atlas
 from softreach.atlas.command import Command
 from softreach.atlas.layout import PER_DESIGN
+from softreach.cli.app import run
 from softreach.support.errors import SoftreachError, SoftreachWarning
 from softreach.support.files.stores import Chunk
-from tests.abuse.refusals import files_in, raised_by
+from tests.abuse.refusals import files_in, raised_by, refusal_of
 from tests.atlas.families import TINY, gapped_space
 
 Files = dict[str, bytes]
@@ -40,12 +41,15 @@ def flipped(content: bytes, bit: int | None = None) -> bytes:
 
 
 WAYS: dict[str, Callable[[bytes], bytes | None]] = {
+    "one bit flipped": flipped,
     "cut in half": lambda content: content[: len(content) // 2],
+    "a byte longer": lambda content: content + b"\0",
     "empty": lambda _: b"",
+    "of zeros": lambda content: bytes(len(content)),
     "nested too deeply": lambda _: b"[" * 100_000,
     "missing": lambda _: None,
 }
-MENDED = "cut in half", "missing"
+MENDED = "one bit flipped", "missing"
 """Ways after which the atlas is built again; the other ways are found out the same way."""
 
 
@@ -241,6 +245,21 @@ def test_the_same_command_says_which_design_it_computes_again(atlas_files, tmp_p
         assert verify_atlas(place).damaged == left
 
 
+def test_commands_name_what_is_damaged(cloud_files, atlas_files, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written(cloud_files, Path("cloud.zarr"), "tip/c/0/0", flipped(cloud_files["tip/c/0/0"]))
+    assert "chunk 0/0 of array tip" in refusal_of(["volume", "cloud.zarr"], capsys, tmp_path)
+    written(atlas_files, Path("a.zarr"), TIP, flipped(atlas_files[TIP]))
+    assert run(["atlas", "verify", "a.zarr"]) == 2
+    printed = capsys.readouterr()
+    assert "chunk 0/0/0/0 of array tip" in printed.out
+    assert printed.err.count("\n") == 1
+    assert "the command that built the atlas" in printed.err
+    written(atlas_files, Path("b.zarr"), "taper/c/0", None)
+    arguments = ["atlas", "best", "b.zarr", "reach_height"]
+    assert "array taper" in refusal_of(arguments, capsys, tmp_path)
+
+
 def test_a_store_that_is_replaced_while_it_is_read_is_not_mixed(cloud, tmp_path, monkeypatch):
     place = tmp_path / "cloud.zarr"
     sr.save_cloud(cloud, place)
@@ -310,12 +329,21 @@ def test_an_atlas_gives_way_to_a_cloud_only_if_one_says_so(cloud, atlas_files, t
 CHANGES: dict[str, Callable[[xr.Dataset], object]] = {
     "no coordinate axis": lambda cloud: cloud.drop_vars("axis"),
     "bundles of other names": lambda cloud: cloud.assign_coords(bundle=["a", "b", "c"]),
+    "fewer bundles": lambda cloud: cloud.isel(bundle=[0, 1]),
     "another status": lambda cloud: schema.with_status(cloud, np.full(64, 9, np.int8)),
+    "complex numbers beside": lambda cloud: cloud.assign(more=("sample", np.ones(64, complex))),
     "no dataset": lambda cloud: cloud.to_dict(),
+    "another length": lambda cloud: cloud.assign(tip=cloud.tip.assign_attrs(length=2.0)),
+    "complex tips": lambda cloud: cloud.assign(tip=cloud.tip.astype(complex)),
+    "activations of texts": lambda cloud: cloud.assign(activation=cloud.activation.astype("U4")),
     "a status of floats": lambda cloud: cloud.assign(status=cloud.status.astype(np.float32)),
     "no design": lambda cloud: cloud.assign_attrs(design=None),
+    "another design": lambda cloud: cloud.assign_attrs(design=sr.designs.lce_arm().to_toml()),
     "another schema": lambda cloud: cloud.assign_attrs(schema_version=1),
+    "no version": lambda cloud: cloud.assign_attrs(softreach_version=None),
+    "a sampler that is none": lambda cloud: cloud.assign_attrs(sampler=True),
     "a seed of a half": lambda cloud: cloud.assign_attrs(seed=0.5),
+    "a tolerance of NaN": lambda cloud: cloud.assign_attrs(tol=float("nan")),
 }
 
 

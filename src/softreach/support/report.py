@@ -16,6 +16,8 @@ from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
 from softreach.support.quantity import columns
 
+__all__ = ["REPORT", "Report", "Section", "check_libraries", "page_template", "png_source"]
+
 REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
 
