@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.kernels.points.point_distances import distances_to_faces
+from softreach.kernels.points.triangles import distances_to_faces
 from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 from softreach.support.errors import MissingExtra

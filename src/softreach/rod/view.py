@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
-from softreach.kernels.rod.placing import move, turn
+from softreach.kernels.rod.frames import move, turn
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.tip_map import (
