@@ -198,7 +198,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
         rod.fill(running.trial[:n], tips[:n], ahead[:n])
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, *bounds)
+        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
         slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
         low, high = running.low[:n], running.high[:n]
         multiplier[:n] = 0.0
