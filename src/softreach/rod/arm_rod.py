@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass
 from threading import RLock
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,8 @@ class ArmRod(TipMap):
 
     arm: Manipulator
     tol: float = 1e-6
+    fixed_steps: int | None = None
+    """Steps along the arm, if nothing breaks it, in place of those that `tol` needs."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tol", check_tol(self.tol))
@@ -70,10 +72,6 @@ class ArmRod(TipMap):
                 least[block] = np.minimum(extension, growth).min(axis=1)
                 most[block] = (growth * bend * step).max(axis=1)
         return least, most
-
-    @abstractmethod
-    def in_steps(self, steps: int) -> Self:
-        """The rod in so many steps, whatever its tolerance; none of its own are sought."""
 
     @abstractmethod
     def _prepare(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,20 +52,16 @@ class FreeRod(ArmRod):
     @lazy
     def _fineness(self) -> int:
         """Uniform steps in S, of which none may be longer."""
-        return self.rule.steps_for(self.tol)
+        return self.fixed_steps or self.rule.steps_for(self.tol)
 
     @lazy
     def _shape_steps(self) -> int:
         """Steps with which `tol` holds all along the arm, and directors lose no digits."""
-        return max(self._fineness, self.rule.steps_for_shapes(self.tol))
+        return self.fixed_steps or max(self._fineness, self.rule.steps_for_shapes(self.tol))
 
     @lazy
     def _table(self) -> Array:
         return self.rule.packed_nodes(self._fineness)
-
-    def in_steps(self, steps: int) -> Self:
-        vars(self).update(_fineness=steps, _shape_steps=steps)
-        return self
 
     def _prepare(self) -> None:
         self._table  # noqa: B018

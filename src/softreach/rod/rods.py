@@ -123,12 +123,10 @@ def _new(arm: Manipulator, tol: float, frame: Frame, steps: int | None = None) -
         assert isinstance(rod, ArmRod)
         return PlacedRod(rod)
     if arm.loads is None:
-        rod = FreeRod(arm, tol)
-    else:
-        from softreach.rod.loaded.rod import LoadedRod
+        return FreeRod(arm, tol, steps)
+    from softreach.rod.loaded.rod import LoadedRod
 
-        rod = LoadedRod(arm, tol)
-    return rod if steps is None else rod.in_steps(steps)
+    return LoadedRod(arm, tol, steps)
 
 
 @lru_cache(maxsize=64)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -101,12 +100,13 @@ class LoadedRod(ArmRod):
     @lazy
     def _tip_steps(self) -> int | None:
         """Steps with which `tol` holds for tips, if any are enough, theory (72)."""
-        return self._fewest(self.tables.phase.fewest_steps, tip_differences)
+        fewest = self.tables.phase.fewest_steps
+        return self.fixed_steps or self._fewest(fewest, tip_differences)
 
     @lazy
     def _shape_steps(self) -> int | None:
         """Steps with which `tol` holds all along the arm, if any are enough."""
-        return self._fewest(self.steps, shape_differences)
+        return self.fixed_steps or self._fewest(self.steps, shape_differences)
 
     def _fewest(self, steps: int, differences: Differences) -> int | None:
         gamma = pilot_activations(self.arm, self.box)
@@ -134,10 +134,6 @@ class LoadedRod(ArmRod):
     @lazy
     def _shape_solver(self) -> Solver:
         return self._solver_of(checked(self._shape_steps, self.tol))
-
-    def in_steps(self, steps: int) -> Self:
-        vars(self).update(_tip_steps=steps, _shape_steps=steps)
-        return self
 
     def _prepare(self) -> None:
         self.postures  # noqa: B018
