@@ -11,15 +11,15 @@ import softreach as sr
 from softreach.arm import Chamber, LinearTaper, Loads, Material, Ring, Section, Tendon, designs
 from softreach.rod import tip_positions
 from softreach.rod.free import FreeRod
-from softreach.rod.rods import in_steps, tip_map
-from softreach.rod.view import activation_measures, free_bundles, measured_bundles
+from softreach.rod.inputs import activation_measures
+from softreach.rod.rods import free_bundles, in_steps, measured_bundles, tip_map
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.laws import in_box
 
 
 def test_an_arm_without_loads_is_a_free_rod(trunk):
-    assert tip_map(trunk) == FreeRod(trunk, 1e-6)
+    assert tip_map(trunk).rod == FreeRod(trunk, 1e-6)
 
 
 def test_equal_arms_and_tolerances_share_one_tip_map(trunk):

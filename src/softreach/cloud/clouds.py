@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import all_inputs, tip_map, with_unstable
 from softreach.rod.tip_map import BLOCK, Frame, TipMap
-from softreach.rod.view import View
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
@@ -89,8 +88,7 @@ def compute_cloud(
             says what to use instead.
     """
     report = None if progress is None else as_function("progress", progress)
-    rod = tip_map(arm, tol, frame=frame)
-    rod = rod.base if isinstance(rod, View) else rod  # that of all bundles, each in its own unit
+    rod = with_unstable(all_inputs(tip_map(arm, tol, frame=frame)))
     bundles = rod.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)

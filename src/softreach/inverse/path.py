@@ -12,9 +12,8 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.descent import descend
 from softreach.inverse.request import allowance, as_activations, as_residual, as_targets
 from softreach.inverse.solve import solve_inverse
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import free_bundles, measured_bundles, tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
@@ -77,7 +76,7 @@ def track_path(
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
     residual = as_residual(residual_over_length)
-    tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
+    tracker = Continuation(free_bundles(rod), residual * rod.length)
     if start is not None:
         gamma = as_activations("start", start, rod.box, 1)[0]
         gamma = gamma / rod.measures[rod.box.free]

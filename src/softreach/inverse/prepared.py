@@ -18,9 +18,8 @@ from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
-from softreach.rod.rods import coarsened, tip_map
+from softreach.rod.rods import coarsened, free_bundles, measured_bundles, tip_map
 from softreach.rod.tip_map import Frame, TipMap
-from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -53,11 +52,8 @@ class PreparedMap:
 
     @lazy
     def rod(self) -> TipMap:
-        """The tip map of the free bundles; held ones are no variables of any search.
-
-        Where an arm under loads has no stable equilibrium, it is NaN.
-        """
-        return free_bundles(stable_tips(self.whole))
+        """The tip map of the free bundles; held ones are no variables of any search."""
+        return free_bundles(self.whole)
 
     @lazy
     def coarse_rod(self) -> TipMap:

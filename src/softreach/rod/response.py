@@ -18,7 +18,7 @@ from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
-from softreach.rod.arm_rod import ArmRod
+from softreach.rod.free import ArmRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput
@@ -238,7 +238,7 @@ def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
     status = np.zeros(len(gamma), np.int8)
     ascending = np.clip(z[order], 0.0, rod.length)
     if isinstance(rod, LoadedRod):
-        shapes = rod.shapes(gamma, ascending, status)
+        shapes = rod.loaded_shapes(gamma, ascending, status)
         frames, moment = shapes.frames, shapes.moment[:, back]
     else:
         frames = rod.frames(gamma, ascending, status)
