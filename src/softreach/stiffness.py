@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.free import ArmRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import of_tip, tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
@@ -184,11 +184,10 @@ def yielding_rod(rod: TipMap) -> LoadedRod:
 
     Without loads nothing weighs on it.
     """
-    own = tip_map(rod)
-    is_whole = own.inputs.is_plain and own.point is None
-    if isinstance(own.rod, LoadedRod) and is_whole:
+    own = of_tip(rod)
+    if isinstance(own.rod, LoadedRod) and own.inputs.is_plain:
         return own.rod
-    if not isinstance(own.rod, ArmRod) or not is_whole:
+    if not isinstance(own.rod, ArmRod) or not own.inputs.is_plain:
         raise InvalidInput("arm", repr(rod), "a Manipulator, or the tip map that it has")
     return _without_loads(own.rod.arm, own.rod.tol)
 

@@ -59,6 +59,7 @@ def compute_cloud(
     sampler: str = "uniform",
     tol: float = 1e-6,
     frame: Frame = "world",
+    point: str | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Sample the activation box and compute the tip of each sample (section 3).
@@ -75,6 +76,8 @@ def compute_cloud(
         tol: Largest tip error, in L.
         frame: In which tips are told: that of the "world", or of the "base", whose z is along the
             straight arm. The attributes hold it, and the pose of the base.
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
         progress: Called with the number of samples done since its last call; by default a bar is
             shown on a terminal when the cloud is large.
 
@@ -88,7 +91,7 @@ def compute_cloud(
             says what to use instead.
     """
     report = None if progress is None else as_function("progress", progress)
-    rod = with_unstable(all_inputs(tip_map(arm, tol, frame=frame)))
+    rod = with_unstable(all_inputs(tip_map(arm, tol, frame=frame, point=point)))
     bundles = rod.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)

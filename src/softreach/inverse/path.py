@@ -39,6 +39,7 @@ def track_path(
     *,
     residual_over_length: float = 1e-10,
     tol: float = 1e-6,
+    point: str | None = None,
 ) -> xr.Dataset:
     """Follow a path of tip positions, straight between its points, on one branch.
 
@@ -57,6 +58,8 @@ def track_path(
             bounds do not let the tip come so near, a point is followed by the nearest tip as far as
             `tol`: whether the arm reaches it is more than its tips can say.
         tol: Largest error of the tips themselves, in L. A tip map keeps its own.
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
 
     Returns:
         Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
@@ -70,7 +73,7 @@ def track_path(
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
     points = as_targets("path", path)
-    rod = measured_bundles(tip_map(arm, tol))
+    rod = measured_bundles(tip_map(arm, tol, point=point))
     if rod.box.dimension < 3:
         raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
     if not len(points):

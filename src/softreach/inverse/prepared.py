@@ -131,6 +131,7 @@ def prepared_map(
     *,
     cells: int = _CELLS,
     frame: Frame = "world",
+    point: str | None = None,
 ) -> PreparedMap:
     """Prepare an arm for `solve_inverse`; the last four are remembered.
 
@@ -139,6 +140,8 @@ def prepared_map(
         tol: Largest tip error, in L.
         cells: With three free bundles: cells along each axis of the activation box.
         frame: In which targets are told: that of the "world" or of the "base".
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
 
     Raises:
         InvalidInput: Numbers out of range, or an arm that was prepared in another frame.
@@ -149,7 +152,7 @@ def prepared_map(
             hint = "prepare the arm with this frame"
             raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
-    return _of_map(measured_bundles(tip_map(arm, tol, frame=frame)), cells)
+    return _of_map(measured_bundles(tip_map(arm, tol, frame=frame, point=point)), cells)
 
 
 @lru_cache(maxsize=4)

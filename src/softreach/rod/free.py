@@ -56,8 +56,6 @@ class ArmRod(TipMap):
     tol: float = 1e-6
     fixed_steps: int | None = None
     """Steps along the arm, if nothing breaks it, in place of those that `tol` needs."""
-    point: Marker | None = None  # pyright: ignore[reportIncompatibleMethodOverride]
-    """The marker that stands for the tip; None for the tip."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tol", check_tol(self.tol))
@@ -72,6 +70,10 @@ class ArmRod(TipMap):
     def box(self) -> ActivationBox:
         """The activations within bounds."""
         return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
+
+    @property
+    def point(self) -> Marker | None:
+        return self.arm.pointed
 
     @lazy
     def end(self) -> float:
@@ -112,6 +114,13 @@ class ArmRod(TipMap):
                 least[block] = np.minimum(extension, growth).min(axis=1)
                 most[block] = (growth * bend * step).max(axis=1)
         return least, most
+
+    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
+        """Frames at ascending stations Z [m], and m in the directors there [N m], (n, station, 3).
+
+        Without loads there is none.
+        """
+        return self.frames(gamma, z, status), np.zeros((len(gamma), len(z), 3))
 
     @abstractmethod
     def _prepare(self) -> None:

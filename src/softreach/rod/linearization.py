@@ -77,8 +77,9 @@ class Linearization:
         """Bounds for a point at a distance from the center of the section at Z = end [m]."""
         # Even in S, in which the response of a tapered arm is even.
         s = np.linspace(0.0, arm.profile.slender_length, _STATIONS)
-        table = tables(arm, both_sides(arm, arm.profile.station(s)))
-        if end < arm.length or reach > 0.0:
+        z = both_sides(arm, arm.profile.station(s))
+        table = tables(arm, np.minimum(z, end) if end < arm.length else z)
+        if reach > 0.0:
             table = _with_rigid_end(table, end, reach)
         self.stations, self.curvature = table.stations, table.curvature
         self.extension, self.stretch = table.extension, np.abs(table.extension)
@@ -168,15 +169,15 @@ class Linearization:
 
 
 def _with_rigid_end(table: Tables, end: float, reach: float) -> Tables:
-    """Tables up to a section, and beyond it a straight piece that nothing deforms."""
-    z = np.concatenate([np.minimum(table.stations, end), [end, end + reach]])
+    """Tables with a straight piece beyond the end that nothing deforms [m]."""
+    z = np.concatenate([table.stations, [end, end + reach]])
 
     def ending(values: Array) -> Array:
         return np.concatenate([values, np.zeros_like(values[:2])])
 
     extension = ending(table.extension)
     growth = extension if table.growth is table.extension else ending(table.growth)
-    return Tables(z, extension, growth, ending(table.curvature))
+    return Tables(z, extension, ending(table.curvature), growth)
 
 
 def _signs(count: int) -> Array:

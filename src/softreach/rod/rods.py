@@ -29,7 +29,7 @@ from softreach.rod.tip_map import (
     drop,
 )
 from softreach.support.arguments import as_flag, as_given, as_instance, as_one_of
-from softreach.support.errors import InvalidInput, did_you_mean
+from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
 
@@ -41,6 +41,7 @@ __all__ = [
     "free_bundles",
     "in_steps",
     "measured_bundles",
+    "of_tip",
     "refined",
     "tip_map",
     "with_unstable",
@@ -244,8 +245,8 @@ def tip_map(
         tol: Largest tip error, in L.
         frame: Frame of places: the "world", or that of the "base", whose z is
             along the straight arm. That of a tip map, if it is not of the world, counts.
-        point: Name of the marker whose places count as those of the tip; by default the tip, or
-            the point of a tip map.
+        point: Name of the marker that counts as the tip; by default that of the design, or of a
+            tip map.
         warn: Whether to warn of loads beyond what was verified.
 
     Raises:
@@ -255,31 +256,21 @@ def tip_map(
     as_one_of("frame", frame, ("world", "base"))
     if not isinstance(arm, Manipulator | TipMap):
         raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
-    marker = None if point is None else _marker(arm, point)
     if isinstance(arm, TipMap):
         known = arm if isinstance(arm, ArmMap) else ArmMap.of(arm)
-        known = replace(known, pose=UPRIGHT) if frame == "base" != known.frame else known
-        return known if marker in (None, known.point) else _at(known, known.tol, marker)
-    found = _of_arm(arm, check_tol(tol), frame, marker)
+        return replace(known, pose=UPRIGHT) if frame == "base" != known.frame else known
+    found = _of_arm(arm.at_point(point), check_tol(tol), frame)
     if as_flag("warn", warn) and arm.loads is not None:
         _warn_of_large_loads(arm)
     return found
 
 
-def _marker(arm: Manipulator | TipMap, name: object) -> Marker:
-    markers = {m.name: m for m in (arm if isinstance(arm, Manipulator) else arm.arm).markers}
-    if isinstance(name, str) and name in markers:
-        return markers[name]
-    allowed = f"a marker of the arm: {', '.join(markers)}" if markers else "left out: it has none"
-    raise InvalidInput("point", name, allowed, did_you_mean(str(name), markers))
-
-
-def _at(known: ArmMap, tol: float, point: Marker | None) -> ArmMap:
-    """The map of the same arm to another tolerance or of another point."""
+def _to_tolerance(rod: TipMap, tol: float) -> TipMap:
+    known = tip_map(rod)
     if not isinstance(known.rod, ArmRod):
-        return known
-    inputs = known.inputs if tol == known.tol else known.inputs.to_tolerance(tol)
-    return replace(known, rod=_known_rod(known.rod.arm, tol, point), inputs=inputs)
+        return rod
+    inputs = known.inputs.to_tolerance(tol)
+    return replace(known, rod=_known_rod(known.rod.arm, tol), inputs=inputs)
 
 
 def refined(rod: TipMap, tol: float) -> TipMap:
@@ -289,7 +280,7 @@ def refined(rod: TipMap, tol: float) -> TipMap:
         rod: The tip map; one that is of no arm stays as it is.
         tol: Largest tip error, in L.
     """
-    return rod if rod.tol <= check_tol(tol) else _at(tip_map(rod), tol, rod.point)
+    return rod if rod.tol <= check_tol(tol) else _to_tolerance(rod, tol)
 
 
 def coarsened(rod: TipMap, tol: float) -> TipMap:
@@ -299,7 +290,7 @@ def coarsened(rod: TipMap, tol: float) -> TipMap:
         rod: The tip map; one that is of no arm stays as it is.
         tol: Largest tip error, in L.
     """
-    return rod if rod.tol >= check_tol(tol) else _at(tip_map(rod), tol, rod.point)
+    return rod if rod.tol >= check_tol(tol) else _to_tolerance(rod, tol)
 
 
 def effective(rod: TipMap) -> TipMap:
@@ -340,6 +331,17 @@ def with_unstable(rod: TipMap) -> ArmMap:
     return replace(tip_map(rod), unstable=True)
 
 
+def of_tip(rod: TipMap) -> ArmMap:
+    """The tip map, for what is known of tips alone.
+
+    Raises:
+        InvalidInput: A marker stands for its tip.
+    """
+    if rod.point is not None:
+        raise InvalidInput("point", rod.point.name, "left out: this is known of the tip alone")
+    return tip_map(rod)
+
+
 def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
     """The tip map of an arm in so many steps, which are not checked against its tolerance.
 
@@ -349,17 +351,16 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
     Args:
         arm: The design.
         steps: Along the arm, if nothing breaks it.
-        like: A tip map whose tolerance, frame, point and effective inputs it has.
+        like: A tip map whose tolerance, frame and effective inputs it has.
     """
-    driving, point = tip_map(like).inputs.driving, like.point
-    marker = None if point is None else _marker(arm, point.name)
-    found = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, marker, steps))
+    driving = tip_map(like).inputs.driving
+    found = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
     return effective(found) if driving is not None and driving.is_effective else found
 
 
 @lru_cache(maxsize=64)
-def _of_arm(arm: Manipulator, tol: float, frame: Frame, point: Marker | None) -> ArmMap:
-    return _made(arm, tol, frame, _known_rod(inner_arm(arm), tol, point))
+def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> ArmMap:
+    return _made(arm, tol, frame, _known_rod(inner_arm(arm), tol))
 
 
 def _made(arm: Manipulator, tol: float, frame: Frame, rod: ArmRod) -> ArmMap:
@@ -368,16 +369,16 @@ def _made(arm: Manipulator, tol: float, frame: Frame, rod: ArmRod) -> ArmMap:
 
 
 @lru_cache(maxsize=64)
-def _known_rod(inner: Manipulator, tol: float, point: Marker | None) -> ArmRod:
-    return _rod(inner, tol, point)
+def _known_rod(inner: Manipulator, tol: float) -> ArmRod:
+    return _rod(inner, tol)
 
 
-def _rod(inner: Manipulator, tol: float, point: Marker | None, steps: int | None = None) -> ArmRod:
+def _rod(inner: Manipulator, tol: float, steps: int | None = None) -> ArmRod:
     if inner.loads is None:
-        return FreeRod(inner, tol, steps, point)
+        return FreeRod(inner, tol, steps)
     from softreach.rod.loaded.rod import LoadedRod
 
-    return LoadedRod(inner, tol, steps, point)
+    return LoadedRod(inner, tol, steps)
 
 
 @lru_cache(maxsize=64)

@@ -38,7 +38,7 @@ from softreach.rod.loaded.phase import SHOT_AT_ONCE
 from softreach.rod.loaded.ring import NEUTRAL, SYMMETRIC
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.rods import ArmMap, all_inputs, tip_map, with_unstable
+from softreach.rod.rods import ArmMap, all_inputs, of_tip, tip_map, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip
 from softreach.support.arrays import as_floats
@@ -99,7 +99,7 @@ class AllEquilibria:
         together = np.union1d(z, marker_sections(rod.arm))
         shapes = self.solver.shapes_facing(inner, self.directions, together)[0]
         frames = rod.placed(shapes.frames)
-        strains = loaded.strains_under(inner, together, shapes.moment, shapes.force)
+        strains = loaded.strains_under(inner, together, shapes)
         places = marked(rod.arm, together, frames)
         rows = np.searchsorted(together, z)
         shapes = Shapes(*(values[:, rows] for values in (*frames, *strains)))
@@ -181,7 +181,7 @@ def equilibria(
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
     """
-    asked = tip_map(arm, tol, warn=False)  # the degree tells whether any is missing
+    asked = of_tip(tip_map(arm, tol, warn=False))  # the degree tells whether any is missing
     gamma = asked.inputs.every(_one(asked, activations))
     rod = with_unstable(all_inputs(asked))
     if not rod.supports_unstable:

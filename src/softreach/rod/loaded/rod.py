@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,9 +32,17 @@ from softreach.rod.loaded.steps import (
     tip_differences,
 )
 from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
+from softreach.rod.response import (
+    NodeTables,
+    linear_response,
+    node_tables,
+    rod_state,
+    step_grid,
+)
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
+    Frames,
     Shapes,
     Status,
     Strains,
@@ -46,9 +53,6 @@ from softreach.rod.tip_map import (
 )
 from softreach.support import parallel
 from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    from softreach.rod.response import NodeTables
 
 __all__ = ["LoadedRod"]
 
@@ -146,7 +150,7 @@ class LoadedRod(ArmRod):
     def continued_from(self, gamma: Array) -> LoadedRod:
         frame = self.equilibria(gamma).frame
         postures = self.postures.continued_from(gamma, frame)
-        rod = _ContinuedRod(self.arm, self.tol, self.fixed_steps, self.point)
+        rod = _ContinuedRod(self.arm, self.tol, self.fixed_steps)
         vars(rod).update({"origin": self, **vars(self), "postures": postures})
         return rod
 
@@ -202,8 +206,6 @@ class LoadedRod(ArmRod):
 
     def _section_twists(self, gamma: Array) -> Array:
         """(v, ω) of the section of a marker per unit of each activation, shape (n, 6, bundles)."""
-        from softreach.rod.response import linear_response, rod_state  # of rods
-
         state = rod_state(self, gamma, self._node_tables)
         response = linear_response(self._node_tables, state, [])
         turns = response.turns[:, 0]
@@ -212,8 +214,6 @@ class LoadedRod(ArmRod):
 
     @lazy
     def _node_tables(self) -> NodeTables:
-        from softreach.rod.response import node_tables, step_grid  # of rods
-
         z = np.array([self.end])
         grid = step_grid(self.arm, z, max(_RESPONSE_STEPS, self.steps))
         return node_tables(self.arm, z, grid)
@@ -244,14 +244,14 @@ class LoadedRod(ArmRod):
         """
         gamma = self.box.check(activations)
         z, at, found = np.asarray(framed, float), np.asarray(strained, float), self._found(gamma)
-        (position, directors), moment, force = self._walked(found, z, status)
+        framed_shapes = strained_shapes = self._walked(found, z, status)
         if not np.array_equal(z, at):
-            _, moment, force = self._walked(found, at, status)
-        return Shapes(position, directors, *self.strains_under(gamma, at, moment, force))
+            strained_shapes = self._walked(found, at, status)
+        return Shapes(*framed_shapes.frames, *self.strains_under(gamma, at, strained_shapes))
 
-    def loaded_shapes(self, gamma: Array, z: Array, status: Status | None) -> LoadedShapes:
-        """Shapes with forces and moments at ascending stations."""
-        return self._walked(self._found(gamma), z, status)
+    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
+        shapes = self._walked(self._found(gamma), z, status)
+        return shapes.frames, shapes.moment
 
     def _found(self, gamma: Array) -> tuple[Array, NDArray[np.intp], Equilibria]:
         gamma, lost = self.with_arms(gamma)
@@ -270,13 +270,13 @@ class LoadedRod(ArmRod):
         drop(lost, status, *shapes.frames, shapes.moment, shapes.force)
         return shapes
 
-    def strains_under(self, gamma: Array, z: Array, moment: Array, force: Array) -> Strains:
-        """The strains at stations Z [m], from m and n in the directors there."""
+    def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
+        """The strains at stations Z [m], from m and n in the directors of the shapes there."""
         axial, bending, torsion = _compliance_at(self.body, z.tobytes())
         u, extension, growth = linear_strains(tables_at(self.arm, z), gamma)
-        extension = extension + growth * force[..., 2] * axial
+        extension = extension + growth * shapes.force[..., 2] * axial
         yielded = np.stack([bending, bending, torsion], axis=1)
-        return per_length(u + moment * yielded, extension, growth)
+        return per_length(u + shapes.moment * yielded, extension, growth)
 
 
 @lru_cache(maxsize=64)
