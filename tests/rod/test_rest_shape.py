@@ -18,7 +18,7 @@ from softreach.arm.loads import PointLoad
 from softreach.forces import blocked_force
 from softreach.rest import rest
 from softreach.rod import tip_map
-from softreach.rod.arm_shape import rest_configuration
+from softreach.rod.kinematics import rest_configuration
 from softreach.rod.rods import free_bundles
 from softreach.stiffness import cloud_compliance, tip_compliance
 from softreach.support.errors import InvalidInput

@@ -6,7 +6,7 @@ otherwise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +31,7 @@ __all__ = [
     "marked",
     "marker_positions",
     "marker_sections",
+    "rest_configuration",
     "shape_dataset",
     "stations_along",
     "tip_jacobian",
@@ -190,6 +191,34 @@ def configuration(
     if rod.supports_unstable:
         dataset = schema.with_status(dataset, status)
     return dataset.isel(sample=0) if values.ndim == 1 else dataset
+
+
+def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
+    """The arm before activation: straight from its base, directors along the axes of that.
+
+    Args:
+        arm: The design.
+        stations: Number of stations, evenly spaced in Z.
+    """
+    z = np.linspace(0.0, arm.length, stations)
+    straight = np.zeros((1, stations, 3))
+    straight[..., 2] = z
+    directors = np.tile(np.eye(3), (1, stations, 1, 1))
+    nodes = len(quadrature(body_of(arm))[0])
+    straight_lines = lengths_of_strains(arm, np.zeros((1, nodes, 3)), np.ones((1, nodes)))
+    lines: dict[str, Any] = {"line_length": straight_lines} if arm.bundles else {}
+    shape = schema.configuration_dataset(
+        arm,
+        np.zeros((1, arm.inputs)),
+        z,
+        position=arm.base.to_world(straight),
+        directors=arm.base.directions_to_world(directors),
+        curvature=np.zeros((1, stations, 3)),
+        extension=np.ones((1, stations)),
+        radius=arm.profile.radius(z),
+        **lines,
+    )
+    return shape.isel(sample=0)
 
 
 def shape_dataset(
