@@ -85,7 +85,7 @@ class ArmRod(TipMap):
         """The point from the center of its section, in the directors [m], shape (3,)."""
         return np.zeros(3) if self.point is None else np.array(self.point.offset)
 
-    @property
+    @lazy
     def reach(self) -> float:
         """Distance of the point from the center of its section [m]."""
         return float(np.linalg.norm(self.offset))

@@ -108,7 +108,7 @@ class Inputs:
         """True if x are all inputs in their own units."""
         return len(self.free) == len(self.scale) and all(factor == 1.0 for factor in self.scale)
 
-    @property
+    @lazy
     def are_activations(self) -> bool:
         """True if γ(x) = x."""
         return self.is_plain and self.driving is None

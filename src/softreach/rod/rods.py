@@ -97,7 +97,7 @@ class ArmMap(TipMap):
     def steps(self) -> int:
         return self.rod.steps
 
-    @property
+    @lazy
     def supports_unstable(self) -> bool:
         return self.rod.supports_unstable
 
@@ -117,6 +117,8 @@ class ArmMap(TipMap):
             self.inputs.activations(self.box.low[None])
 
     def continued_from(self, gamma: Array) -> TipMap:
+        if not self.supports_unstable:
+            return self
         activation = self.inputs.activations(gamma)
         rod = self.rod.continued_from(activation)
         if rod is self.rod:
@@ -134,6 +136,10 @@ class ArmMap(TipMap):
         directions: Array | None = None,
     ) -> None:
         """Put tips, and what else is asked for, of inputs into place."""
+        if self._is_rod:
+            others = {"twists": twists, "status": status, "directions": directions}
+            self.rod.fill(gamma, tips, slopes, **others)
+            return
         wanted, of_drives = (slopes, twists), None
         if slopes is None and twists is None:
             inner = self.inputs.activations(gamma)
@@ -154,6 +160,12 @@ class ArmMap(TipMap):
             if room is not None and values is not None and room is not values:
                 self.inputs.along_x(room, of_drives, values)
         self._drop(lost, status, tips, slopes, twists, directions)
+
+    @lazy
+    def _is_rod(self) -> bool:
+        """True if nothing changes of what the rod gives."""
+        is_whole = self.unstable or not self.supports_unstable
+        return is_whole and self.inputs.are_activations and self.pose.is_identity
 
     def _known(self, inner: Array) -> tuple[Array, NDArray[np.intp]]:
         """Activations with the lower bounds where no tensions were found, and their rows."""
@@ -323,12 +335,16 @@ def measured_bundles(rod: TipMap) -> TipMap:
 def all_inputs(rod: TipMap) -> ArmMap:
     """The tip map of all inputs of an arm, each in its own unit."""
     known = tip_map(rod)
+    if known.inputs.is_plain:
+        return known
     return replace(known, inputs=Inputs.of(known.inputs.whole, known.inputs.driving))
 
 
 def with_unstable(rod: TipMap) -> ArmMap:
     """The tip map that has tips of unstable equilibria, too."""
-    return replace(tip_map(rod), unstable=True)
+    known = tip_map(rod)
+    is_there = known.unstable or not known.supports_unstable
+    return known if is_there else replace(known, unstable=True)
 
 
 def of_tip(rod: TipMap) -> ArmMap:

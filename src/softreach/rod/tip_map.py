@@ -155,7 +155,7 @@ class TipMap(ABC):
         """The frame in which the map tells places and takes directions."""
         return "world"
 
-    @property
+    @lazy
     def supports_unstable(self) -> bool:
         """True if a tip can have another status than stable."""
         return False

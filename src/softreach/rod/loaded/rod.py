@@ -71,7 +71,7 @@ class LoadedRod(ArmRod):
     The equilibrium is the posture that the arm comes to when it hangs first and is then activated.
     """
 
-    @property
+    @lazy
     def supports_unstable(self) -> bool:
         return True
 
