@@ -48,13 +48,8 @@ class Mapped(TipMap):
             moved[:, k] += 1j * STEP
             slopes[:, :, k] = np.imag(self.of(moved)) / STEP
 
-    def frames(self, activations, stations, status=None):
+    def shapes(self, activations, framed, strained, status=None):
         raise NotImplementedError
-
-    def strains_at(self, stations):
-        raise NotImplementedError
-
-    strain_range = strains_at
 
 
 def columns(*each: np.ndarray) -> np.ndarray:

@@ -56,6 +56,7 @@ def solve_inverse(
     seed: int = 0,
     tol: float = 1e-6,
     frame: Frame = "world",
+    point: str | None = None,
 ) -> Solutions:
     """The activations that put the tip at each target, or as near to it as the arm can reach.
 
@@ -94,6 +95,8 @@ def solve_inverse(
             keeps its own.
         frame: In which targets and directions are told: that of the "world", or of the "base",
             whose z is along the straight arm.
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
 
     Returns:
         One `Solution` for each target; failures are its status, never an exception.
@@ -101,7 +104,7 @@ def solve_inverse(
     Raises:
         InvalidInput: Arguments of another shape, not finite, or out of range.
     """
-    prepared = prepared_map(arm, tol, frame=frame)
+    prepared = prepared_map(arm, tol, frame=frame, point=point)
     points, box = as_targets("targets", targets), prepared.whole.box
     preferred = np.zeros(box.bundles) if near is None else near
     unit = None if direction is None else as_directions("direction", direction, len(points))

@@ -17,7 +17,6 @@ from softreach.kernels.box.bounded_descent import (
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap
-from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
@@ -151,7 +150,7 @@ def nearest_tips(
         enough: Distance at which a target counts as reached [m].
         stop: When to give up.
     """
-    rod, gamma = stable_tips(rod), np.ascontiguousarray(start)
+    gamma = np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
 
     def task(block: slice) -> None:
