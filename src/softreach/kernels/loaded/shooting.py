@@ -206,70 +206,63 @@ def _store(w, nodes, work, first, here, tiny, out):
             out[row, -1] = AT_WORK
 
 
-def _search_with(in_space):  # noqa: C901
-    """A search over all samples, for forces along one direction or, in space, for any loads."""
-    parts = IN_SPACE if in_space else ALONG_ONE
-    step_walk, step_tip, watch, begin, go_on, turns, missing = parts
+def _walk_with(in_space, tangents):  # noqa: C901
+    """A walk from tip to base, with tangents of turns of the world or with the tip."""
+    step_walk, step_tip, watch, begin, go_on, turns, missing = IN_SPACE if in_space else ALONG_ONE
+    step = step_walk if tangents else step_tip
 
     @inline
-    def start(w, nodes, tip, i):
-        put(w, G, i, get(nodes[0], WORLD, i))
-        put(w, H, i, get(nodes[0], WORLD + 3 * LANES, i))
+    def set_out(w, node, tip, i):
+        put(w, G, i, get(node, WORLD, i))
+        put(w, H, i, get(node, WORLD + 3 * LANES, i))
         begin_tip(w, tip, i)
+        if tangents:
+            begin_tangents(w, tip, i)
+            begin(w, i)
+            w[MARGIN + i] = 1.0
 
     @inline
-    def arrive(w, node, i):
+    def enter(w, before, node, i):
+        if not in_space and tangents:
+            carry_normal(node, WORLD, get(w, H, i), i)
+        elif not in_space:
+            put_world(w, G, i, get(w, G, i), get(node, WORLD + 3 * LANES, i))
         put(node, MISSING, i, missing(world(w, G, i), world(node, WORLD, i)))
+        if tangents:
+            _answer(w, turns(w, i), before, node, i)
+        _enter(w, node, i)
+        if tangents:
+            put_three(w, THETA, i, world(w, G, i))
+            put_three(w, MOMENT, i, three(node, ANSWER, i))
+            put_three(w, FORCE, i, three(node, ANSWER + 9 * LANES, i))
+            go_on(w, i)
 
     @pasted
     def walk(w, nodes, rest, table, tip):
         firsts, scalars, moments = table[5], table[2], table[4]
         for i in range(LANES):
-            start(w, nodes, tip, i)
-            begin_tangents(w, tip, i)
-            begin(w, i)
-            w[MARGIN + i] = 1.0
+            set_out(w, nodes[0], tip, i)
         for n in range(firsts.shape[0] - 1):
             for k in range(firsts[n], firsts[n + 1]):
                 r, c = rest[k], scalars[k]
                 if in_space and moments[k].any():
                     for i in range(LANES):
-                        push(w, moments[k], True, i)
+                        push(w, moments[k], tangents, i)
                 for i in range(LANES):
-                    step_walk(w, r, c, i)
-                for i in range(LANES):
-                    watch(w, i)
+                    step(w, r, c, i)
+                if tangents:
+                    for i in range(LANES):
+                        watch(w, i)
             before, node = nodes[n], nodes[n + 1]
             for i in range(LANES):
-                if not in_space:
-                    carry_normal(node, WORLD, get(w, H, i), i)
-                arrive(w, node, i)
-                _answer(w, turns(w, i), before, node, i)
-                _enter(w, node, i)
-                put_three(w, THETA, i, world(w, G, i))
-                put_three(w, MOMENT, i, three(node, ANSWER, i))
-                put_three(w, FORCE, i, three(node, ANSWER + 9 * LANES, i))
-                go_on(w, i)
+                enter(w, before, node, i)
 
-    @pasted
-    def walk_tip(w, nodes, rest, table, tip):
-        firsts, scalars, moments = table[5], table[2], table[4]
-        for i in range(LANES):
-            start(w, nodes, tip, i)
-        for n in range(firsts.shape[0] - 1):
-            for k in range(firsts[n], firsts[n + 1]):
-                r, c = rest[k], scalars[k]
-                if in_space and moments[k].any():
-                    for i in range(LANES):
-                        push(w, moments[k], False, i)
-                for i in range(LANES):
-                    step_tip(w, r, c, i)
-            node = nodes[n + 1]
-            for i in range(LANES):
-                if not in_space:
-                    put_world(w, G, i, get(w, G, i), get(node, WORLD + 3 * LANES, i))
-                arrive(w, node, i)
-                _enter(w, node, i)
+    return walk
+
+
+def _search_with(in_space):
+    """A search over all samples, for forces along one direction or, in space, for any loads."""
+    walk, walk_tip = _walk_with(in_space, tangents=True), _walk_with(in_space, tangents=False)
 
     @pasted
     def search(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
@@ -292,8 +285,9 @@ def _search_with(in_space):  # noqa: C901
                 walk(w, nodes, rest, coarse, tip)
                 if _newton(w, nodes, count, small) == 0:
                     break
-            rest_frames(work, lanes, fine[0], fine[1], rest[: fine[1].shape[0]])
-            _aim(nodes[count], work, axes, not in_space)
+            if coarse[1].shape[0] != fine[1].shape[0]:  # as many steps are the same
+                rest_frames(work, lanes, fine[0], fine[1], rest[: fine[1].shape[0]])
+                _aim(nodes[count], work, axes, not in_space)
             for i in range(LANES):
                 if w[DONE + i] == FOUND:
                     _move(nodes, count, i)

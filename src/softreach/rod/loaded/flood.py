@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from softreach.kernels.loaded.grid_values import interpolate
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.loaded.following import Path, follow
-from softreach.rod.loaded.shooting import Shots, turn_between, units
+from softreach.rod.loaded.shooting import Shots, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.support.lazy import lazy
 
@@ -78,7 +78,7 @@ class Flood:
         interpolate(of_nodes, rough.ravel() < _UNEVEN, places, sizes, frames)
         rough = rough[self._cells_at(gamma)]
         frames[np.isinf(rough)] = of_nodes[self.held.is_found.argmax()]
-        return units(frames), rough
+        return frames, rough
 
     @lazy
     def _rough(self) -> Array:

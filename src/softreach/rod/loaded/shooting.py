@@ -93,19 +93,9 @@ def shoot(
     out = np.empty((len(gamma), 5 + size))
     solve = kernels.solve_directions if tables.one_direction else kernels.solve_frames
     given = np.zeros((0, size)) if guesses is None else np.ascontiguousarray(guesses)
-    limits = search.widest, search.small, tiny
-    steps = tuple(coarse), tuple(fine)
-    solve(
-        _columns(gamma),
-        tables.axes,
-        tables.at_tip,
-        given,
-        *steps,
-        limits,
-        search.walks,
-        shares,
-        out,
-    )
+    limits, steps = (search.widest, search.small, tiny), (tuple(coarse), tuple(fine))
+    arm = _columns(gamma), tables.axes, tables.at_tip, given
+    solve(*arm, *steps, limits, search.walks, shares, out)
     found = (out[:, -1] == kernels.FOUND) & np.isfinite(out[:, :-1]).all(axis=1)
     return Shots(out[:, :3], out[:, 3:-2], out[:, -2], found)
 
@@ -197,4 +187,4 @@ def units(frames: Array) -> Array:
 def turn_between(frames: Array, others: Array) -> Array:
     """The largest change of a direction [rad], shape (n,)."""
     change = (frames - others).reshape(len(frames), frames.shape[1] // 3, 3)
-    return np.linalg.norm(change, axis=2).max(axis=1)
+    return np.sqrt(np.einsum("nki,nki->nk", change, change).max(axis=1))
