@@ -151,16 +151,12 @@ def _chords(w, nodes, count, turn, least):
 
 
 @inline
-def _aim(node, work, axes, again):
-    """The world as the base sees it, in the frame of the walk, theory (65).
-
-    Again, on other tables, the tangents know a normal of one direction already.
-    """
+def _aim(node, work, axes):
+    """The world as the base sees it, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(node, WORLD, i, turned(q, (axes[0, 0], axes[0, 1], axes[0, 2])))
-        if not again:
-            put(node, WORLD + 3 * LANES, i, turned(q, (axes[1, 0], axes[1, 1], axes[1, 2])))
+        put(node, WORLD + 3 * LANES, i, turned(q, (axes[1, 0], axes[1, 1], axes[1, 2])))
 
 
 @inline
@@ -265,34 +261,31 @@ def _search_with(in_space):
     walk, walk_tip = _walk_with(in_space, tangents=True), _walk_with(in_space, tangents=False)
 
     @pasted
-    def search(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+    def search(gamma, axes, tip, guesses, steps, limits, most, shares, out):
         widest, small, tiny = limits
-        count = coarse[5].shape[0] - 1
-        lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
+        count = steps[5].shape[0] - 1
+        lanes = np.zeros((steps[0].shape[2] - 1, LANES))
         work, w = np.zeros(REST_WORK), np.zeros(SIZE)
         nodes = np.zeros((count + 1, NODE))
-        rest = np.zeros((max(coarse[1].shape[0], fine[1].shape[0]), STEP_ROWS * LANES))
+        rest = np.zeros((steps[1].shape[0], STEP_ROWS * LANES))
         for first in range(0, gamma.shape[0], LANES):
             here = min(LANES, gamma.shape[0] - first)
             load_all(lanes, gamma, first, here)
-            rest_frames(work, lanes, coarse[0], coarse[1], rest[: coarse[1].shape[0]])
-            _aim(nodes[count], work, axes, False)
+            rest_frames(work, lanes, steps[0], steps[1], rest)
+            _aim(nodes[count], work, axes)
             _set_out(w, nodes, work, guesses, first, here)
             for i in range(LANES):
                 w[SHARE + i] = shares[min(first + min(i, here - 1), shares.shape[0] - 1)]
                 w[DONE + i], w[LEFT + i] = AT_WORK, widest
             for _ in range(most[0]):
-                walk(w, nodes, rest, coarse, tip)
+                walk(w, nodes, rest, steps, tip)
                 if _newton(w, nodes, count, small) == 0:
                     break
-            if coarse[1].shape[0] != fine[1].shape[0]:  # as many steps are the same
-                rest_frames(work, lanes, fine[0], fine[1], rest[: fine[1].shape[0]])
-                _aim(nodes[count], work, axes, not in_space)
             for i in range(LANES):
                 if w[DONE + i] == FOUND:
                     _move(nodes, count, i)
             for turn in range(most[1]):
-                walk_tip(w, nodes, rest, fine, tip)
+                walk_tip(w, nodes, rest, steps, tip)
                 if _chords(w, nodes, count, turn, tiny * tiny) == 0:
                     break
             _store(w, nodes, work, first, here, tiny, out)
@@ -304,7 +297,7 @@ _search_directions, _search_frames = _search_with(in_space=False), _search_with(
 
 
 @kernel
-def solve_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+def solve_directions(gamma, axes, tip, guesses, steps, limits, most, shares, out):
     """Equilibria under forces along one direction, with three numbers for each node.
 
     Args:
@@ -313,40 +306,39 @@ def solve_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shar
         tip: Weight of the payload along them, its lever, force and moment that follow (12,).
         guesses: G of the nodes, tip first, as the base of the unloaded arm sees them, (n, 3 node)
             or (0, 3 node).
-        coarse: Tables (pieces, lengths, scalars, bends, moments, firsts) for Newton steps.
-        fine: Tables for the last steps.
-        limits: Longest first Newton step [rad] that is trusted; step at which the coarse tables
-            have done their work; what the fine ones may leave.
-        most: Walks (coarse, fine) allowed.
+        steps: Tables (pieces, lengths, scalars, bends, moments, firsts).
+        limits: Longest first Newton step [rad] that is trusted; step from which on the last
+            matrices do; what may be left.
+        most: Walks allowed, with tangents and without.
         shares: Shares of the loads (n,), or (1,) for all.
         out: Filled with the tip, G of the nodes, the margin, and the state (0 not found, 1 found, 3
             given up), (n, 5 + 3 node).
     """
-    _search_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out)
+    _search_directions(gamma, axes, tip, guesses, steps, limits, most, shares, out)
 
 
 @kernel
-def solve_frames(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+def solve_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out):
     """The same under any loads, with six numbers for each node: G, H."""
-    _search_frames(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out)
+    _search_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out)
 
 
 @kernel
-def base_directions(gamma, tip, directions, fine, out):
+def base_directions(gamma, tip, directions, steps, out):
     """Directions of the forces that the base must see, for those that the tip of one rod sees.
 
     Args:
         gamma: One activation (1, bundle).
         tip: As of `solve_directions`.
         directions: G(L) as the base of the unloaded arm sees them (n, 3).
-        fine: As of `solve_directions`.
+        steps: As of `solve_directions`.
         out: Filled, (n, 3).
     """
-    lanes = np.zeros((fine[0].shape[2] - 1, LANES))
+    lanes = np.zeros((steps[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(SIZE)
-    rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
+    rest = np.zeros((steps[1].shape[0], STEP_ROWS * LANES))
     load_all(lanes, gamma, 0, 1)
-    rest_frames(work, lanes, fine[0], fine[1], rest)
+    rest_frames(work, lanes, steps[0], steps[1], rest)
     for first in range(0, directions.shape[0], LANES):
         here = min(LANES, directions.shape[0] - first)
         for i in range(LANES):
@@ -355,7 +347,7 @@ def base_directions(gamma, tip, directions, fine, out):
             put_world(w, G, i, g, h)
             begin_tip(w, tip, i)
         for k in range(rest.shape[0]):
-            r, c = rest[k], fine[2][k]
+            r, c = rest[k], steps[2][k]
             for i in range(LANES):
                 step_direction_tip(w, r, c, i)
         for i in range(here):

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 _TWIST = 1e-4  # [rad], of the twin over its length
 _OF_TWIN = 1e-3  # [L], its tolerance, as postures are polished on the arm
-_DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
+_DOUBTFUL = 0.02  # margin below which what is found from the unloaded arm may not be its posture
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
@@ -112,8 +112,6 @@ class Postures:
         order, guesses = self._guesses(gamma[at])
         at = at[order]
         shots = self.solver.quick(gamma[at], guesses)
-        doubtful = np.flatnonzero(shots.is_found & (np.abs(shots.margin) < _DOUBTFUL))
-        shots.put(doubtful, self.solver.careful(gamma[at[doubtful]], shots.frame[doubtful]))
         good = shots.is_found & (shots.margin > self._least)
         if guesses is not None:
             good &= turn_between(shots.frame, guesses) < self._nearness
