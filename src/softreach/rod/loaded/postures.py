@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.flood import PARTS, Flood, grid_sizes
-from softreach.rod.loaded.following import Followed, Path, follow
+from softreach.rod.loaded.following import Followed, follow
 from softreach.rod.loaded.ring import Ring
 from softreach.rod.loaded.shooting import Equilibria, Shots, turn_between
 from softreach.rod.tip_map import TipStatus
@@ -87,9 +87,8 @@ class Postures:
 
     def _hung(self, gamma: Array) -> Followed:
         """Loads put on the twin at fixed activations."""
-        path = Path(gamma, gamma, np.zeros(len(gamma)), np.ones(len(gamma)))
-        start = self.twin.careful(gamma, None, path.from_share)
-        return follow(self.twin, path, start)
+        start = self.twin.careful(gamma, None, np.zeros(1))
+        return follow(self.twin, gamma, gamma, start, hangs=False)
 
     @lazy
     def _ring(self) -> Ring | None:
@@ -171,7 +170,7 @@ class Postures:
             start = self.rest.of(np.zeros(len(gamma), np.intp))
         else:
             begin, start = self._leaning(gamma)
-        return follow(self.twin, Path.under_all_loads(begin, gamma), start)
+        return follow(self.twin, begin, gamma, start)
 
     def _leaning(self, gamma: Array) -> tuple[Array, Shots]:
         """Places on lines where the twin leans that nothing holds at rest, and how it does."""
@@ -229,7 +228,7 @@ class FloodedPostures(Postures):
         if len(cut):
             begin[cut], of_cut, slopes[cut] = self._before_cuts(gamma[cut])
             start.put(cut, of_cut)
-        followed = follow(self.twin, Path.under_all_loads(begin, gamma), start, slopes)
+        followed = follow(self.twin, begin, gamma, start, slopes)
         lost = np.flatnonzero(uncut & ~followed.shots.is_found)
         if len(lost):
             by_line = super().followed(gamma[lost])
