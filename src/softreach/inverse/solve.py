@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -27,10 +29,12 @@ from softreach.inverse.roots import (
     roots_at,
 )
 from softreach.inverse.solutions import Solutions, Status
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_number
-from softreach.support.arrays import Array, as_directions, joined, rows
+from softreach.support.arrays import Array, Mask, as_directions, joined, rows
 from softreach.support.errors import Range
 
 __all__ = ["solve_inverse"]
@@ -64,8 +68,9 @@ def solve_inverse(
     proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
 
-    Of an arm under loads every activation given holds the arm in its posture; nothing is proved, so
-    that a target that no search reaches is `NOT_FOUND`.
+    Of an arm under loads every activation given holds the arm in its posture; `leans` says where it
+    leans there to one of two sides. Nothing is proved, so that a target that no search reaches is
+    `NOT_FOUND`.
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
@@ -122,7 +127,16 @@ def solve_inverse(
         solve, size = _by_branches, _BRANCH_BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
-    return solutions.in_units_of(prepared.measures)
+    solutions = solutions.in_units_of(prepared.measures)
+    return replace(solutions, leans=_leans(prepared.whole, solutions.activations))
+
+
+def _leans(rod: TipMap, activations: Array) -> Mask:
+    """Mask of activations whose postures lean to one of two sides; of driven arms none is told."""
+    loaded = tip_map(rod.arm, rod.tol, frame="base", warn=False)
+    if isinstance(loaded, LoadedRod):
+        return loaded.leans(activations)
+    return np.zeros(len(activations), bool)
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
@@ -209,6 +223,7 @@ def _solutions(
         residuals=roots.residual,
         conditions=conditions(roots.slope),
         margins=rod.box.margin(roots.gamma),
+        leans=np.zeros(len(roots.target), bool),
         statuses=statuses,
         nearest=points,
         nearest_activations=prepared.whole.box.with_fixed(gamma),

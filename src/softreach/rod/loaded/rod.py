@@ -17,7 +17,7 @@ from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod, linear_strains, per_length
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shapes import Shapes
-from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.steps import (
     UNJUDGED,
@@ -53,6 +53,7 @@ Array = NDArray[np.float64]
 
 _BLOCK = BLOCK // 8  # samples per task
 _OF_LINES = 32 * LANES  # samples per task that follows branches
+_SIDES = 1e-3  # [rad], between postures of two sides
 
 
 @dataclass(frozen=True, repr=False)
@@ -135,6 +136,10 @@ class LoadedRod(ArmRod):
     def _shape_solver(self) -> Solver:
         return self._solver_of(checked(self._shape_steps, self.tol))
 
+    @lazy
+    def _mirrored(self) -> Postures:
+        return self.postures.mirrored.with_flood()
+
     def in_steps(self, steps: int) -> Self:
         vars(self).update(_tip_steps=steps, _shape_steps=steps)
         return self
@@ -201,6 +206,23 @@ class LoadedRod(ArmRod):
 
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
         return compliance
+
+    def leans(self, activations: ArrayLike) -> NDArray[np.bool_]:
+        """Mask of activations at which the arm leans to one of two sides, shape (n,).
+
+        With the other twist it leans to the other.
+        """
+        self.prepare()
+        gamma, sides = self.box.check(activations), (self.postures, self._mirrored)
+        leans = np.empty(len(gamma), bool)
+
+        def fill(block: slice) -> None:
+            here, there = (side.find(gamma[block]) for side in sides)
+            leans[block] = has_tip(here.status) & has_tip(there.status)
+            leans[block] &= turn_between(here.frame, there.frame) > _SIDES
+
+        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
+        return leans
 
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
