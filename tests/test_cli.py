@@ -636,6 +636,7 @@ def test_every_change_has_an_option(capsys):
         payload="1g",
         gravity="up",
         tip_force="0",
+        point="tool",
         settings=["a=1"],
     )
     assert len(every.given) == len(vars(every))

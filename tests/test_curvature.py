@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,7 +11,13 @@ from hypothesis import given
 
 import softreach as sr
 from softreach.arm.tables import tables
-from softreach.cloud.curvature import curvature_statistics, distal_stations, stream_statistics
+from softreach.cloud.curvature import (
+    QUANTITIES,
+    curvature_statistics,
+    distal_stations,
+    strain_ranges,
+    stream_statistics,
+)
 from softreach.rod.rods import refined, tip_map
 from softreach.support.errors import InvalidInput
 from tests.kinds import any_arms, fibers_and_a_tendon
@@ -149,7 +157,7 @@ def test_a_force_leaves_curvature_per_length_at_rest_and_fibers_take_it_along():
 
 def test_a_sample_has_the_same_strains_to_the_last_bit_whatever_is_beside_it(trunk):
     gamma = in_box(trunk, 1000)
-    strains = tip_map(trunk).strains_at(stations(trunk))
+    strains = partial(tip_map(trunk).strains, stations=stations(trunk))
     whole = strains(gamma)
     for part in (slice(0, 1), slice(3, 500), slice(7, 1000, 13)):
         np.testing.assert_array_equal(strains(gamma[part]).curvature, whole.curvature[part])
@@ -160,7 +168,7 @@ def test_a_sample_has_the_same_strains_to_the_last_bit_whatever_is_beside_it(tru
 def test_the_range_of_the_box_holds_all_strains_and_its_corners_reach_it(arm):
     z, rod = stations(arm), tip_map(arm)
     inside, corners = rod.strains(in_box(arm, 50), z), rod.strains(rod.box.corners(), z)
-    for name, ends in rod.strain_range(z)._asdict().items():
+    for name, ends in zip(QUANTITIES, strain_ranges(rod, z), strict=True):
         slack = 1e-12 * max(1.0, np.abs(ends).max())
         values, extremes = quantities(inside)[name], quantities(corners)[name]
         assert (values >= ends[:, 0] - slack).all()
@@ -174,7 +182,7 @@ def test_the_range_of_the_box_holds_all_strains_and_its_corners_reach_it(arm):
 def test_the_range_of_the_box_holds_all_strains_of_fibers_and_forces(arm):
     z, rod = stations(arm), tip_map(arm, 1e-4)
     gamma = np.concatenate([in_box(arm, 50), rod.box.corners()])
-    for name, ends in rod.strain_range(z)._asdict().items():
+    for name, ends in zip(QUANTITIES, strain_ranges(rod, z), strict=True):
         slack, values = (
             1e-12 * max(1.0, np.abs(ends).max()),
             quantities(rod.strains(gamma, z))[name],

@@ -7,11 +7,11 @@ import pytest
 
 import softreach as sr
 from softreach.arm import Chamber, FiberArchitecture, LinearTaper, ObliqueMuscle, Tendon
-from softreach.arm.skin import Centerline, body_skin, bundle_skins, bundle_solids, inside
+from softreach.arm.skin import Centerline, arm_surface, bundle_skins, bundle_surfaces, inside
 from softreach.export import export_arm
 from softreach.picture.shading import faces_to_eye, seen_through
 from softreach.plot import DesignPanel, plot_arm, plot_cross_section, plot_designs
-from softreach.rod.arm_shape import arm_surface, bundle_surfaces, rest_configuration
+from softreach.rod.kinematics import rest_configuration
 from softreach.support.palette import material_fill
 from tests.cable import Cable
 from tests.made_arms import FIRM, MADE_ARMS, SOFT, STIFF, Ring, mixed_arm, one_ring_arm
@@ -82,7 +82,7 @@ class TestSkins:
         arm = mixed_arm()
         for skins in (
             bundle_skins(arm, resting(arm)),
-            bundle_solids(arm, resting(arm), thickness=0),
+            bundle_surfaces(arm, resting(arm), thickness=0),
         ):
             ends = [(skin.vertices[:, 2].min(), skin.vertices[:, 2].max()) for skin in skins]
             for k, (first, last) in {0: (0, 0.62), 1: (0.21, 1), 5: (0.1, 0.8)}.items():
@@ -97,7 +97,7 @@ class TestSkins:
                 return (0.1, 0.2)
 
         arm = one_ring_arm(Pausing(name="cable", place=(0.01, 0.0)))
-        (skin,) = bundle_solids(arm, resting(arm, 5), thickness=0.1)
+        (skin,) = bundle_surfaces(arm, resting(arm, 5), thickness=0.1)
         pieces = solid(skin).split()
         heights = sorted((*piece.bounds[:, 2],) for piece in pieces)
         np.testing.assert_allclose(heights, [(0, 0.1), (0.2, 0.3)], atol=1e-12)
@@ -107,7 +107,7 @@ class TestSkins:
         edges = arm.length * np.array([0, 0.3, 0.45, 1])
         r = arm.profile.radius(edges)
         cones = np.pi / 3 * np.diff(edges) * (r[1:] ** 2 + r[1:] * r[:-1] + r[:-1] ** 2)
-        body = solid(body_skin(arm, resting(arm, 4), sides=600))
+        body = solid(arm_surface(arm, resting(arm, 4), sides=600))
         assert body.volume == pytest.approx(cones.sum(), rel=1e-4)
 
     def test_stations_between_others_lie_on_the_arm(self):

@@ -11,9 +11,10 @@ import pytest
 
 import softreach as sr
 from softreach import plot
+from softreach.arm.skin import arm_surface
 from softreach.cloud.redundancy import activation_distance
 from softreach.picture.projection import project, view_axes
-from softreach.rod.arm_shape import arm_surface, rest_configuration
+from softreach.rod.kinematics import rest_configuration
 from softreach.support.errors import InvalidInput
 
 plt = pytest.importorskip("matplotlib.pyplot")

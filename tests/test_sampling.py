@@ -21,7 +21,7 @@ from softreach.cloud.volume import concave_hull, convex_hull, unreachability
 from softreach.export import export_cloud
 from softreach.plot.coloring import color_samples
 from softreach.rod import configuration, tip_map
-from softreach.rod.view import free_bundles
+from softreach.rod.rods import free_bundles
 from softreach.sampling import SAMPLERS, cube_blocks, sample_cube
 from softreach.support.errors import InvalidInput
 

@@ -21,9 +21,8 @@ from softreach.inverse import solve_inverse
 from softreach.rest import rest
 from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import tip_jacobian, tip_positions
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import free_bundles, tip_map
 from softreach.rod.tip_map import TipStatus
-from softreach.rod.view import free_bundles
 from softreach.stiffness import (
     cloud_compliance,
     principal_compliances,

@@ -6,15 +6,10 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.arm.skin import arm_surface, bundle_curves, bundle_skins, bundle_surfaces
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, ribbon_surface, tube_surface
-from softreach.rod.arm_shape import (
-    arm_surface,
-    bundle_curves,
-    bundle_skins,
-    bundle_surfaces,
-    rest_configuration,
-)
+from softreach.rod.kinematics import rest_configuration
 from softreach.support.errors import InvalidInput
 
 trimesh = pytest.importorskip("trimesh")

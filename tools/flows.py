@@ -1,6 +1,6 @@
 """Calls, functions and files of softreach that a repeated question passes through.
 
-    python -m tools.flows [FLOW ...] [--functions]
+    python -m tools.flows [FLOW ...] [--files] [--functions N]
 
 Each flow is asked once, so that all is compiled and prepared, and counted when it is asked again.
 """
@@ -48,6 +48,10 @@ class Passage:
         folder = str(Path(SOURCE) / room)
         return len({c.co_filename for c in self.calls if c.co_filename.startswith(folder)})
 
+    def names(self) -> list[str]:
+        """The files, those called first before the others."""
+        return list(dict.fromkeys(str(Path(c.co_filename).relative_to(SOURCE)) for c in self.calls))
+
     def most_called(self, count: int) -> list[str]:
         """The functions called most, with their calls."""
         return [
@@ -80,6 +84,18 @@ def free_cloud() -> Callable[[], object]:
     return lambda: sr.compute_cloud(arm, 64)
 
 
+def new_cloud() -> Callable[[], object]:
+    """A cloud of 64 samples of an arm that was never asked before."""
+    lengths = itertools.count(1.0, 0.01)
+    return lambda: sr.compute_cloud(sr.designs.minimal_trunk(length=next(lengths)), 64)
+
+
+def loaded_configuration() -> Callable[[], object]:
+    """The shape of an arm under a payload at one activation."""
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads(payload=0.001))
+    return lambda: sr.configuration(arm, arm.bounds.mean(axis=1))
+
+
 def loaded_cloud() -> Callable[[], object]:
     """A cloud of 64 samples of an arm under a tip force."""
     arm = sr.designs.lce_arm().replace(loads=sr.Loads(payload=0.001))
@@ -98,6 +114,11 @@ def _inverse(arm: sr.Manipulator) -> Callable[[], object]:
 def inverse_of_three() -> Callable[[], object]:
     """Four targets of three bundles."""
     return _inverse(sr.designs.minimal_trunk())
+
+
+def inverse_of_four() -> Callable[[], object]:
+    """Four targets of four bundles."""
+    return _inverse(sr.designs.redundant_trunk())
 
 
 def inverse_of_five() -> Callable[[], object]:
@@ -162,8 +183,11 @@ def activation_slider() -> Callable[[], object]:
 
 FLOWS: dict[str, Flow] = {
     "cloud": free_cloud,
+    "cloud, new arm": new_cloud,
     "cloud, loaded": loaded_cloud,
+    "configuration, loaded": loaded_configuration,
     "inverse, three bundles": inverse_of_three,
+    "inverse, four bundles": inverse_of_four,
     "inverse, five bundles": inverse_of_five,
     "reach, flux": reach_by_flux,
     "reach, raster": reach_by_raster,
@@ -177,6 +201,7 @@ def main() -> None:
     """Print a line for each flow."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("flows", nargs="*", help=f"of {', '.join(FLOWS)}; all by default")
+    parser.add_argument("--files", action="store_true", help="list the files in their order")
     parser.add_argument("--functions", type=int, default=0, help="list so many most called ones")
     options = parser.parse_args()
     print(f"{'flow':24} {'calls':>8} {'functions':>10} {'files':>6} {'studio':>6}")
@@ -191,6 +216,8 @@ def main() -> None:
             counted = passage(question)
             numbers = counted.calls.total(), len(counted.calls), counted.files
             print("{:24} {:8,} {:10} {:6}".format(name, *numbers), counted.files_in("studio"))
+            if options.files:
+                print(" → ".join(counted.names()))
             for line in counted.most_called(options.functions):
                 print(line)
 

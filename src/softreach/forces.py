@@ -14,7 +14,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.force_growth import Grown, Growth, Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import as_activations, as_targets
-from softreach.rod.driven import inner_rod
 from softreach.rod.loaded.pushing_tip import PushingTip
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import tip_map
@@ -89,7 +88,7 @@ def blocked_force(
     best = []
     for target, along, choice in zip(targets, directions, starts, strict=True):
         push, place = rod.pose.directions_to_base(along), rod.pose.to_base(target)
-        choice = inner_rod(rod, choice)[1]
+        choice = rod.inputs.activations(choice)
         results = [_grown(yielding, push, place, gamma) for gamma in choice]
         best.append(max((result for result in results if result), key=_force, default=None))
         progress(1)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
-from softreach.rod.driven import DrivenRod
+from softreach.rod.free import ArmRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import of_tip, tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
@@ -184,27 +184,24 @@ def yielding_rod(rod: TipMap) -> LoadedRod:
 
     Without loads nothing weighs on it.
     """
-    of_base = tip_map(rod, frame="base")
-    if isinstance(of_base, DrivenRod):
-        of_base = of_base.base
-    if isinstance(of_base, LoadedRod):
-        return of_base
-    if of_base != tip_map(of_base.arm, rod.tol, frame="base"):
+    own = of_tip(rod)
+    if isinstance(own.rod, LoadedRod) and own.inputs.is_plain:
+        return own.rod
+    if not isinstance(own.rod, ArmRod) or not own.inputs.is_plain:
         raise InvalidInput("arm", repr(rod), "a Manipulator, or the tip map that it has")
-    return _without_loads(of_base)
+    return _without_loads(own.rod.arm, own.rod.tol)
 
 
 def _compliance(rod: TipMap, activations: ArrayLike) -> Array:
     """∂r/∂F [m/N] in the frame of a tip map, shape (n, 3, 3)."""
     gamma = rod.box.check(activations)
-    at = rod.activations(gamma) if isinstance(rod, DrivenRod) else gamma
+    at = tip_map(rod).inputs.activations(gamma)
     matrices, turn = yielding_rod(rod).compliance(at), rod.pose.rotation
     return matrices if rod.pose.is_identity else turn @ matrices @ turn.T
 
 
 @lru_cache(maxsize=16)
-def _without_loads(rod: TipMap) -> LoadedRod:
-    faults = rod.arm.section.modulus_faults("for a compliance")
-    if faults:
+def _without_loads(arm: Manipulator, tol: float) -> LoadedRod:
+    if faults := arm.section.modulus_faults("for a compliance"):
         raise InvalidDesign(faults)
-    return LoadedRod(rod.arm, rod.tol)
+    return LoadedRod(arm, tol)

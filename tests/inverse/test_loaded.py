@@ -27,7 +27,7 @@ TARGETS = slice(40, 60)  # with one tip of several stable activations among them
 
 def loaded(arm: Manipulator) -> LoadedRod:
     """The tip map that has equilibria."""
-    rod = tip_map(arm)
+    rod = tip_map(arm).rod
     assert isinstance(rod, LoadedRod)
     return rod
 

@@ -11,6 +11,7 @@ import pytest
 import softreach as sr
 from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
+from softreach.cloud.curvature import strain_ranges
 from softreach.rod import TipStatus, free_bundles, tip_map
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import all_equilibria as equilibria_by_degree
@@ -20,8 +21,8 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, LoadTables
+from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import has_tip
-from softreach.rod.view import stable_tips
 from softreach.support.errors import InvalidInput
 from tests.bodies import Uniform, oracle_rod, rubber, uniform
 from tests.oracles import column, elastica
@@ -44,7 +45,7 @@ def trunk(load, gravity=UP, arm=TRUNK, **loads):
 def test_their_number_is_odd_and_one_is_the_branch_of_the_unloaded_arm(gravity, load, most):
     arm = trunk(load, gravity)
     for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (3, 3)):
-        every, branch = sr.equilibria(arm, gamma), tip_map(arm).equilibria(gamma[None])
+        every, branch = sr.equilibria(arm, gamma), tip_map(arm).rod.equilibria(gamma[None])
         assert every.complete
         assert every.degree == 1
         assert len(every) % 2 == 1
@@ -63,7 +64,7 @@ def test_no_random_start_of_a_chain_of_links_comes_to_another(load, starts):
     """Newton's method on the energy of a chain, from shapes with random bending."""
     arm = trunk(load)
     every = sr.equilibria(arm, BENT)
-    chain = Chain(*oracle_rod(arm, every.rod.body, BENT, arm.loads), 20)
+    chain = Chain(*oracle_rod(arm, every.rod.rod.body, BENT, arm.loads), 20)
     tips = [tip for seed in range(starts) if (tip := come_to_rest(chain, seed)) is not None]
     assert len(tips) > 10
     apart = np.linalg.norm(np.array(tips)[:, None] - every.tips, axis=2)
@@ -102,7 +103,7 @@ def test_stable_ones_are_minima_and_signs_count_the_ways_to_fall(load, gravity):
 def softest_of(every, links=24):
     """The smallest eigenvalues of the energy of a chain at each equilibrium."""
     rod = every.rod
-    chain = Chain(*oracle_rod(rod.arm, rod.body, every.activation, rod.arm.loads), links)
+    chain = Chain(*oracle_rod(rod.arm, rod.rod.body, every.activation, rod.arm.loads), links)
     many = np.repeat(every.activation[None], len(every), axis=0)
     shapes = every.solver.shapes_facing(many, every.directions, chain.joints)[0]
     frames, moments = shapes.frames.directors, shapes.moment
@@ -197,7 +198,7 @@ def test_turning_gravity_and_the_arm_changes_nothing_but_the_directions():
     np.testing.assert_array_equal(one.status, other.status)
 
 
-@pytest.mark.parametrize("restrict", [free_bundles, stable_tips])
+@pytest.mark.parametrize("restrict", [free_bundles, with_unstable])
 def test_those_of_a_view_are_those_of_the_arm(restrict):
     arm = trunk(12.0, arm=TRUNK.with_bounds([(-5 / 3, 0), (-0.5, -0.5), (-5 / 3, 0)]))
     whole, gamma = tip_map(arm), np.array([-0.03, -0.5, -0.1])
@@ -433,7 +434,7 @@ def test_loads_that_no_walk_can_follow_are_refused_in_one_line(loads):
         rod.status(rod.box.corners())
     assert "\n" not in str(refused.value)
     with pytest.raises(InvalidInput, match="loads"):
-        rod.strain_range([0.0])
+        strain_ranges(tip_map(rod), np.zeros(1))
 
 
 def stubby(share):
@@ -468,7 +469,7 @@ def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_on
     assert not has_tip(rod.status(rod.box.corners())).any()
     assert rod.steps >= FreeRod(rod.arm, 1e-4).steps
     with pytest.raises(InvalidInput, match="has an equilibrium"):
-        rod.strain_range([0.1])
+        strain_ranges(tip_map(rod), np.array([0.1]))
 
 
 def test_steps_that_are_not_found_are_not_searched_again(monkeypatch):

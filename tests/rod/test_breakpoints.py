@@ -251,16 +251,16 @@ def test_strains_at_a_breakpoint_are_those_of_the_piece_that_begins_there():
     """At the base too; and at the tip those of the piece that ends."""
     arm = broken()
     z = np.array([0.0, *BREAKS])
-    strains = FreeRod(arm, 1e-6).strains_at
+    rod = FreeRod(arm, 1e-6)
     here, after, before = (
-        strains(places)(in_box(arm, 1)).curvature[0]
+        rod.strains(in_box(arm, 1), places).curvature[0]
         for places in (z, z + 1e-12, z - 1e-12 * (z > 0))
     )
     np.testing.assert_allclose(here, after, rtol=1e-9, atol=1e-9)
     jumps = dict(zip(z, np.abs(here - before).max(axis=1), strict=True))
     assert min(jumps[end] for end in (0.1, 0.3, 0.41, 0.83, 0.9)) > 1e-3  # ends of segments
     assert min(jumps[end] for end in (0.5, 0.55)) > 1e-3  # kinks of routing and angle
-    last = strains([1 - 1e-12, 1.0])(in_box(arm, 1)).curvature[0]
+    last = rod.strains(in_box(arm, 1), [1 - 1e-12, 1.0]).curvature[0]
     np.testing.assert_allclose(last[1], last[0], rtol=1e-9)
 
 

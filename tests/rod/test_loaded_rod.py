@@ -313,14 +313,14 @@ def test_what_acts_on_the_base_section_moves_nothing():
 def test_statistics_of_strains_count_only_arms_that_have_an_equilibrium(monkeypatch):
     rod, stations = loaded(Loads(gravity=SIDE), 1e-6), [0.7, 0.3]
     expected = stream_statistics(rod, [GAMMA[[0, 3]]], stations, bins=64)
-    whole = rod.strains_at(stations)
+    whole = LoadedRod.shapes
 
-    def torn(gamma, status=None):
-        found = whole(gamma, status)
+    def torn(rod, gamma, *others):
+        found = whole(rod, gamma, *others)
         found.curvature[1:3], found.extension[1:3] = np.nan, np.nan
         return found
 
-    monkeypatch.setattr(LoadedRod, "strains_at", lambda rod, stations: torn)
+    monkeypatch.setattr(LoadedRod, "shapes", torn)
     found = stream_statistics(rod, [GAMMA], stations, bins=64)
     np.testing.assert_array_equal(found.bending_count.sum("bin"), [2, 2])
     for name in ("bending_mean", "torsion_mean", "extension_mean"):

@@ -8,9 +8,10 @@ import pytest
 import softreach as sr
 from softreach.arm import LengthTendon, Marker, Measured, Pieces, RestShape, RigidPiece, Samples
 from softreach.arm.parameters import changed, parameters
+from softreach.arm.skin import marker_points
 from softreach.arm.tables import compliance, tables
 from softreach.rod import marker_positions
-from softreach.rod.arm_shape import marker_points, rest_configuration
+from softreach.rod.kinematics import rest_configuration
 from softreach.support.errors import InvalidDesign
 
 MATTER = sr.Material(young_modulus=1e6, density=1000.0)

@@ -11,14 +11,15 @@ import softreach as sr
 from softreach.arm import Chamber, LinearTaper, Loads, Material, Ring, Section, Tendon, designs
 from softreach.rod import tip_positions
 from softreach.rod.free import FreeRod
-from softreach.rod.rods import tip_map
-from softreach.rod.view import activation_measures, free_bundles, measured_bundles
+from softreach.rod.inputs import activation_measures
+from softreach.rod.rods import free_bundles, in_steps, measured_bundles, tip_map
 from softreach.support.errors import InvalidDesign, InvalidInput
+from tests.bodies import rubber
 from tests.laws import in_box
 
 
 def test_an_arm_without_loads_is_a_free_rod(trunk):
-    assert tip_map(trunk) == FreeRod(trunk, 1e-6)
+    assert tip_map(trunk).rod == FreeRod(trunk, 1e-6)
 
 
 def test_equal_arms_and_tolerances_share_one_tip_map(trunk):
@@ -27,6 +28,18 @@ def test_equal_arms_and_tolerances_share_one_tip_map(trunk):
     assert tip_map(rod) is rod
     assert tip_map(trunk, 1e-8) is not rod
     assert tip_map(trunk.with_bounds((-1, 0)), 1e-7) is not rod
+
+
+@pytest.mark.parametrize("loads", [None, Loads(payload=0.1)])
+def test_maps_in_other_steps_are_other_maps(trunk, loads):
+    arm = rubber(trunk, loads)
+    rod, gamma = tip_map(arm), in_box(arm, 20)
+    coarse = in_steps(arm, 3, rod)
+    assert coarse != rod
+    assert coarse == in_steps(arm, 3, rod)
+    assert hash(coarse) == hash(in_steps(arm, 3, rod))
+    apart = np.linalg.norm(coarse.tips(gamma) - rod.tips(gamma), axis=1)
+    assert rod.tol * rod.length < apart.max() < 1e-2 * rod.length
 
 
 def test_what_is_remembered_is_computed_once(trunk, monkeypatch):

@@ -23,9 +23,8 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import ArmMap, tip_map
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
-from softreach.rod.view import PlacedRod
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.kinds import fibers_and_a_tendon
@@ -42,15 +41,15 @@ def sideways(arm: Manipulator, tol: float) -> LoadedRod:
 POSE = Base(position=(0.3, -0.2, 1.5), points="-x", turn=0.7)
 
 
-def placed(arm: Manipulator, tol: float) -> PlacedRod:
+def placed(arm: Manipulator, tol: float) -> ArmMap:
     """An arm whose base is anywhere in the world."""
-    return PlacedRod(FreeRod(arm.replace(base=POSE), tol))
+    return ArmMap.of(FreeRod(arm.replace(base=POSE), tol), POSE)
 
 
-def placed_and_loaded(arm: Manipulator, tol: float) -> PlacedRod:
+def placed_and_loaded(arm: Manipulator, tol: float) -> ArmMap:
     """The same with its weight and 100 g, which fall in the world."""
     heavy = rubber(arm, Loads(payload=0.1)).replace(base=POSE)
-    return PlacedRod(LoadedRod(heavy, tol))
+    return ArmMap.of(LoadedRod(heavy, tol), POSE)
 
 
 MAKERS: dict[str, Make] = {
@@ -441,6 +440,6 @@ def test_its_radius_is_that_of_the_arm_at_rest(make, share, trunk):
 
 
 def test_a_tip_map_is_its_own(make, trunk):
-    rod = make(trunk, 1e-9)
+    rod = tip_map(make(trunk, 1e-9))
     assert tip_map(rod) is rod
     assert tip_map(rod, 1e-3) is rod

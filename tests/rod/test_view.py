@@ -23,9 +23,8 @@ from softreach.arm.loads import Loads
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import refined
+from softreach.rod.rods import free_bundles, measured_bundles, refined, tip_map, with_unstable
 from softreach.rod.tip_map import TipStatus
-from softreach.rod.view import View, free_bundles, measured_bundles, stable_tips
 from tests.bodies import rubber
 from tests.laws import in_box
 
@@ -56,14 +55,14 @@ def heavy() -> LoadedRod:
 def test_each_equilibrium_of_stable_tips_is_found_once(heavy, ask, monkeypatch):
     direct, found = Postures.direct, []
     x = in_box(HEAVY, 20)
-    ask(stable_tips(heavy), x)  # what all samples need is there now
+    ask(tip_map(heavy), x)  # what all samples need is there now
 
     def counted(postures, gamma, rows, equilibria):
         found.append(len(gamma[rows]))
         direct(postures, gamma, rows, equilibria)
 
     monkeypatch.setattr(Postures, "direct", counted)
-    ask(stable_tips(heavy), x)
+    ask(tip_map(heavy), x)
     assert sum(found) == len(x)
 
 
@@ -71,19 +70,18 @@ def test_stable_tips_are_those_of_the_map_where_it_is_stable(heavy):
     x = in_box(HEAVY, 200)
     tips, status = heavy.tips_and_status(x)
     stable = status == TipStatus.STABLE
-    view = stable_tips(heavy)
+    view = tip_map(heavy)
     np.testing.assert_array_equal(view.tips(x), np.where(stable[:, None], tips, np.nan))
-    assert TipStatus.UNSTABLE not in view.status(x)
+    np.testing.assert_array_equal(view.status(x), status)
+    np.testing.assert_array_equal(with_unstable(view).tips(x), tips)
     for values in (*view.tip_motions(x), *view.frames(x, [0.5]), *view.strains(x, [0.5])):
         np.testing.assert_array_equal(np.isnan(values.reshape(len(x), -1)).all(axis=1), ~stable)
 
 
 def test_views_of_views_are_views_of_the_map_itself(heavy):
-    view = free_bundles(stable_tips(free_bundles(heavy)))
-    assert isinstance(view, View)
-    assert view.base is heavy
-    assert view == stable_tips(free_bundles(heavy)) == free_bundles(stable_tips(heavy))
-    assert stable_tips(view) is view
+    view = free_bundles(free_bundles(heavy))
+    assert view.rod is heavy
+    assert view == free_bundles(heavy) != with_unstable(view)
     assert free_bundles(view) is view
     assert measured_bundles(view) is view
     fine = refined(view, 1e-7)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from softreach.support.lazy import lazy
 
 __all__ = [
     "Driving",
-    "InnerActivations",
+    "Lengths",
     "body_of",
     "cube_corners",
     "extension_range",
@@ -38,26 +39,43 @@ _SAFETY = 1.25  # of the largest tensions that samples reach
 _LEAST_EXTENSION = 0.05  # that a box of tensions has
 
 
-@dataclass(frozen=True, eq=False)
-class InnerActivations:
-    """Activations of the inner arm and their derivatives."""
+class Lengths(Protocol):
+    """Tensions that displacements of tendons lead to under loads."""
 
-    values: Array
-    """γ, shape (n, inner bundle)."""
-    slopes: Array
-    """∂γ/∂x, shape (n, inner bundle, bundle)."""
+    law: LengthLaw
+
+    def tensions(self, activations: Array) -> Tensions:
+        """Tensions at activations with displacements, shape (n, bundles)."""
+        ...
+
+    def shortening_slopes(self, inner: Array) -> Array:
+        """∂s/∂γ at activations with tensions [m per unit], shape (n or 1, tendon, bundle)."""
+        ...
+
+    def continued_from(self, inner: Array) -> Self:
+        """Those of the arm in its posture at activations with tensions, shape (1, bundles)."""
+        ...
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Driving:
-    """The map from the activations x of an arm without loads to those of its inner arm, γ(x)."""
+    """The map from the inputs x of an arm to the activations of its inner arm, γ(x)."""
 
     arm: Manipulator
+    lengths: Lengths | None = None
+    """Tensions of tendons driven by length under loads; by default those without loads."""
+    is_effective: bool = False
+    """True if x are inputs beyond the dead zones of the drives."""
+
+    @lazy
+    def driven(self) -> Manipulator:
+        """The arm, without dead zones if x are effective inputs."""
+        return without_dead_zones(self.arm) if self.is_effective else self.arm
 
     @lazy
     def law(self) -> LengthLaw:
-        """Law of the tendons that are driven by length."""
-        return LengthLaw(body_of(self.arm))
+        """Law of the tendons that are driven by length, without loads."""
+        return LengthLaw(body_of(self.arm)) if self.lengths is None else self.lengths.law
 
     @lazy
     def has_length_tendons(self) -> bool:
@@ -68,27 +86,27 @@ class Driving:
     def is_affine(self) -> bool:
         """True if γ(x) has no kinks."""
         is_cut = self._pulls & (self._reached()[:, 0] < 0.0)
-        has_dead_zones = any(drive.dead_zone for drive in self.arm.drives)
+        has_dead_zones = any(drive.dead_zone for drive in self.driven.drives)
         return not (self.has_length_tendons or has_dead_zones or is_cut.any())
 
     @lazy
     def is_smooth(self) -> bool:
         """True if γ(x) has no kinks within the bounds: is affine, or all lengths stay taut."""
         is_cut, law = self._pulls & (self._reached()[:, 0] < 0.0), self.law
-        if is_cut.any() or any(drive.dead_zone for drive in self.arm.drives):
+        if is_cut.any() or any(drive.dead_zone for drive in self.driven.drives):
             return False
         if not self.has_length_tendons:
             return True
         if self.arm.loads is not None or law.has_growth:
             return False
-        low, high = self.arm.input_bounds.T
+        low, high = self.driven.input_bounds.T
         tensions = law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))
         return bool(tensions.is_taut.all())
 
     @lazy
     def kinks(self) -> list[Array]:
         """Inputs at which a drive alone lets a tendon go slack, for each input in its unit."""
-        low, high = self.arm.input_bounds.T
+        low, high = self.driven.input_bounds.T
         at_low, kinks = self.offsets + self.gains @ low, list[Array]()
         free = (self.gains != 0.0) & (low < high)
         for k in range(self.arm.inputs):
@@ -104,8 +122,8 @@ class Driving:
 
     def _reached(self) -> Array:
         """Bounds of the bundles, if tendons could push."""
-        bounds = self.arm.input_bounds.copy()
-        for k, drive in enumerate(self.arm.drives):
+        bounds = self.driven.input_bounds.copy()
+        for k, drive in enumerate(self.driven.drives):
             bounds[k] = drive.effective(bounds[k])[0]
         return self.offsets[:, None] + ends_over(self.gains, bounds)
 
@@ -152,7 +170,7 @@ class Driving:
     def _of_drives(self, x: Array) -> tuple[Array, Array]:
         """The same with their derivatives along x, shape (n, inner bundle, input)."""
         effective, slopes = x.copy(), np.ones(x.shape)
-        for k, drive in enumerate(self.arm.drives):
+        for k, drive in enumerate(self.driven.drives):
             effective[:, k], slopes[:, k] = drive.effective(x[:, k])
         bundles = np.tile(self.offsets, (len(x), 1))
         for k in range(x.shape[1]):  # in their order, whatever BLAS and its threads would do
@@ -162,33 +180,33 @@ class Driving:
         return bundles, np.where(slack[..., None], 0.0, slopes[:, None] * self.gains)
 
     def activations(self, x: Array) -> Array:
-        """γ at checked x (n, inputs)."""
+        """γ at checked x (n, inputs); NaN where no tensions are found."""
         bundles = self.bundles(x)
         if not self.has_length_tendons:
             return bundles
-        return self.law.inner(bundles, self.law.tensions(bundles).tension)
+        return self.law.inner(bundles, self._lengths.tensions(bundles).tension)
 
-    def with_slopes(self, x: Array) -> InnerActivations:
-        """γ with ∂γ/∂x."""
-        bundles, slopes = self._of_drives(x)
-        if not self.has_length_tendons:
-            return InnerActivations(bundles, slopes)
-        tensions = self.law.tensions(bundles)
-        inner = self.law.inner(bundles, tensions.tension)
-        return self.on_taut(x, tensions, self.law.shortening_slopes(inner))
-
-    def on_taut(self, x: Array, tensions: Tensions, of_strains: Array) -> InnerActivations:
-        """γ with ∂γ/∂x on the taut tendons.
-
-        Args:
-            x: Inputs, shape (n, inputs).
-            tensions: Those that they lead to.
-            of_strains: ∂s/∂γ there, shape (n or 1, tendon, inner bundle).
-        """
+    def with_slopes(self, x: Array) -> tuple[Array, Array]:
+        """γ (n, inner bundle) with ∂γ/∂x (n, inner bundle, input), of taut tendons."""
         bundles, of_drives = self._of_drives(x)
+        if not self.has_length_tendons:
+            return bundles, of_drives
+        tensions = self._lengths.tensions(bundles)
         inner = self.law.inner(bundles, tensions.tension)
-        slopes = self.law.slopes(inner, tensions.is_taut, of_strains)
-        return InnerActivations(inner, slopes @ of_drives)
+        of_strains = self._lengths.shortening_slopes(inner)
+        return inner, self.law.slopes(inner, tensions.is_taut, of_strains) @ of_drives
+
+    @property
+    def _lengths(self) -> LengthLaw | Lengths:
+        return self.law if self.lengths is None else self.lengths
+
+    def with_dead_zones(self, x: Array) -> Array:
+        """Inputs of the arm at x (n, inputs), with the dead zones that effective ones leave."""
+        if not self.is_effective:
+            return x
+        zones = np.zeros(x.shape[1])
+        zones[: len(self.arm.drives)] = [drive.dead_zone for drive in self.arm.drives]
+        return x + np.sign(x) * zones
 
 
 def without_dead_zones(arm: Manipulator) -> Manipulator:

@@ -62,6 +62,9 @@ class Manipulator(Body):
     """Inputs that activate bundles; bundles that none of them names are inputs themselves."""
     markers: tuple[Marker, ...] = ()
     """Points that go with its sections; they change nothing about the arm."""
+    point: str | None = None
+    """Name of the marker that is asked for wherever tips are, such as that of a tool; None for the
+    tip. Clouds, reachable sets, inverse solutions, paths, checks and searches are then of it."""
     display_unit: str | None = field(default=None, compare=False)
     """Unit that it is shown in, "m", "cm", "mm" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
@@ -91,8 +94,35 @@ class Manipulator(Body):
             owner = f"markers.{marker.name}"
             own = marker.place_faults(self.length)
             faults += [fault._replace(path=f"{owner}.{fault.path}") for fault in own]
+        if self.point is not None and self.pointed is None:
+            faults.append(Fault("point", self.point, self._points))
         names = [actuator.name for actuator in self.actuators], self.bundle_names
         return faults or [*drive_faults(self.drives, *names)]
+
+    @lazy
+    def pointed(self) -> Marker | None:
+        """The marker that `point` names; None for the tip."""
+        return next((each for each in self.markers if each.name == self.point), None)
+
+    @property
+    def _points(self) -> str:
+        names = ", ".join(each.name for each in self.markers)
+        return f"must be a marker of the arm: {names}" if names else "must be absent: no markers"
+
+    def at_point(self, point: str | None) -> Self:
+        """The arm with a marker in place of its tip; itself for None.
+
+        Args:
+            point: Name of the marker.
+
+        Raises:
+            InvalidInput: It has no such marker.
+        """
+        if point is None or point == self.point:
+            return self
+        if not any(each.name == point for each in self.markers):
+            raise InvalidInput("point", as_given(point), self._points.removeprefix("must be "))
+        return self.replace(point=point)
 
     @classmethod
     def tapered(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,16 +18,25 @@ from softreach.arm.body import Body
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
+from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.arm.manipulator import Manipulator
+
+    Shape = xr.Dataset | "Centerline"
 
 __all__ = [
     "Centerline",
     "arm_card",
-    "body_skin",
+    "arm_surface",
     "bundle_curves",
     "bundle_skins",
-    "bundle_solids",
+    "bundle_surfaces",
     "inside",
+    "marker_points",
 ]
 
 Array = NDArray[np.float64]
@@ -55,6 +64,31 @@ class Centerline:
         position = base.to_world(np.column_stack([0 * z, 0 * z, z]))
         directors = base.directions_to_world(np.tile(np.eye(3), (len(z), 1, 1)))
         return cls(z=z, position=position, directors=directors)
+
+    @classmethod
+    def of(cls, shape: xr.Dataset | Centerline) -> Centerline:
+        """That of one configuration.
+
+        Raises:
+            InvalidInput: Several configurations, or one of an arm without length.
+        """
+        if isinstance(shape, Centerline):
+            return shape
+        if not (least := float(shape["extension"].min())) > 0.0:
+            hint = "ask for the configuration of activations within the bounds of the design"
+            extension = f"with extension ζ = {least:.4g}"
+            raise InvalidInput(
+                "configuration", extension, "of an arm that has a length, ζ > 0", hint
+            )
+        if "sample" in shape.dims:
+            count = shape.sizes["sample"]
+            hint = "choose one with configuration.isel(sample=0)"
+            raise InvalidInput("configuration.sizes['sample']", count, "absent: one shape", hint)
+        return cls(
+            z=shape["Z"].values,
+            position=shape["position"].transpose("station", "axis").values,
+            directors=shape["directors"].transpose("station", "director", "axis").values,
+        )
 
     def with_stations(self, more: ArrayLike) -> Self:
         """The same line with more stations; those that it has, or that lie beyond it, are left."""
@@ -128,41 +162,58 @@ class _Span:
         return self.points(angles, (self.outer_ratio + lift) * self.arm_radius)
 
 
-def body_skin(arm: Body, line: Centerline, sides: int = 32) -> Surface:
+def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
     """The body of the arm as a closed tube.
 
     Args:
-        arm: The design.
-        line: Centerline with its sections.
+        arm: The design; where its radius is not smooth, the tube has a section.
+        shape: One configuration of that arm, or its centerline.
         sides: Corners of each section.
 
     Raises:
-        InvalidInput: Fewer than two stations or three sides.
+        InvalidInput: Several configurations, fewer than two stations or three sides.
     """
+    line = _drawn_line(arm, shape)
     d1, d2 = line.directors[:, 0], line.directors[:, 1]
     return tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
 
 
-def bundle_curves(arm: Body, line: Centerline) -> Array:
-    """The middle of every bundle at all stations [m], shape (bundle, station, 3).
+def bundle_curves(arm: Body, shape: Shape) -> Array:
+    """The middle of every bundle, also where it does not act: r + R (cos a d1 + sin a d2).
 
-    For a sector it is on the outside of its ring.
+    Args:
+        arm: The design; a = arm.outline(Z).center. R is the distance of lines and lumens from the
+            axis, and the outer radius of the ring that a sector is in.
+        shape: As for `arm_surface`.
+
+    Returns:
+        Points [m], shape (bundles, stations, 3).
+
+    Raises:
+        InvalidInput: Several configurations.
     """
+    line = Centerline.of(shape)
     every = np.ones((len(line.z) - 1, arm.bundles), bool)
     spans = [next(parts) for parts in _spans(arm, line, every)]
     return np.stack([span.curve() for span in spans])
 
 
 def bundle_skins(
-    arm: Body, line: Centerline, *, lift: float = 0.0, step: float = np.pi / 32
+    arm: Body, shape: Shape, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Surface]:
-    """Each bundle as a surface to look at: an open band, or a closed tube, with outward faces.
+    """Surfaces of all bundles where they act: bands, thin tubes for lines, tubes for lumens.
 
     Args:
-        arm: The design; bundle j covers a_j - σ_j/2 to a_j + σ_j/2.
-        line: Centerline with its sections; give it `arm.breakpoints`, so that bundles end there.
+        arm: The design; band j covers a_j - σ_j/2 to a_j + σ_j/2 on the outside of its ring.
+        shape: As for `arm_surface`.
         lift: Height of bands above their ring, in R2 [-].
         step: Largest angle between neighboring points across a band [rad].
+
+    Returns:
+        One surface for each bundle; bands are open, and the points of each are (stations, across).
+
+    Raises:
+        InvalidInput: Several configurations.
     """
 
     def sector(span: _Span) -> Surface:
@@ -170,16 +221,19 @@ def bundle_skins(
         # along x across is d3 x e_θ = -e_R: turned, so that faces point outwards
         return Surface(vertices=band.reshape(-1, 3), faces=grid_faces(*band.shape[:2])[:, ::-1])
 
-    return _skins(arm, line, sector)
+    return _skins(arm, _drawn_line(arm, shape), sector)
 
 
-def bundle_solids(arm: Body, line: Centerline, *, thickness: float) -> list[Surface]:
-    """Each bundle as closed surfaces: bands become skins, half sunk into the outside of their ring.
+def bundle_surfaces(arm: Body, shape: Shape, thickness: float = 0.04) -> list[Surface]:
+    """Every bundle as a closed surface; bands are half sunk into the outside of their ring.
 
     Args:
         arm: The design.
-        line: Centerline with its sections; give it `arm.breakpoints`, so that bundles end there.
-        thickness: Of the skins, in R2 [-].
+        shape: As for `arm_surface`.
+        thickness: Of bands, in R2 [-].
+
+    Raises:
+        InvalidInput: Several configurations.
     """
 
     def sector(span: _Span) -> Surface:
@@ -187,7 +241,29 @@ def bundle_solids(arm: Body, line: Centerline, *, thickness: float) -> list[Surf
         upper, lower = (span.band(lift, np.pi / 32) for lift in (thickness / 2, -thickness / 2))
         return ribbon_surface(upper, lower)
 
-    return _skins(arm, line, sector)
+    return _skins(arm, _drawn_line(arm, shape), sector)
+
+
+def marker_points(arm: Manipulator, shape: Shape) -> Array:
+    """Places of the markers of an arm, between the stations of a configuration for pictures.
+
+    Args:
+        arm: The design.
+        shape: As for `arm_surface`, from the base to the tip.
+
+    Returns:
+        Points [m], shape (marker, 3).
+
+    Raises:
+        InvalidInput: Several configurations.
+    """
+    if not arm.markers:
+        return np.empty((0, 3))
+    stations = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
+    line = Centerline.of(shape).with_stations(np.unique(stations))
+    section = np.abs(line.z - stations[:, None]).argmin(axis=1)
+    offsets = np.array([marker.offset for marker in arm.markers])
+    return line.position[section] + np.einsum("mk,mkx->mx", offsets, line.directors[section])
 
 
 def inside(arm: Body) -> tuple[bool, ...]:
@@ -203,14 +279,18 @@ def inside(arm: Body) -> tuple[bool, ...]:
 def arm_card(arm: Body, base: Base) -> str:
     """HTML with a small picture of the unactivated arm above its numbers, for notebooks."""
     line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS), base)
-    line = line.with_stations(arm.breakpoints)
-    body = body_skin(arm, line)
+    body = arm_surface(arm, line)
     bundles = bundle_skins(arm, line, lift=0.01, step=_CARD_STEP)
     skins = (
         Skin(bundle.vertices, bundle.faces, bundle_color(k)) for k, bundle in enumerate(bundles)
     )
     body_card = Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
     return html_card(repr(arm), body_card, *skins)
+
+
+def _drawn_line(arm: Body, shape: Shape) -> Centerline:
+    """With stations where the radius has kinks and where bundles begin and end."""
+    return Centerline.of(shape).with_stations(arm.breakpoints)
 
 
 def _skins(arm: Body, line: Centerline, sector: Callable[[_Span], Surface]) -> list[Surface]:

@@ -16,7 +16,7 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import tip_map, with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
@@ -102,7 +102,7 @@ class Intermediates(Mapping[Need, Any]):
 
     @cached_property
     def _samples(self) -> tuple[Array, NDArray[np.int8]]:
-        return self.rod.tips_and_status(activations_of(self.rod, self.cube))
+        return with_unstable(self.rod).tips_and_status(activations_of(self.rod, self.cube))
 
     def __getitem__(self, need: Need) -> Any:
         if need not in self._cache:

@@ -15,7 +15,7 @@ from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
 from softreach.atlas.store import DAMAGED, DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE, AtlasStore
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import tip_map, with_unstable
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
     as_flag,
@@ -140,7 +140,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     activation = activations_of(rod, opened["unit_activation"].values)
     drawn: Any = {"seed": command.seed, "sampler": command.sampler, "tol": command.tol}
     if rod.supports_unstable:
-        tip, stability = rod.tips_and_status(activation)
+        tip, stability = with_unstable(rod).tips_and_status(activation)
         return with_status(cloud_dataset(arm, activation, tip, **drawn), stability)
     if "tip" in opened:
         tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)

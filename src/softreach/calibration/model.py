@@ -177,8 +177,9 @@ class MarkerModel:
         body = body_of(arm)
         bounds = body.bounds * 0.0  # which decide nothing
         bounds[arm.bundles :] = 1.0
-        rod = (FreeRod if arm.loads is None else LoadedRod)(body.with_bounds(bounds), _TOL)
-        rod, law, gamma = rod.in_steps(int(grid.counts.sum())), LengthLaw(body), at.bundles
+        kind, steps = FreeRod if arm.loads is None else LoadedRod, int(grid.counts.sum())
+        rod = kind(body.with_bounds(bounds), _TOL, steps)
+        law, gamma = LengthLaw(body), at.bundles
         if len(law.columns):  # tensions in place of displacements
             lengths = law if arm.loads is None else LoadedLengths(law, rod)
             gamma = law.inner(gamma, lengths.tensions(gamma).tension)

@@ -60,6 +60,10 @@ class Changes:
             allow_leading_hyphen=True,
         ),
     ] = None
+    point: Annotated[
+        str | None,
+        Parameter(help="Marker that counts as the tip, such as that of a tool."),
+    ] = None
     settings: Annotated[
         list[str] | None,
         Parameter(
@@ -98,7 +102,7 @@ class Changes:
         if of_loads or {"payload", "gravity", "tip_force"} & self.given.keys():
             arm = self._loaded(arm, bool(of_loads))
             arm = changed(arm, _values(arm, of_loads))
-        return arm
+        return arm.at_point(self.point)
 
     def _posed(self, arm: Manipulator) -> Manipulator:
         from softreach.arm.base import POINTS
@@ -137,7 +141,7 @@ class Changes:
         lacking = {fault.path: examples.get(fault.path.rpartition(".")[2]) for fault in faults}
         lacking = {path: example for path, example in lacking.items() if example}
         if lacking:
-            idle = ("base", "revolution_deg", "taper_deg")  # which ask for no matter
+            idle = ("base", "revolution_deg", "taper_deg", "point")  # which ask for no matter
             values = {name: str(value) for name, value in self.given.items() if name not in idle}
             options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
             hint = f"give them in the design file, or as {options}"

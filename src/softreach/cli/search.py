@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.changes import design_from
+from softreach.cli.changes import Changes, design_from
 from softreach.cli.check import EXIT, finding_record
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
@@ -32,6 +33,10 @@ def search(
             group=_ASKED,
             help="Design to vary: a file (.toml) or a built-in design. Repeated, one is chosen.",
         ),
+    ] = None,
+    point: Annotated[
+        str | None,
+        Parameter(group=_ASKED, help="Marker that counts as the tip, such as that of a tool."),
     ] = None,
     free: Annotated[
         list[str] | None,
@@ -121,7 +126,8 @@ def search(
     }
     given = {name: value for name, value in given.items() if value is not None}
     text = read_text("requirements", needs, LONGEST)
-    asked = read_search(text, needs.parent, design_from, source=str(needs), given=given)
+    designs_from = partial(design_from, changes=Changes(point=point))
+    asked = read_search(text, needs.parent, designs_from, source=str(needs), given=given)
     base = asked.base
     first = next(iter(base.values())) if isinstance(base, Mapping) else base
     lengths = Lengths.of(first, unit)

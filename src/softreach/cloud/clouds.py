@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import all_inputs, tip_map, with_unstable
 from softreach.rod.tip_map import BLOCK, Frame, TipMap
-from softreach.rod.view import View
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
@@ -60,6 +59,7 @@ def compute_cloud(
     sampler: str = "uniform",
     tol: float = 1e-6,
     frame: Frame = "world",
+    point: str | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Sample the activation box and compute the tip of each sample (section 3).
@@ -76,6 +76,8 @@ def compute_cloud(
         tol: Largest tip error, in L.
         frame: In which tips are told: that of the "world", or of the "base", whose z is along the
             straight arm. The attributes hold it, and the pose of the base.
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
         progress: Called with the number of samples done since its last call; by default a bar is
             shown on a terminal when the cloud is large.
 
@@ -89,8 +91,7 @@ def compute_cloud(
             says what to use instead.
     """
     report = None if progress is None else as_function("progress", progress)
-    rod = tip_map(arm, tol, frame=frame)
-    rod = rod.base if isinstance(rod, View) else rod  # that of all bundles, each in its own unit
+    rod = with_unstable(all_inputs(tip_map(arm, tol, frame=frame, point=point)))
     bundles = rod.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)

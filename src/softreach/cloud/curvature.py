@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arm.driving import pilot
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import Tables, ends_over, tables
 from softreach.cloud.clouds import tip_map_of
-from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import Strains, TipMap
-from softreach.rod.view import stable_tips
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.rods import ArmMap, all_inputs, tip_map
+from softreach.rod.steps import pilot_activations
+from softreach.rod.tip_map import Strains, TipMap, loads_too_heavy, no_equilibrium_message
 from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_given, as_instance, as_integer
@@ -47,6 +50,7 @@ QUANTITIES = {
 """Quantity -> unit and meaning."""
 
 _MOST = 1 << 24  # bins, and stations
+_HEADINGS = 720
 _AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
 
 
@@ -109,11 +113,13 @@ def stream_statistics(
     bins = as_integer("bins", bins, 1, _MOST)
     shares = as_shares("quantiles", quantiles)
     blocks = _blocks("activations", activations)
-    rod = stable_tips(tip_map(arm))
+    rod = tip_map(arm)
     places = distal_stations(rod) if stations is None else stations
     z = rod.check_stations(np.atleast_1d(as_floats("stations", places)), ascending=False)
-    ranges = rod.strain_range(z)._asdict()
-    tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
+    tallies = {
+        name: _Tally.between(ends, bins)
+        for name, ends in zip(QUANTITIES, strain_ranges(rod, z), strict=True)
+    }
     for strains in _strains(rod, blocks, z):
         for k in range(len(z)):
             u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
@@ -138,15 +144,77 @@ def _blocks(name: str, value: Any) -> Iterable[Array]:
 
 
 def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
-    strains = rod.strains_at(z)
     for activation in activations:
         block = rod.check_activations("activations", activation)
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
-            curvature, extension = strains(block[rows])
+            curvature, extension = rod.strains(block[rows], z)
             if rod.supports_unstable:  # samples without a stable equilibrium are NaN
                 settled = np.isfinite(extension).all(axis=1)
                 curvature, extension = curvature[settled], extension[settled]
             yield Strains(curvature, extension)
+
+
+def strain_ranges(rod: ArmMap, z: Array) -> tuple[Array, Array, Array]:
+    """Ranges within the activation box of bending, torsion and extension, (station, 2) each.
+
+    Exact but for bending, which is at most 1e-5 too large for fibers and muscles, and with tendons
+    and chambers by as much as their ζ differs. Under loads, and with tendons driven by length, they
+    are those of samples: others may strain the arm a little more.
+
+    Args:
+        rod: The tip map.
+        z: Z of the stations [m].
+
+    Raises:
+        InvalidInput: Under loads no sample has an equilibrium.
+    """
+    driving, inner = rod.inputs.driving, rod.rod
+    if driving is not None and driving.has_length_tendons:
+        whole = all_inputs(rod)
+        return _sampled(whole.strains(whole.box.from_cube(pilot(whole.box.bundles)), z))
+    if not rod.supports_unstable:
+        return _exact(tables(inner.arm, z), inner.box)
+    gamma = pilot_activations(inner.arm, inner.box)
+    strains = inner.strains(gamma, z)
+    if np.isnan(strains.extension).all():
+        raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
+    return _sampled(strains)
+
+
+def _sampled(strains: Strains) -> tuple[Array, Array, Array]:
+    bend = np.hypot(strains.curvature[..., 0], strains.curvature[..., 1])
+    torsion, extension = (
+        np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
+        for values in (strains.curvature[..., 2], strains.extension)
+    )
+    return np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1), torsion, extension
+
+
+def _exact(table: Tables, box: ActivationBox) -> tuple[Array, Array, Array]:
+    bounds = np.stack([box.low, box.high], axis=1)
+    most, torsion = _most_bending(table.curvature[:, :2], bounds), table.curvature[:, 2]
+    bending, torsion = np.stack([np.zeros_like(most), most], axis=1), ends_over(torsion, bounds)
+    extension = 1.0 + ends_over(table.extension, bounds)
+    if table.growth is not table.extension:  # η/ζ = 1 - (ζ - η)/ζ
+        forces = ends_over(table.extension - table.growth, bounds)
+        ratio = 1.0 - _products(forces, 1.0 / extension)
+        bending, torsion = bending * ratio[:, :1], _products(torsion, ratio)
+    return bending, torsion, extension
+
+
+def _products(first: Array, second: Array) -> Array:
+    """Least and largest products of numbers from two ranges, shape (station, 2)."""
+    all_ends = (first[:, :, None] * second[:, None]).reshape(len(first), 4)
+    return np.stack([all_ends.min(axis=1), all_ends.max(axis=1)], axis=1)
+
+
+def _most_bending(plane: Array, bounds: Array) -> Array:
+    """An upper bound of √(u1² + u2²): the support of (u1, u2) toward many headings."""
+    heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
+    toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    along = np.einsum("hc,scb->shb", toward, plane)
+    support = (along[..., None] * bounds).max(-1).sum(-1)
+    return support.max(axis=1) / np.cos(np.pi / _HEADINGS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.tip_map import BLOCK
-from softreach.rod.view import stable_tips
 from softreach.schema import activation_units, cell_dataset, check_cloud, tip_cells
 from softreach.support import parallel
 from softreach.support.arrays import Array
@@ -51,7 +50,7 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     import xarray as xr
 
     check_cloud(cloud)
-    rod, n = stable_tips(tip_map_of(cloud)), cloud.sizes["sample"]
+    rod, n = tip_map_of(cloud), cloud.sizes["sample"]
     if not rod.box.bundles:
         raise InvalidInput("bundles", 0, "1 or more: nothing moves the tip")
     measure, condition = np.empty(n), np.empty(n)

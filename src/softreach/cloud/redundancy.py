@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.neighbors import mean_value_distance
-from softreach.rod.view import activation_measures
+from softreach.rod.inputs import activation_measures
 from softreach.schema import cell_dataset, check_cloud, is_stable, tip_cells
 from softreach.support.arguments import as_dataset, as_number, plain
 from softreach.support.arrays import Array, Index, Mask, as_indices

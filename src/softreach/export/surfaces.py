@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import a_manipulator
-from softreach.arm.skin import inside
+from softreach.arm.skin import arm_surface, bundle_surfaces, inside
 from softreach.export.formats import (
     format_file,
     load_library,
@@ -20,9 +20,7 @@ from softreach.export.formats import (
     write_vtk,
     write_vtu,
 )
-from softreach.geometry.manifold import parted
-from softreach.geometry.surface import SurfaceMesh
-from softreach.rod.arm_shape import arm_surface, bundle_surfaces
+from softreach.geometry.surface import SurfaceMesh, parted
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import PathStatus, PreparedMap, prepared_map
 from softreach.inverse.path import BranchPoint, Continuation
+from softreach.rod.rods import all_inputs
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import View
 from softreach.workspace.search import CLOSELY, nearest_tips
 
 __all__ = ["Drag", "Dragged"]
@@ -114,6 +114,5 @@ class Drag:
         activation = rod.box.with_fixed(point.gamma[None])[0] * self._prepared.measures
         gap = float(np.linalg.norm(point.tip - target))
         within = tuple(float(value) for value in activation)
-        self._last, held = (within, point), point.rod
-        held = held.base if isinstance(held, View) else held
+        self._last, held = (within, point), all_inputs(point.rod)
         return Dragged(within, point.tip, 0.0 if gap <= self._tracker.allowance else gap, held)

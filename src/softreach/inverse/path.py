@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.descent import descend
+from softreach.inverse.nearest import descend
 from softreach.inverse.request import allowance, as_activations, as_residual, as_targets
 from softreach.inverse.solve import solve_inverse
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import free_bundles, measured_bundles, tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
@@ -40,6 +39,7 @@ def track_path(
     *,
     residual_over_length: float = 1e-10,
     tol: float = 1e-6,
+    point: str | None = None,
 ) -> xr.Dataset:
     """Follow a path of tip positions, straight between its points, on one branch.
 
@@ -58,6 +58,8 @@ def track_path(
             bounds do not let the tip come so near, a point is followed by the nearest tip as far as
             `tol`: whether the arm reaches it is more than its tips can say.
         tol: Largest error of the tips themselves, in L. A tip map keeps its own.
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
 
     Returns:
         Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
@@ -71,13 +73,13 @@ def track_path(
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
     points = as_targets("path", path)
-    rod = measured_bundles(tip_map(arm, tol))
+    rod = measured_bundles(tip_map(arm, tol, point=point))
     if rod.box.dimension < 3:
         raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
     residual = as_residual(residual_over_length)
-    tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
+    tracker = Continuation(free_bundles(rod), residual * rod.length)
     if start is not None:
         gamma = as_activations("start", start, rod.box, 1)[0]
         gamma = gamma / rod.measures[rod.box.free]
@@ -202,9 +204,9 @@ class Continuation:
         """Nearest to the last of some places (k, 3), if all are as near as tips can tell."""
         start = np.tile(gamma, (len(targets), 1))
         ends = descend(rod, targets, start, self.residual)
-        if not (ends.residual <= self.allowance).all():
+        if not (ends.distance <= self.allowance).all():
             return None
-        return BranchPoint(ends.gamma[-1], ends.tip[-1], ends.slope[-1], rod)
+        return self.at(ends.gamma[-1], rod)
 
     def _corrected(
         self, rod: TipMap, gamma: Array, target: Array, moving: Mask

@@ -18,9 +18,8 @@ from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
-from softreach.rod.rods import coarsened, tip_map
+from softreach.rod.rods import coarsened, free_bundles, measured_bundles, tip_map
 from softreach.rod.tip_map import Frame, TipMap
-from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -53,11 +52,8 @@ class PreparedMap:
 
     @lazy
     def rod(self) -> TipMap:
-        """The tip map of the free bundles; held ones are no variables of any search.
-
-        Where an arm under loads has no stable equilibrium, it is NaN.
-        """
-        return free_bundles(stable_tips(self.whole))
+        """The tip map of the free bundles; held ones are no variables of any search."""
+        return free_bundles(self.whole)
 
     @lazy
     def coarse_rod(self) -> TipMap:
@@ -135,6 +131,7 @@ def prepared_map(
     *,
     cells: int = _CELLS,
     frame: Frame = "world",
+    point: str | None = None,
 ) -> PreparedMap:
     """Prepare an arm for `solve_inverse`; the last four are remembered.
 
@@ -143,6 +140,8 @@ def prepared_map(
         tol: Largest tip error, in L.
         cells: With three free bundles: cells along each axis of the activation box.
         frame: In which targets are told: that of the "world" or of the "base".
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
 
     Raises:
         InvalidInput: Numbers out of range, or an arm that was prepared in another frame.
@@ -153,7 +152,7 @@ def prepared_map(
             hint = "prepare the arm with this frame"
             raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
-    return _of_map(measured_bundles(tip_map(arm, tol, frame=frame)), cells)
+    return _of_map(measured_bundles(tip_map(arm, tol, frame=frame, point=point)), cells)
 
 
 @lru_cache(maxsize=4)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch
+from softreach.inverse.direction import compromises
 from softreach.inverse.least_change import least_changes
-from softreach.inverse.nearest import Nearest, nearest, nearest_from
+from softreach.inverse.nearest import nearest, nearest_from
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
 from softreach.inverse.request import (
@@ -36,6 +35,7 @@ from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_number
 from softreach.support.arrays import Array, Mask, as_directions, joined, rows
 from softreach.support.errors import Range
+from softreach.workspace.search import Nearest
 
 __all__ = ["solve_inverse"]
 
@@ -58,6 +58,7 @@ def solve_inverse(
     seed: int = 0,
     tol: float = 1e-6,
     frame: Frame = "world",
+    point: str | None = None,
 ) -> Solutions:
     """The activations that put the tip at each target, or as near to it as the arm can reach.
 
@@ -97,6 +98,8 @@ def solve_inverse(
             keeps its own.
         frame: In which targets and directions are told: that of the "world", or of the "base",
             whose z is along the straight arm.
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
 
     Returns:
         One `Solution` for each target; failures are its status, never an exception.
@@ -104,7 +107,7 @@ def solve_inverse(
     Raises:
         InvalidInput: Arguments of another shape, not finite, or out of range.
     """
-    prepared = prepared_map(arm, tol, frame=frame)
+    prepared = prepared_map(arm, tol, frame=frame, point=point)
     points, box = as_targets("targets", targets), prepared.whole.box
     preferred = np.zeros(box.bundles) if near is None else near
     unit = None if direction is None else as_directions("direction", direction, len(points))
@@ -127,16 +130,7 @@ def solve_inverse(
         solve, size = _by_branches, _BRANCH_BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
-    solutions = solutions.in_units_of(prepared.measures)
-    return replace(solutions, leans=_leans(prepared.whole, solutions.activations))
-
-
-def _leans(rod: TipMap, activations: Array) -> Mask:
-    """Mask of activations whose postures lean to one of two sides; of driven arms none is told."""
-    loaded = tip_map(rod.arm, rod.tol, frame="base", warn=False)
-    if isinstance(loaded, LoadedRod):
-        return loaded.leans(activations)
-    return np.zeros(len(activations), bool)
+    return solutions.in_units_of(prepared.measures)
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
@@ -145,11 +139,11 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
-    bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
+    bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
     # A target not proved to be out of reach may have roots that are nearly singular.
-    left = (closest.gap > request.residual) & (bounds == 0.0)
+    left = (closest.distance > request.residual) & (bounds == 0.0)
     if not prepared.proves:
-        left &= closest.gap <= _NEARLY * prepared.whole.length
+        left &= closest.distance <= _NEARLY * prepared.whole.length
     if left.any():
         late = nearly_singular_roots(prepared, request, missing[left])
         late = distinct(prepared, request, late)
@@ -161,7 +155,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     """Nearest points, or compromises between distance and direction."""
     roots = every_branch(prepared, request) if prepared.dimension == 3 else None
-    closest = nearest(prepared, request, roots)
+    closest = (nearest if request.direction is None else compromises)(prepared, request, roots)
     return _solutions(prepared, request, no_roots(prepared.rod), closest)
 
 
@@ -197,8 +191,8 @@ def _solutions(
     rod, count = prepared.rod, len(request.targets)
     missing = roots.missing(count)
     if bounds is None:
-        bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
-    hit = closest.gap <= request.allowance
+        bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
+    hit = closest.distance <= request.allowance
     roots = roots.joined(roots_at(rod, request.targets, missing[hit], closest.gamma[hit]))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual
@@ -211,22 +205,31 @@ def _solutions(
     points = request.targets.copy()
     off = reached[gaps[reached] > request.residual]
     points[off] = placed(rod, gamma[off])
-    points[missing], gamma[missing], gaps[missing] = closest.tip, closest.gamma, closest.gap
+    points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
+    activations = prepared.whole.box.with_fixed(roots.gamma)
     return Solutions(
         arm=prepared.whole.arm,
         frame=prepared.whole.frame,
         bundles=prepared.whole.box.names,
         targets=request.targets,
         offsets=np.searchsorted(roots.target, np.arange(count + 1)),
-        activations=prepared.whole.box.with_fixed(roots.gamma),
+        activations=activations,
         residuals=roots.residual,
         conditions=conditions(roots.slope),
         margins=rod.box.margin(roots.gamma),
-        leans=np.zeros(len(roots.target), bool),
+        leans=_leans(prepared.whole, activations),
         statuses=statuses,
         nearest=points,
         nearest_activations=prepared.whole.box.with_fixed(gamma),
         gaps=gaps,
         gap_bounds=proved_gaps,
     )
+
+
+def _leans(rod: TipMap, activations: Array) -> Mask:
+    """Mask of activations at which an arm under loads leans to one of two sides."""
+    known = tip_map(rod)
+    if isinstance(known.rod, LoadedRod):
+        return known.rod.leans(known.inputs.activations(activations))
+    return np.zeros(len(activations), bool)

@@ -15,7 +15,6 @@ from softreach.requirements.chosen_poses import effort_scales
 from softreach.requirements.poses import PoseRules
 from softreach.rod.rods import in_steps
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 
@@ -108,7 +107,7 @@ class Point:
         needs, parts = self.design.problem.requirements, []
         within = needs.within
         for number, (rod, cube) in enumerate(self._by_payload()):
-            tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+            tips = rod.tips(rod.box.from_free_cube(cube))
             gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
             slopes = cache(partial(self._tip_slopes, number))
             for k, gap in enumerate(gaps):
@@ -121,7 +120,7 @@ class Point:
         """Derivatives of tips over L under one payload, shape (place, 3, unknowns)."""
         rod, cube = self._by_payload()[number]
         box, count = rod.box, len(self.reals)
-        _, slopes = stable_tips(rod).tips_and_slopes(box.from_free_cube(cube))
+        _, slopes = rod.tips_and_slopes(box.from_free_cube(cube))
         result = np.zeros((len(cube), 3, self._size))
         result[:, :, :count] = self.design.derivatives[number].at(cube) @ self.design.chain
         for j, column in enumerate(self._columns(number)):

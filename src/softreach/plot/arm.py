@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.skin import inside
+from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.projection import View
 from softreach.picture.shading import draw_mesh, faces_to_eye
 from softreach.picture.zbuffer import ZBuffer
@@ -24,7 +24,7 @@ from softreach.plot.style import (
     pyplot,
     some_bundles,
 )
-from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
+from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_instance, as_number
 from softreach.support.arrays import Array, Mask, as_stations

@@ -25,7 +25,7 @@ from softreach.plot.style import (
     place_panels,
     write_note,
 )
-from softreach.rod.arm_shape import rest_configuration
+from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_number

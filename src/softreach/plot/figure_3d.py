@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.skin import inside
+from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.cloud.clouds import design_of
 from softreach.geometry.surface import compact_surface, simplified
 from softreach.geometry.tube import tube_surface
@@ -23,7 +23,7 @@ from softreach.plot.clouds import drawn_tips, point_size
 from softreach.plot.coloring import BundleKey, ScalarKey, color_map, color_samples, key_entries
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import a_surface
-from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
+from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_cloud, a_configuration
 from softreach.support.arguments import as_given, as_text

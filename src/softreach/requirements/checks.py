@@ -46,6 +46,7 @@ def check(
     requirements: Requirements,
     *,
     accuracy: float = 1e-2,
+    point: str | None = None,
     progress: Progress | None = None,
 ) -> Check:
     """A design against requirements, every one of them judged.
@@ -59,6 +60,7 @@ def check(
         arm: The design.
         requirements: The requirements.
         accuracy: Error of shares of regions that are covered, and relative error of volumes.
+        point: Name of the marker that counts as the tip; by default that of the design.
         progress: Called with the number of places done since its last call.
 
     Returns:
@@ -71,7 +73,7 @@ def check(
     Warns:
         SoftreachWarning: The error of a reachable set is larger than asked.
     """
-    arm = a_manipulator("arm", arm)
+    arm = a_manipulator("arm", arm).at_point(point)
     needs = as_instance("requirements", requirements, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.2))
     if not (needs.targets or needs.keeps or needs.limits.given or needs.measures):

@@ -15,7 +15,6 @@ from softreach.requirements.check_result import TOL
 from softreach.requirements.poses import PoseRules
 from softreach.rod.bending import some_corners
 from softreach.rod.rods import tip_map
-from softreach.rod.view import stable_tips
 from softreach.sampling import sample_cube
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
@@ -99,7 +98,7 @@ def descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     rod, count = rules.rod, len(places)
     gamma = rod.box.from_cube(sample_cube("sobol", _SEEDS, rod.box.bundles))
     gamma = np.concatenate([gamma, some_corners(rod)])
-    tips = stable_tips(rod).tips(gamma)
+    tips = rod.tips(gamma)
     known = np.isfinite(tips).all(axis=1)
     if not known.any():
         return _fallen(rules, places)

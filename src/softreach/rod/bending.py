@@ -18,7 +18,7 @@ from softreach.arm.bending import (
     smallest_bending,
 )
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import tip_map, with_unstable
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
@@ -61,11 +61,10 @@ def bending_over_bounds(arm: Manipulator) -> BendingRange:
         least, largest = smallest_bending(arm).value, largest_bending(arm).value
         gentlest = float((bending_at(arm, stations)[0] * radius).min()) if least else 0.0
         return BendingRange(least, largest, gentlest, sharpest_bending(arm), exact=True)
-    rod = tip_map(arm, warn=False)
-    strains_of = rod.strains_at(stations)
+    rod = with_unstable(tip_map(arm, warn=False))
 
     def bending(gamma: Array) -> Array:
-        curvature = strains_of(gamma).curvature
+        curvature = rod.strains(gamma, stations).curvature
         return np.hypot(curvature[..., 0], curvature[..., 1])
 
     def ends(gamma: Array) -> Array:

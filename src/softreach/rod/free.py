@@ -1,29 +1,35 @@
-"""The free rod: no load but its actuators, so that activations alone decide its shape."""
+"""Rods of arms, and the free one: activations alone decide its shape."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import abstractmethod
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple, Self
+from functools import lru_cache, partial
+from threading import RLock
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.tables import Tables, ends_over, tables
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.stations import Marker
+from softreach.arm.tables import Tables, check_extension, strain_stations, tables
 from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import slopes as derivatives
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.arm_rod import ArmRod
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
 from softreach.rod.tip_map import (
+    SMALLEST_TOL,
+    Frame,
     Frames,
+    Shapes,
     Status,
-    StrainRange,
     Strains,
+    TipMap,
     TipStatus,
+    check_tol,
     drop,
     position_slopes,
 )
@@ -32,7 +38,105 @@ from softreach.support.lazy import lazy
 
 Array = NDArray[np.float64]
 
-_HEADINGS = 720
+_LEVER = 4.0  # of what is off by turning at the tip, over what is off by moving, per length
+
+
+@dataclass(frozen=True, repr=False)
+class ArmRod(TipMap):
+    """The rod that one arm is, free or loaded, in the activations of all its bundles.
+
+    Places are in the frame of the base.
+
+    Raises:
+        InvalidInput: `tol` out of range.
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+
+    arm: Manipulator
+    tol: float = 1e-6
+    fixed_steps: int | None = None
+    """Steps along the arm, if nothing breaks it, in place of those that `tol` needs."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tol", check_tol(self.tol))
+        check_extension(self.arm)
+
+    @property
+    def frame(self) -> Frame:
+        """That of the base, which is the world's where the arm stands upright at its origin."""
+        return "world" if self.arm.base.is_identity else "base"
+
+    @lazy
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
+
+    @property
+    def point(self) -> Marker | None:
+        return self.arm.pointed
+
+    @lazy
+    def end(self) -> float:
+        """Z of the section that the point goes with [m]."""
+        return self.length if self.point is None else self.point.station_at("station", self.length)
+
+    @lazy
+    def offset(self) -> Array:
+        """The point from the center of its section, in the directors [m], shape (3,)."""
+        return np.zeros(3) if self.point is None else np.array(self.point.offset)
+
+    @lazy
+    def reach(self) -> float:
+        """Distance of the point from the center of its section [m]."""
+        return float(np.linalg.norm(self.offset))
+
+    @lazy
+    def _tip_tol(self) -> float:
+        """Tolerance of the center of the section, with which the point is as accurate as asked."""
+        return max(self.tol / (1.0 + _LEVER * self.reach / self.length), SMALLEST_TOL)
+
+    def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
+        """Smallest ζ, or η, along the arm at activations (n, bundles), shape (n,).
+
+        And the largest angle by which a step turns the arm [rad], η |Uγ| R2 dS, shape (n,).
+        """
+        table, profile = tables_at(self.arm, strain_stations(self.arm)), self.arm.profile
+        step = profile.radius(table.stations) * (profile.slender_length / self.steps)
+        least, most = np.empty((2, len(gamma)))
+        with np.errstate(all="ignore"):  # what overflows is no arm
+            for block in parallel.blocks(len(gamma), 1024):
+                extension = growth = 1.0 + gamma[block] @ table.extension.T
+                if table.growth is not table.extension:
+                    growth = 1.0 + gamma[block] @ table.growth.T
+                bend = np.linalg.norm(
+                    np.einsum("scb,nb->nsc", table.curvature, gamma[block]), axis=-1
+                )
+                least[block] = np.minimum(extension, growth).min(axis=1)
+                most[block] = (growth * bend * step).max(axis=1)
+        return least, most
+
+    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
+        """Frames at ascending stations Z [m], and m in the directors there [N m], (n, station, 3).
+
+        Without loads there is none.
+        """
+        return self.frames(gamma, z, status), np.zeros((len(gamma), len(z), 3))
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Compute what every sample needs."""
+
+    def prepare(self) -> None:
+        known = vars(self)
+        if "_is_prepared" in known:
+            return
+        with known.setdefault("_lock", RLock()):
+            if "_is_prepared" not in known:
+                self._prepare()
+                known["_is_prepared"] = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_lock"}
 
 
 @dataclass(frozen=True, repr=False)
@@ -52,20 +156,18 @@ class FreeRod(ArmRod):
     @lazy
     def _fineness(self) -> int:
         """Uniform steps in S, of which none may be longer."""
-        return self.rule.steps_for(self.tol)
+        return self.fixed_steps or self.rule.steps_for(self._tip_tol)
 
     @lazy
     def _shape_steps(self) -> int:
         """Steps with which `tol` holds all along the arm, and directors lose no digits."""
-        return max(self._fineness, self.rule.steps_for_shapes(self.tol))
+        return self.fixed_steps or max(self._fineness, self.rule.steps_for_shapes(self.tol))
 
     @lazy
     def _table(self) -> Array:
-        return self.rule.packed_nodes(self._fineness)
-
-    def in_steps(self, steps: int) -> Self:
-        vars(self).update(_fineness=steps, _shape_steps=steps)
-        return self
+        if self.end == self.length:
+            return self.rule.packed_nodes(self._fineness)
+        return self.rule.packed_stations(np.array([self.end]), self._fineness)[0]
 
     def _prepare(self) -> None:
         self._table  # noqa: B018
@@ -81,20 +183,25 @@ class FreeRod(ArmRod):
         directions: Array | None = None,
     ) -> None:
         """Put tips, and what else is asked for, into place: theory (25) and (31)."""
+        has_offset = self.reach > 0.0
+        if has_offset and slopes is not None and twists is None:
+            twists = np.empty((len(gamma), 6, gamma.shape[1]))
         if twists is not None:
             jacobian.jacobians(self._table, gamma, tips, twists)
-            if slopes is not None:
-                position_slopes(tips, twists, slopes)
         elif slopes is not None:
             derivatives.slopes(self._table, gamma, tips, slopes)
         else:
             rod.tips(self._table, gamma, tips)
-        if status is not None:
-            status[:] = TipStatus.STABLE
-        if directions is not None:
+        if has_offset or directions is not None:
             place, directors = np.empty((len(gamma), 1, 3)), np.empty((len(gamma), 1, 3, 3))
             frames.frames(*self._tip_table, gamma, place, directors)
-            directions[:] = directors[:, 0, 2]
+            add_offset(tips, self.offset, directors[:, 0])
+            if directions is not None:
+                directions[:] = directors[:, 0, 2]
+        if slopes is not None and twists is not None:
+            position_slopes(tips, twists, slopes)
+        if status is not None:
+            status[:] = TipStatus.STABLE
 
     def farthest(self) -> float:
         """No tip is farther from the base than this [m], the length of the longest arm."""
@@ -108,48 +215,58 @@ class FreeRod(ArmRod):
 
     @lazy
     def _linearization(self) -> Linearization:
-        return Linearization(self.arm, self.box)
+        return Linearization(self.arm, self.box, self.end, self.reach)
 
-    def frames(
-        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
-    ) -> Frames:
+    def shapes(
+        self,
+        activations: ArrayLike,
+        framed: ArrayLike,
+        strained: ArrayLike,
+        status: Status | None = None,
+    ) -> Shapes:
+        """Centerlines and directors, and u = Uγ η/ζ and ζ = 1 + z·γ: theory (7)."""
         gamma, lost = self.with_arms(self.box.check(activations))
-        z = self.check_stations(stations)
-        is_tip = len(z) == 1 and z[0] == self.length
+        z, at = np.asarray(framed, float), np.asarray(strained, float)
+        strains = per_length(*linear_strains(tables_at(self.arm, at), gamma))
+        shapes = Shapes(*self._frames(gamma, z), *strains)
+        if status is not None:
+            status[:] = TipStatus.STABLE
+        drop(lost, status, *shapes)
+        return shapes
+
+    def _frames(self, gamma: Array, z: Array) -> Frames:
+        result = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
+        if not len(z):
+            return result
+        is_tip = len(z) == 1 and z[0] == self.end
         packed = self.rule.packed_stations
         table, ends = self._tip_table if is_tip else packed(z, self._shape_steps)
-        result = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
         parallel.run(
             partial(frames.frames, table, ends, gamma[b], result.position[b], result.directors[b])
             for b in parallel.blocks(len(gamma), 1024)
         )
-        if status is not None:
-            status[:] = TipStatus.STABLE
-        drop(lost, status, *result)
         return result
-
-    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """u = Uγ η/ζ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
-        table = tables(self.arm, self.check_stations(stations, ascending=False))
-
-        def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
-            gamma, lost = self.with_arms(self.box.check(activations))
-            strain = per_length(*linear_strains(table, gamma))
-            if status is not None:
-                status[:] = TipStatus.STABLE
-            drop(lost, status, *strain)
-            return strain
-
-        return strains
-
-    def strain_range(self, stations: ArrayLike) -> StrainRange:
-        z = self.check_stations(stations, ascending=False)
-        return strain_range(tables(self.arm, z), self.box)
 
     @lazy
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
         steps = max(self._fineness, self.rule.fewest_for_frames)
-        return self.rule.packed_stations(np.array([self.length]), steps)
+        return self.rule.packed_stations(np.array([self.end]), steps)
+
+
+def add_offset(tips: Array, offset: Array, directors: Array) -> None:
+    """Move tips (n, 3) by an offset in their directors (n, 3, 3); by nothing, bit for bit."""
+    for k in np.flatnonzero(offset):
+        tips += offset[k] * directors[:, k]
+
+
+def tables_at(arm: Manipulator, stations: Array) -> Tables:
+    """Tables at stations [m], kept for the next block of activations."""
+    return _tables_at(arm, stations.tobytes())
+
+
+@lru_cache(maxsize=64)
+def _tables_at(arm: Manipulator, stations: bytes) -> Tables:
+    return tables(arm, np.frombuffer(stations))
 
 
 class LinearStrains(NamedTuple):
@@ -197,31 +314,3 @@ def per_length(curvature: Array, extension: Array, growth: Array) -> Strains:
     if growth is not extension:
         curvature = curvature * (growth / extension)[..., None]
     return Strains(curvature, extension)
-
-
-def strain_range(table: Tables, box: ActivationBox) -> StrainRange:
-    """Ranges of the strains of all activations in a box; where η is not ζ, bounds of them."""
-    bounds = np.stack([box.low, box.high], axis=1)
-    most, torsion = _most_bending(table.curvature[:, :2], bounds), table.curvature[:, 2]
-    bending, torsion = np.stack([np.zeros_like(most), most], axis=1), ends_over(torsion, bounds)
-    extension = 1.0 + ends_over(table.extension, bounds)
-    if table.growth is not table.extension:  # η/ζ = 1 - (ζ - η)/ζ
-        forces = ends_over(table.extension - table.growth, bounds)
-        ratio = 1.0 - _products(forces, 1.0 / extension)
-        bending, torsion = bending * ratio[:, :1], _products(torsion, ratio)
-    return StrainRange(bending, torsion, extension)
-
-
-def _products(first: Array, second: Array) -> Array:
-    """Least and largest products of numbers from two ranges, shape (station, 2)."""
-    all_ends = (first[:, :, None] * second[:, None]).reshape(len(first), 4)
-    return np.stack([all_ends.min(axis=1), all_ends.max(axis=1)], axis=1)
-
-
-def _most_bending(plane: Array, bounds: Array) -> Array:
-    """An upper bound of √(u1² + u2²): the support of (u1, u2) toward many headings."""
-    heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
-    toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    along = np.einsum("hc,scb->shb", toward, plane)
-    support = (along[..., None] * bounds).max(-1).sum(-1)
-    return support.max(axis=1) / np.cos(np.pi / _HEADINGS)

@@ -6,7 +6,7 @@ otherwise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +16,8 @@ from softreach.arm.driving import body_of
 from softreach.arm.lines import lengths_of_strains
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import quadrature
-from softreach.rod.driven import DrivenRod
-from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import Frame, Frames, Strains, TipMap
-from softreach.rod.view import View
+from softreach.rod.rods import ArmMap, tip_map, with_unstable
+from softreach.rod.tip_map import Frame, Frames, Shapes, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import as_floats
@@ -30,7 +28,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "configuration",
+    "marked",
     "marker_positions",
+    "marker_sections",
+    "rest_configuration",
     "shape_dataset",
     "stations_along",
     "tip_jacobian",
@@ -67,7 +68,7 @@ def tip_positions(
             (ζ <= 0) or none that the steps follow; or a `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    rod = tip_map(arm, tol, frame=frame)
+    rod = with_unstable(tip_map(arm, tol, frame=frame))
     return rod.tips(rod.check_activations("activations", activations))
 
 
@@ -95,7 +96,7 @@ def tip_jacobian(
     Raises:
         InvalidInput: As for `tip_positions`.
     """
-    rod = tip_map(arm, tol, frame=frame)
+    rod = with_unstable(tip_map(arm, tol, frame=frame))
     return rod.tip_twists(rod.check_activations("activations", activations))[1]
 
 
@@ -121,24 +122,35 @@ def marker_positions(
     Raises:
         InvalidInput: As for `tip_positions`.
     """
-    rod = tip_map(arm, tol, frame=frame)
+    rod = with_unstable(tip_map(arm, tol, frame=frame))
     gamma = rod.check_activations("activations", activations)
     return _markers(rod, gamma)
 
 
-def _markers(rod: TipMap, gamma: Array) -> Array:
-    """r + x d1 + y d2 + z d3 of each marker at checked activations [m], shape (n, marker, 3)."""
-    markers = rod.arm.markers
-    if not markers:
-        return np.empty((len(gamma), 0, 3))
-    # together, so that each equilibrium is found once
-    z, section = np.unique(
-        [m.station_at("station", rod.length) for m in markers], return_inverse=True
-    )
-    frames = rod.frames(gamma, z)
-    offsets = np.array([marker.offset for marker in markers])
-    turned = np.einsum("mk,nmkx->nmx", offsets, frames.directors[:, section])
+def marker_sections(arm: Manipulator) -> Array:
+    """Z of the sections of all markers [m], ascending."""
+    return np.unique([marker.station_at("station", arm.length) for marker in arm.markers])
+
+
+def marked(arm: Manipulator, z: Array, frames: Frames) -> Array:
+    """r + x d1 + y d2 + z d3 of each marker [m], shape (n, marker, 3).
+
+    Args:
+        arm: The design.
+        z: Ascending stations that hold `marker_sections` [m].
+        frames: The arms there.
+    """
+    if not arm.markers:
+        return np.empty((len(frames.position), 0, 3))
+    stations = [marker.station_at("station", arm.length) for marker in arm.markers]
+    section, offsets = np.searchsorted(z, stations), [marker.offset for marker in arm.markers]
+    turned = np.einsum("mk,nmkx->nmx", np.array(offsets), frames.directors[:, section])
     return frames.position[:, section] + turned
+
+
+def _markers(rod: TipMap, gamma: Array) -> Array:
+    z = marker_sections(rod.arm)
+    return marked(rod.arm, z, rod.frames(gamma, z)) if len(z) else np.empty((len(gamma), 0, 3))
 
 
 def configuration(
@@ -169,53 +181,75 @@ def configuration(
         InvalidInput: Activations or stations of another shape or out of range, or activations
             under which there is no arm (ζ <= 0).
     """
-    rod = tip_map(arm, tol, frame=frame)
+    rod = with_unstable(tip_map(arm, tol, frame=frame))
     values = as_floats("activation", activation)
     gamma = rod.check_activations("activation", np.atleast_2d(values))
-    z = stations_along(rod, stations)
-    status = np.empty(len(gamma), np.int8)
-    frames, strains = rod.frames(gamma, z, status), rod.strains(gamma, z)
-    dataset = shape_dataset(rod, gamma, z, frames, strains, **_lines(rod, gamma))
+    z, status = stations_along(rod, stations), np.empty(len(gamma), np.int8)
+    shapes = rod.shapes(gamma, z, z, status)
+    others = {"marker_position": _markers(rod, gamma), **_lines(rod, gamma)}
+    dataset = shape_dataset(rod, gamma, z, shapes, **others)
     if rod.supports_unstable:
         dataset = schema.with_status(dataset, status)
     return dataset.isel(sample=0) if values.ndim == 1 else dataset
 
 
+def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
+    """The arm before activation: straight from its base, directors along the axes of that.
+
+    Args:
+        arm: The design.
+        stations: Number of stations, evenly spaced in Z.
+    """
+    z = np.linspace(0.0, arm.length, stations)
+    straight = np.zeros((1, stations, 3))
+    straight[..., 2] = z
+    directors = np.tile(np.eye(3), (1, stations, 1, 1))
+    nodes = len(quadrature(body_of(arm))[0])
+    straight_lines = lengths_of_strains(arm, np.zeros((1, nodes, 3)), np.ones((1, nodes)))
+    lines: dict[str, Any] = {"line_length": straight_lines} if arm.bundles else {}
+    shape = schema.configuration_dataset(
+        arm,
+        np.zeros((1, arm.inputs)),
+        z,
+        position=arm.base.to_world(straight),
+        directors=arm.base.directions_to_world(directors),
+        curvature=np.zeros((1, stations, 3)),
+        extension=np.ones((1, stations)),
+        radius=arm.profile.radius(z),
+        **lines,
+    )
+    return shape.isel(sample=0)
+
+
 def shape_dataset(
-    rod: TipMap, gamma: Array, z: Array, frames: Frames, strains: Strains, **lines: Array
+    rod: TipMap, gamma: Array, z: Array, shapes: Shapes, **others: Array
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
-    markers = {"marker_position": _markers(rod, gamma)} if rod.arm.markers else {}
     return schema.configuration_dataset(
         rod.arm,
         gamma * rod.measures,
         z,
         names=rod.box.names,
         frame=rod.frame,
-        **frames._asdict(),
-        **strains._asdict(),
+        **shapes._asdict(),
         radius=rod.radius(z),
-        **markers,
-        **lines,
+        **{name: values for name, values in others.items() if values.shape[1]},
     )
 
 
-def _lines(rod: TipMap, gamma: Array) -> dict[str, Array]:
+def _lines(rod: ArmMap, gamma: Array) -> dict[str, Array]:
     """Lengths of the lines of bundles, and what drives and displacements activate there."""
-    arm = rod.arm
+    arm, length = rod.arm, np.empty((len(gamma), rod.arm.bundles))
     if not arm.bundles:
         return {}
-    strains_at = rod.strains_at(quadrature(body_of(arm))[0])
-    length = np.empty((len(gamma), arm.bundles))
+    nodes = quadrature(body_of(arm))[0]
     for block in parallel.blocks(len(gamma), _LINES_TOGETHER):
-        strains = strains_at(gamma[block])
-        turn = strains.curvature * strains.extension[..., None]
-        length[block] = lengths_of_strains(arm, turn, strains.extension)
+        curvature, extension = rod.strains(gamma[block], nodes)
+        length[block] = lengths_of_strains(arm, curvature * extension[..., None], extension)
     if arm.is_direct:
         return {"line_length": length}
-    while isinstance(rod, View | DrivenRod):
-        rod, gamma = rod.base, rod.activations(gamma)
-    return {"line_length": length, "bundle_activation": gamma[:, : arm.bundles]}
+    activation = rod.inputs.activations(gamma)[:, : arm.bundles]
+    return {"line_length": length, "bundle_activation": activation}
 
 
 def stations_along(rod: TipMap, stations: int | ArrayLike) -> Array:

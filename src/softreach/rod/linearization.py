@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import both_sides, tables
-from softreach.kernels.rod.relative_strains import relative_strains
+from softreach.arm.tables import Tables, both_sides, tables
+from softreach.kernels.rod.frames import relative_strains
 from softreach.rod.activation_box import ActivationBox
 from softreach.support.lazy import lazy
 
@@ -73,10 +73,14 @@ class _Terms(NamedTuple):
 class Linearization:
     """The bounds for one arm, its tables computed once."""
 
-    def __init__(self, arm: Manipulator, box: ActivationBox) -> None:
+    def __init__(self, arm: Manipulator, box: ActivationBox, end: float, reach: float) -> None:
+        """Bounds for a point at a distance from the center of the section at Z = end [m]."""
         # Even in S, in which the response of a tapered arm is even.
         s = np.linspace(0.0, arm.profile.slender_length, _STATIONS)
-        table = tables(arm, both_sides(arm, arm.profile.station(s)))
+        z = both_sides(arm, arm.profile.station(s))
+        table = tables(arm, np.minimum(z, end) if end < arm.length else z)
+        if reach > 0.0:
+            table = _with_rigid_end(table, end, reach)
         self.stations, self.curvature = table.stations, table.curvature
         self.extension, self.stretch = table.extension, np.abs(table.extension)
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths
@@ -162,6 +166,18 @@ class Linearization:
         if len(free) > _MOST_SIGNS:
             return np.linalg.norm(of_each, axis=1).sum(axis=1)[None]
         return np.linalg.norm(np.einsum("scj,dj->dsc", of_each, _signs(len(free))), axis=2)
+
+
+def _with_rigid_end(table: Tables, end: float, reach: float) -> Tables:
+    """Tables with a straight piece beyond the end that nothing deforms [m]."""
+    z = np.concatenate([table.stations, [end, end + reach]])
+
+    def ending(values: Array) -> Array:
+        return np.concatenate([values, np.zeros_like(values[:2])])
+
+    extension = ending(table.extension)
+    growth = extension if table.growth is table.extension else ending(table.growth)
+    return Tables(z, extension, ending(table.curvature), growth)
 
 
 def _signs(count: int) -> Array:

@@ -18,8 +18,7 @@ from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
-from softreach.rod.arm_rod import ArmRod
-from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.free import ArmRod
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput
 
@@ -237,12 +236,8 @@ def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
     back[order] = np.arange(len(z))
     status = np.zeros(len(gamma), np.int8)
     ascending = np.clip(z[order], 0.0, rod.length)
-    if isinstance(rod, LoadedRod):
-        shapes = rod.shapes(gamma, ascending, status)
-        frames, moment = shapes.frames, shapes.moment[:, back]
-    else:
-        frames = rod.frames(gamma, ascending, status)
-        moment = np.zeros((len(gamma), len(z), 3))
+    frames, moment = rod.with_moments(gamma, ascending, status)
+    moment = moment[:, back]
     position, directors = frames.position[:, back], frames.directors[:, back]
     steps, count, asked = table.stations.shape[0], table.stations.size, len(table.asked)
     return RodState(

@@ -1,28 +1,255 @@
-"""The tip map of an arm, free or loaded, kept for the next call."""
+"""The tip map of an arm: its rod, free or loaded, between inputs and a pose in the world."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import lru_cache, partial
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.driving import inner_arm
 from softreach.arm.load_number import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.arm_rod import ArmRod
-from softreach.rod.driven import DrivenRod
-from softreach.rod.free import FreeRod
-from softreach.rod.tip_map import Frame, TipMap, check_tol
-from softreach.rod.view import PlacedRod, View
-from softreach.support.arguments import as_flag, as_given, as_one_of
+from softreach.arm.stations import Marker
+from softreach.kernels.rod.frames import move, turn
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.free import ArmRod, FreeRod
+from softreach.rod.inputs import Inputs
+from softreach.rod.tip_map import (
+    Array,
+    Frame,
+    Frames,
+    Shapes,
+    Status,
+    TipMap,
+    TipStatus,
+    check_tol,
+    drop,
+)
+from softreach.support.arguments import as_flag, as_given, as_instance, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
+from softreach.support.lazy import lazy
 
-__all__ = ["coarsened", "effective", "in_steps", "refined", "tip_map"]
+__all__ = [
+    "ArmMap",
+    "all_inputs",
+    "coarsened",
+    "effective",
+    "free_bundles",
+    "in_steps",
+    "measured_bundles",
+    "of_tip",
+    "refined",
+    "tip_map",
+    "with_unstable",
+]
+
+
+@dataclass(frozen=True, repr=False)
+class ArmMap(TipMap):
+    """The tip map of an arm: a rod in the frame of its base, between inputs and a pose.
+
+    Tips of unstable equilibria are NaN, as a real arm leaves them; see `with_unstable`.
+    """
+
+    rod: TipMap
+    """Kernels and physics: tips in the frame of the base at the activations of sections."""
+    inputs: Inputs
+    """The activations of the rod at x."""
+    pose: Base = UPRIGHT
+    """Of the base in the frame of places."""
+    unstable: bool = False
+    """True if unstable equilibria have tips."""
+    arm: Manipulator = field(init=False, compare=False)
+    tol: float = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        driving = self.inputs.driving
+        object.__setattr__(self, "arm", self.rod.arm if driving is None else driving.arm)
+        object.__setattr__(self, "tol", self.rod.tol)
+
+    @classmethod
+    def of(cls, rod: TipMap, pose: Base = UPRIGHT) -> ArmMap:
+        """The map of a rod in the activations of its sections."""
+        return cls(rod, Inputs.of(rod.box), pose)
+
+    @property
+    def frame(self) -> Frame:
+        return self.rod.frame if self.pose.is_identity else "world"
+
+    @property
+    def point(self) -> Marker | None:
+        return self.rod.point
+
+    @lazy
+    def box(self) -> ActivationBox:
+        """Bounds of x."""
+        return self.inputs.box
+
+    @lazy
+    def measures(self) -> Array:
+        return self.inputs.measures
+
+    @property
+    def steps(self) -> int:
+        return self.rod.steps
+
+    @lazy
+    def supports_unstable(self) -> bool:
+        return self.rod.supports_unstable
+
+    @property
+    def is_smooth(self) -> bool:
+        """True if tips depend smoothly on x within the bounds, on each branch."""
+        driving = self.inputs.driving
+        return self.rod.is_smooth and (driving is None or driving.is_smooth)
+
+    @property
+    def kinks(self) -> list[Array]:
+        return self.rod.kinks if self.inputs.are_activations else self.inputs.kinks
+
+    def prepare(self) -> None:
+        self.rod.prepare()
+        if self.inputs.driving is not None:
+            self.inputs.activations(self.box.low[None])
+
+    def continued_from(self, gamma: Array) -> TipMap:
+        if not self.supports_unstable:
+            return self
+        activation = self.inputs.activations(gamma)
+        rod = self.rod.continued_from(activation)
+        if rod is self.rod:
+            return self
+        return replace(self, rod=rod, inputs=self.inputs.continued_from(activation))
+
+    def fill(
+        self,
+        gamma: Array,
+        tips: Array,
+        slopes: Array | None = None,
+        *,
+        twists: Array | None = None,
+        status: Status | None = None,
+        directions: Array | None = None,
+    ) -> None:
+        """Put tips, and what else is asked for, of inputs into place."""
+        if self._is_rod:
+            others = {"twists": twists, "status": status, "directions": directions}
+            self.rod.fill(gamma, tips, slopes, **others)
+            return
+        wanted, of_drives = (slopes, twists), None
+        if slopes is None and twists is None:
+            inner = self.inputs.activations(gamma)
+        else:
+            inner, of_drives = self.inputs.with_slopes(gamma)
+        rooms = [  # for derivatives along the activations of the rod
+            values
+            if values is None or self.inputs.are_activations
+            else np.empty((*values.shape[:2], inner.shape[1]))
+            for values in wanted
+        ]
+        inner, lost = self._known(inner)
+        status = self._status(len(gamma), status)
+        self.rod.fill(inner, tips, rooms[0], twists=rooms[1], status=status, directions=directions)
+        if not self.pose.is_identity:
+            self._place(tips, rooms[0], rooms[1], directions)
+        for room, values in zip(rooms, wanted, strict=True):
+            if room is not None and values is not None and room is not values:
+                self.inputs.along_x(room, of_drives, values)
+        self._drop(lost, status, tips, slopes, twists, directions)
+
+    @lazy
+    def _is_rod(self) -> bool:
+        """True if nothing changes of what the rod gives."""
+        is_whole = self.unstable or not self.supports_unstable
+        return is_whole and self.inputs.are_activations and self.pose.is_identity
+
+    def _known(self, inner: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Activations with the lower bounds where no tensions were found, and their rows."""
+        lost = np.flatnonzero(np.isnan(inner).any(axis=1))
+        if len(lost):
+            inner[lost] = self.rod.box.low
+        return inner, lost
+
+    def _status(self, n: int, status: Status | None) -> Status | None:
+        is_needed = status is None and self.supports_unstable and not self.unstable
+        return np.empty(n, np.int8) if is_needed else status
+
+    def _drop(self, lost: NDArray[np.intp], status: Status | None, *values: Array | None) -> None:
+        """Make NaN what has no tensions, and what is not stable unless it is asked for."""
+        drop(lost, None, *values)
+        if status is None:
+            return
+        status[lost] = TipStatus.UNDECIDED
+        if not self.unstable:
+            drop(np.flatnonzero(status != TipStatus.STABLE), None, *values)
+
+    def _place(
+        self, tips: Array, slopes: Array | None, twists: Array | None, directions: Array | None
+    ) -> None:
+        """Take to the world what is in the frame of the base: r = r(0) + R r'."""
+        rotation, position = np.array(self.pose.rotation), np.array(self.pose.position)
+        move(tips, rotation, position)
+        if slopes is not None:
+            turn(slopes, rotation)
+        if directions is not None:
+            move(directions, rotation, np.zeros(3))
+        if twists is not None:
+            turn(twists, rotation)
+            if position.any():  # v is that of the origin, which is another point now
+                v, w = twists[:, :3], twists[:, 3:]
+                for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                    v[:, i] += position[j] * w[:, k] - position[k] * w[:, j]
+
+    def shapes(
+        self,
+        activations: ArrayLike,
+        framed: ArrayLike,
+        strained: ArrayLike,
+        status: Status | None = None,
+    ) -> Shapes:
+        inner, lost = self._known(self.inputs.activations(self.box.check(activations)))
+        status = self._status(len(inner), status)
+        position, directors, *strains = self.rod.shapes(inner, framed, strained, status)
+        shapes = Shapes(*self.placed(Frames(position, directors)), *strains)
+        self._drop(lost, status, *shapes)
+        return shapes
+
+    def placed(self, frames: Frames) -> Frames:
+        """Centerlines and directors in the world of those in the frame of the base."""
+        if self.pose.is_identity:
+            return frames
+        directors = self.pose.directions_to_world(frames.directors)
+        return Frames(self.pose.to_world(frames.position), directors)
+
+    def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
+        return self.rod.extension_and_turn(self.inputs.activations(gamma))
+
+    def farthest(self) -> float:
+        return self.rod.farthest()
+
+    def linearization_error(self, half_widths: Array) -> float:
+        widths = self.inputs.widths(half_widths)
+        return np.inf if widths is None else self.rod.linearization_error(widths)
+
+    def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
+        widths = self.inputs.widths(half_widths)
+        if widths is None:
+            return np.full(len(centers), np.inf)
+        return self.rod.linearization_errors(self.inputs.activations(centers), widths)
 
 
 def tip_map(
-    arm: Manipulator | TipMap, tol: float = 1e-6, *, frame: Frame = "world", warn: bool = True
-) -> TipMap:
+    arm: Manipulator | TipMap,
+    tol: float = 1e-6,
+    *,
+    frame: Frame = "world",
+    point: str | None = None,
+    warn: bool = True,
+) -> ArmMap:
     """The tip map of an arm, kept for the next call; a tip map is returned as it is.
 
     Args:
@@ -30,27 +257,32 @@ def tip_map(
         tol: Largest tip error, in L.
         frame: Frame of places: the "world", or that of the "base", whose z is
             along the straight arm. That of a tip map, if it is not of the world, counts.
+        point: Name of the marker that counts as the tip; by default that of the design, or of a
+            tip map.
         warn: Whether to warn of loads beyond what was verified.
 
     Raises:
-        InvalidInput: No arm, no such frame, or `tol` out of range.
+        InvalidInput: No arm, no such frame or marker, or `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
     as_one_of("frame", frame, ("world", "base"))
-    if isinstance(arm, TipMap):
-        return arm if frame == "world" else _from_base(arm)
-    if not isinstance(arm, Manipulator):
+    if not isinstance(arm, Manipulator | TipMap):
         raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
-    rod = _of_arm(arm, check_tol(tol), frame)
+    if isinstance(arm, TipMap):
+        known = arm if isinstance(arm, ArmMap) else ArmMap.of(arm)
+        return replace(known, pose=UPRIGHT) if frame == "base" != known.frame else known
+    found = _of_arm(arm.at_point(point), check_tol(tol), frame)
     if as_flag("warn", warn) and arm.loads is not None:
         _warn_of_large_loads(arm)
-    return rod
+    return found
 
 
-def _from_base(rod: TipMap) -> TipMap:
-    if isinstance(rod, View | DrivenRod):
-        return replace(rod, base=_from_base(rod.base))
-    return rod.base if isinstance(rod, PlacedRod) else rod
+def _to_tolerance(rod: TipMap, tol: float) -> TipMap:
+    known = tip_map(rod)
+    if not isinstance(known.rod, ArmRod):
+        return rod
+    inputs = known.inputs.to_tolerance(tol)
+    return replace(known, rod=_known_rod(known.rod.arm, tol), inputs=inputs)
 
 
 def refined(rod: TipMap, tol: float) -> TipMap:
@@ -73,23 +305,57 @@ def coarsened(rod: TipMap, tol: float) -> TipMap:
     return rod if rod.tol >= check_tol(tol) else _to_tolerance(rod, tol)
 
 
-def _to_tolerance(rod: TipMap, tol: float) -> TipMap:
-    if isinstance(rod, View | DrivenRod):
-        return replace(rod, base=_to_tolerance(rod.base, tol))
-    frame: Frame = "base" if isinstance(rod, ArmRod) else "world"
-    return _of_arm(rod.arm, tol, frame) if isinstance(rod, ArmRod | PlacedRod) else rod
-
-
 def effective(rod: TipMap) -> TipMap:
     """The tip map of the same arm in inputs beyond the dead zones of its drives.
 
     It has the same image and no kinks at dead zones; itself where there are none.
     """
-    if isinstance(rod, View):
-        return replace(rod, base=effective(rod.base))
-    if isinstance(rod, DrivenRod) and any(drive.dead_zone for drive in rod.outer.drives):
-        return replace(rod, is_effective=True)
-    return rod
+    known = tip_map(rod)
+    if not any(drive.dead_zone for drive in known.arm.drives):
+        return rod
+    return replace(known, inputs=known.inputs.effective())
+
+
+def free_bundles(rod: TipMap) -> TipMap:
+    """The restriction of a tip map to its free bundles; the map itself if all are free."""
+    as_instance("rod", rod, TipMap, "a TipMap")
+    if rod.box.dimension == rod.box.bundles:
+        return rod
+    known = tip_map(rod)
+    return replace(known, inputs=known.inputs.only(rod.box.free.tolist()))
+
+
+def measured_bundles(rod: TipMap) -> TipMap:
+    """A tip map whose activations are in `activation_measures`; the map itself if they are."""
+    known = tip_map(rod)
+    inputs = known.inputs.measured(known.arm)
+    return rod if inputs == known.inputs else replace(known, inputs=inputs)
+
+
+def all_inputs(rod: TipMap) -> ArmMap:
+    """The tip map of all inputs of an arm, each in its own unit."""
+    known = tip_map(rod)
+    if known.inputs.is_plain:
+        return known
+    return replace(known, inputs=Inputs.of(known.inputs.whole, known.inputs.driving))
+
+
+def with_unstable(rod: TipMap) -> ArmMap:
+    """The tip map that has tips of unstable equilibria, too."""
+    known = tip_map(rod)
+    is_there = known.unstable or not known.supports_unstable
+    return known if is_there else replace(known, unstable=True)
+
+
+def of_tip(rod: TipMap) -> ArmMap:
+    """The tip map, for what is known of tips alone.
+
+    Raises:
+        InvalidInput: A marker stands for its tip.
+    """
+    if rod.point is not None:
+        raise InvalidInput("point", rod.point.name, "left out: this is known of the tip alone")
+    return tip_map(rod)
 
 
 def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
@@ -101,34 +367,34 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
     Args:
         arm: The design.
         steps: Along the arm, if nothing breaks it.
-        like: A tip map whose tolerance and frame it has.
+        like: A tip map whose tolerance, frame and effective inputs it has.
     """
-    rod = _new(arm, like.tol, like.frame, steps)
-    return effective(rod) if isinstance(like, DrivenRod) and like.is_effective else rod
+    driving = tip_map(like).inputs.driving
+    found = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
+    return effective(found) if driving is not None and driving.is_effective else found
 
 
 @lru_cache(maxsize=64)
-def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> TipMap:
-    return _new(arm, tol, frame)
+def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> ArmMap:
+    return _made(arm, tol, frame, _known_rod(inner_arm(arm), tol))
 
 
-def _new(arm: Manipulator, tol: float, frame: Frame, steps: int | None = None) -> TipMap:
-    inside = _of_arm if steps is None else partial(_new, steps=steps)
-    if not arm.is_direct:
-        inner = inside(inner_arm(arm), tol, frame)
-        assert isinstance(inner, ArmRod | PlacedRod)
-        return DrivenRod(inner, arm)
-    if frame == "world" and not arm.base.is_identity:
-        rod = inside(arm, tol, "base")
-        assert isinstance(rod, ArmRod)
-        return PlacedRod(rod)
-    if arm.loads is None:
-        rod = FreeRod(arm, tol)
-    else:
-        from softreach.rod.loaded.rod import LoadedRod
+def _made(arm: Manipulator, tol: float, frame: Frame, rod: ArmRod) -> ArmMap:
+    inputs = Inputs.of(rod.box) if arm.is_direct else Inputs.of_drives(arm, tol)
+    return ArmMap(rod, inputs, arm.base if frame == "world" else UPRIGHT)
 
-        rod = LoadedRod(arm, tol)
-    return rod if steps is None else rod.in_steps(steps)
+
+@lru_cache(maxsize=64)
+def _known_rod(inner: Manipulator, tol: float) -> ArmRod:
+    return _rod(inner, tol)
+
+
+def _rod(inner: Manipulator, tol: float, steps: int | None = None) -> ArmRod:
+    if inner.loads is None:
+        return FreeRod(inner, tol, steps)
+    from softreach.rod.loaded.rod import LoadedRod
+
+    return LoadedRod(inner, tol, steps)
 
 
 @lru_cache(maxsize=64)

@@ -7,7 +7,6 @@ Whoever asks where an arm can go asks a tip map, never the fields of the arm.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from enum import IntEnum
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.stations import Marker
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
 from softreach.support.arguments import as_number
@@ -31,7 +31,7 @@ Frame = Literal["world", "base"]
 
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
-_SMALLEST_TOL = 1e-12
+SMALLEST_TOL = 1e-12
 _FARTHEST = 1e3  # of the bounds, of activations that mean anything
 _SLIGHT = 1e-2  # of the bounds, by which a tension may be negative, such as in a difference
 MOST_TURN_OF_STEP = 2.0
@@ -44,7 +44,7 @@ class TipStatus(IntEnum):
     STABLE = 0
     """A stable equilibrium."""
     UNSTABLE = 1
-    """An unstable equilibrium."""
+    """An unstable equilibrium; its tip is NaN unless it is asked for."""
     NO_EQUILIBRIUM = 2
     """There is no such arm: it would be shortened to nothing; the tip is NaN."""
     UNDECIDED = 3
@@ -103,39 +103,59 @@ class TipMap(ABC):
         """
 
     @abstractmethod
+    def shapes(
+        self,
+        activations: ArrayLike,
+        framed: ArrayLike,
+        strained: ArrayLike,
+        status: Status | None = None,
+    ) -> Shapes:
+        """Arms at stations along them; each equilibrium is found once.
+
+        Args:
+            activations: Shape (n, bundles).
+            framed: Z of centerline and directors [m], ascending; there may be none.
+            strained: Z of curvature and extension [m], likewise.
+            status: `TipStatus`, shape (n,), which is put into place.
+        """
+
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
     ) -> Frames:
         """Centerline and directors at ascending stations Z [m]; `status` (n,) is put into place."""
+        shapes = self.shapes(activations, self.check_stations(stations), (), status)
+        return Frames(shapes.position, shapes.directors)
 
-    @abstractmethod
-    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """The strains at stations Z [m], in any order, as a function of activations.
-
-        What depends on the stations alone is computed once, for many blocks of activations. A
-        second argument `status` (n,) is put into place.
-        """
-
-    @abstractmethod
-    def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] within the activation box."""
+    def strains(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Strains:
+        """Curvature and extension at stations Z [m], in any order; `status` is put into place."""
+        z = self.check_stations(stations, ascending=False)
+        ascending, back = np.unique(z, return_inverse=True)
+        shapes = self.shapes(activations, (), ascending, status)
+        if np.array_equal(z, ascending):
+            return Strains(shapes.curvature, shapes.extension)
+        return Strains(shapes.curvature[:, back], shapes.extension[:, back])
 
     @property
     def length(self) -> float:
         """L [m], the scale of everything in space."""
         return self.arm.length
 
+    pose: Base = UPRIGHT
+    """Pose of the clamped end in the frame in which the map tells places."""
+
     @property
-    def pose(self) -> Base:
-        """Pose of the clamped end in the frame in which the map tells places."""
-        return UPRIGHT
+    def point(self) -> Marker | None:
+        """The marker that stands for the tip; None for the tip."""
+        return None
 
     @property
     def frame(self) -> Frame:
         """The frame in which the map tells places and takes directions."""
         return "world"
 
-    @property
+    @lazy
     def supports_unstable(self) -> bool:
         """True if a tip can have another status than stable."""
         return False
@@ -288,7 +308,8 @@ class TipMap(ABC):
 
     def tip_directions(self, activations: ArrayLike) -> Array:
         """Tangents d3 of the tips [-], shape (n, 3)."""
-        return np.ascontiguousarray(self.frames(activations, [self.length]).directors[:, 0, 2])
+        end = self.length if self.point is None else self.point.station_at("station", self.length)
+        return np.ascontiguousarray(self.frames(activations, [end]).directors[:, 0, 2])
 
     def _filled(self, activations: ArrayLike, *wanted: str) -> dict[str, Any]:
         """Results of `fill` by name: tips and what else is wanted, on all threads."""
@@ -308,12 +329,6 @@ class TipMap(ABC):
         )
         drop(lost, room.get("status"), *(room[name] for name in room if name != "status"))
         return room
-
-    def strains(
-        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
-    ) -> Strains:
-        """Curvature and extension at stations Z [m]; `status` (n,) is put into place."""
-        return self.strains_at(stations)(activations, status)
 
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""
@@ -360,30 +375,17 @@ class Strains(NamedTuple):
     """ζ [-], shape (n, station)."""
 
 
-class StrainRange(NamedTuple):
-    """Ranges of the strains within the activation box, shape (station, 2) each."""
+class Shapes(NamedTuple):
+    """Arms at stations."""
 
-    bending: Array
-    """√(u1² + u2²) [1/m], from 0 to an upper bound: at most 1e-5 too large for fibers and muscles,
-    with tendons and chambers by as much as their ζ differs."""
-    torsion: Array
-    """u3 [1/m]."""
+    position: Array
+    """Centerline r [m], shape (n, framed station, 3)."""
+    directors: Array
+    """d1, d2, d3 as rows, shape (n, framed station, 3, 3)."""
+    curvature: Array
+    """u in the directors, per unit of activated arclength [1/m], (n, strained station, 3)."""
     extension: Array
-    """ζ [-]."""
-
-
-def sampled_range(strains: Strains) -> StrainRange:
-    """Ranges over samples, of those that have an arm."""
-    bend = np.hypot(strains.curvature[..., 0], strains.curvature[..., 1])
-    return StrainRange(
-        np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),
-        _range(strains.curvature[..., 2]),
-        _range(strains.extension),
-    )
-
-
-def _range(values: Array) -> Array:
-    return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
+    """ζ [-], shape (n, strained station)."""
 
 
 class TipMotions(NamedTuple):
@@ -427,9 +429,9 @@ def check_tol(tol: float) -> float:
     Raises:
         InvalidInput: It is below 1e-12 or not a number.
     """
-    if type(tol) is float and _SMALLEST_TOL <= tol < np.inf:  # by far the most, in a tenth of it
+    if type(tol) is float and SMALLEST_TOL <= tol < np.inf:  # by far the most, in a tenth of it
         return tol
-    return as_number("tol", tol, Range(_SMALLEST_TOL, unit="(in L)"))
+    return as_number("tol", tol, Range(SMALLEST_TOL, unit="(in L)"))
 
 
 def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> str:

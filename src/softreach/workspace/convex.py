@@ -13,7 +13,6 @@ import numpy as np
 from softreach.geometry.hull import convex_faces
 from softreach.geometry.surface import compact_surface, corner_areas, enclosed_volume
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Faces
 from softreach.workspace.measure import Estimate
 
@@ -84,7 +83,6 @@ def climbed_hull(
         accuracy: Relative error of the volume that ends the climbing.
         kind: Of corners, with edges for faces in a plane.
     """
-    rod = stable_tips(rod)
     corners = kind.of(rod.tips(rod.box.from_free_cube(cube)), cube)
     before = corners
     if not len(corners.faces):

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Image
 
@@ -76,7 +75,7 @@ def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> tu
     if len(cut) > _MOST:
         looked = np.sort(np.random.default_rng(0).choice(cut, _MOST, replace=False))
     places = np.stack(np.unravel_index(looked, left_out.shape), axis=1)[:, None] + _INSIDE
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(places.reshape(-1, 3) / cells))
+    tips = rod.tips(rod.box.from_free_cube(places.reshape(-1, 3) / cells))
     stable = np.isfinite(tips[:, 0])
     counted = stable.copy()
     counted[stable] = image.counts_at(tips[stable]) == 0
@@ -161,7 +160,7 @@ def _stay_apart(rod: TipMap, edges: Index, along: Index, field: Array) -> Mask:
     torn, open_ = np.zeros(len(edges), bool), np.arange(len(edges))
     for _ in range(_HALVINGS):
         middle = 0.5 * (low[open_] + high[open_])
-        tips = stable_tips(rod).tips(rod.box.from_free_cube(middle))
+        tips = rod.tips(rod.box.from_free_cube(middle))
         down = np.linalg.norm(tips - at_low[open_], axis=1)
         up = np.linalg.norm(at_high[open_] - tips, axis=1)
         torn[open_[np.isnan(down)]] = True

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from softreach.geometry.surface import Surface, corner_areas
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Index
 from softreach.workspace.grid import grid_ticks
 
@@ -98,7 +97,7 @@ def _triangle_nodes(rod: TipMap, cells: int) -> Flux:
     cube = np.stack(
         [t[np.rint(cells * x).astype(int)] for t, x in zip(ticks, grid.T, strict=True)], axis=1
     )
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    tips = rod.tips(rod.box.from_free_cube(cube))
     return _flux_of(rod, cube, tips, corner_areas(tips, face_triangles(grid, cells)))
 
 
@@ -121,7 +120,7 @@ def face_image(rod: TipMap, cells: int = _CELLS) -> Surface:
         With vertices of NaN where an activation on the faces has no stable equilibrium.
     """
     cube = grid_faces(cells)
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    tips = rod.tips(rod.box.from_free_cube(cube))
     surface = Surface(vertices=tips, faces=face_triangles(cube, cells))
     if surface.volume < 0:  # the map turns the box over
         surface = Surface(vertices=tips, faces=surface.faces[:, ::-1].copy())
@@ -191,7 +190,7 @@ def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:
     Returns:
         Shapes (n, 3) and (n, 3, dimension); NaN where there is no stable equilibrium.
     """
-    tips, slopes = stable_tips(rod).tips_and_slopes(rod.box.from_free_cube(cube))
+    tips, slopes = rod.tips_and_slopes(rod.box.from_free_cube(cube))
     free = rod.box.free
     return tips, slopes[:, :, free] * rod.box.widths[free]
 

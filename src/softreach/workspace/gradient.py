@@ -12,7 +12,6 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.rod.rods import effective, refined, tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
 from softreach.schema import provenance
 from softreach.support.arguments import as_names, as_number
 from softreach.support.arrays import Array
@@ -327,7 +326,7 @@ def _finer(corners: HullCorners, rod: TipMap, cells: int) -> HullCorners:
     places = np.rint(2 * cells * corners.cube).astype(np.int64)[:, None] + _AROUND
     keys = np.unique(np.ravel_multi_index(np.moveaxis(places, 2, 0), shape, mode="clip"))
     cube = np.stack(np.unravel_index(keys, shape), axis=1) / (2 * cells)
-    return HullCorners.of(stable_tips(rod).tips(rod.box.from_free_cube(cube)), cube)
+    return HullCorners.of(rod.tips(rod.box.from_free_cube(cube)), cube)
 
 
 def _corners_of(image: Image) -> HullCorners:

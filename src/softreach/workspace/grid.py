@@ -7,7 +7,6 @@ import numpy as np
 from softreach.kernels.image.contour import stretches
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
-from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Mask
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
@@ -54,10 +53,10 @@ def grid_tips(
         InvalidInput: There is none anywhere.
     """
     even = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
-    places, stable = _product(ticks or even), stable_tips(rod)
+    places = _product(ticks or even)
     tips = np.empty((len(places), 3))
     for rows in blocks(len(places), _BLOCK):
-        tips[rows] = stable.tips(rod.box.from_free_cube(places[rows]))
+        tips[rows] = rod.tips(rod.box.from_free_cube(places[rows]))
         progress(0)
     if rod.supports_unstable and np.isnan(tips[:, 0]).all():
         raise no_stable_equilibrium(len(tips))
@@ -142,7 +141,7 @@ def image_measure(rod: TipMap, nodes: int) -> float:
 
 def _stretch(rod: TipMap, gamma: Array) -> Array:
     """The change of measure of the map at each activation: det J where J is square."""
-    slopes = stable_tips(rod).tips_and_slopes(gamma)[1][:, :, rod.box.free]
+    slopes = rod.tips_and_slopes(gamma)[1][:, :, rod.box.free]
     with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
         if rod.box.dimension == 3:
             return np.linalg.det(slopes)

@@ -33,6 +33,7 @@ def payload_curve(
     payloads: ArrayLike | None = None,
     *,
     accuracy: float = 0.01,
+    point: str | None = None,
     progress: Progress | None = None,
 ) -> PayloadCurve:
     """The volume of the exact reachable set under each payload.
@@ -44,6 +45,7 @@ def payload_curve(
         payloads: Masses at the tip [kg], in any order, shape (n,); 0 is added. None for four that
             fit the stiffness of the arm.
         accuracy: Relative error allowed in each volume, as for `reachable_set`.
+        point: Name of the marker that counts as the tip; by default that of the design.
         progress: Called with the number of volumes done since its last call.
 
     Raises:
@@ -54,7 +56,8 @@ def payload_curve(
     Warns:
         SoftreachWarning: The estimated error of a volume is larger than asked.
     """
-    _check(a_manipulator("arm", arm))
+    arm = a_manipulator("arm", arm).at_point(point)
+    _check(arm)
     masses = _usual_payloads(arm) if payloads is None else as_floats("payloads", payloads).ravel()
     if not (np.isfinite(masses) & (masses >= 0)).all():
         raise InvalidInput("payloads", masses, "finite masses of 0 or more [kg]")

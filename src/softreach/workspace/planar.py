@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from softreach.arm.base import Base
 from softreach.geometry.flat import Plane, are_inside, convex_edges, enclosed_area, plane_of
 from softreach.geometry.surface import Surface, compact_surface
+from softreach.rod.rods import ArmMap
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import PlacedRod, stable_tips
 from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import MissingExtra
@@ -70,18 +70,6 @@ class ReachableRegion(ReachableSurface):
         return [f"{size} in one {'plane' if self.convex_area else 'line'}", hull]
 
 
-@dataclass(frozen=True, repr=False)
-class _InPlane(PlacedRod):
-    """A tip map in the axes of the plane that its tips lie in."""
-
-    base: TipMap  # pyright: ignore[reportIncompatibleVariableOverride]
-    turned: Base
-
-    @property
-    def pose(self) -> Base:
-        return self.turned
-
-
 class _FlatCorners(HullCorners):
     """Corners of a convex hull in the plane z = 0, with edges for faces and an area for volume."""
 
@@ -102,7 +90,7 @@ class _FlatCorners(HullCorners):
 def plane_of_tips(rod: TipMap) -> Plane | None:
     """The plane in which all tips lie to their tolerance; None if there is none."""
     (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.dimension, 0, _SAMPLES)
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(np.concatenate([cube, np.rint(cube)])))
+    tips = rod.tips(rod.box.from_free_cube(np.concatenate([cube, np.rint(cube)])))
     tips = tips[np.isfinite(tips[:, 0])]
     return plane_of(tips, _FLAT * rod.tol * rod.length) if len(tips) > 2 else None
 
@@ -123,7 +111,7 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
         points=tuple(map(tuple, plane.rotation.tolist())),  # pyright: ignore[reportArgumentType]
         position=tuple((-plane.rotation @ plane.origin).tolist()),  # pyright: ignore[reportArgumentType]
     )
-    flat = _InPlane(rod, turned)
+    flat = ArmMap.of(rod, turned)  # in the axes of the plane
     cloud = gamma, tips = cloud_on_faces(flat, 0)
     sides = np.ptp(tips[:, :2], axis=0)
     mean = float(np.sqrt(np.prod(sides)))

@@ -40,6 +40,7 @@ def reachable_set(
     cell: float | None = None,
     tol: float = 1e-6,
     frame: Frame = "world",
+    point: str | None = None,
     memory: float | None = None,
     progress: Progress | None = None,
 ) -> ReachableSet:
@@ -77,6 +78,8 @@ def reachable_set(
         tol: Largest tip error, in L.
         frame: In which places are told: that of the "world", or of the "base", whose z is along the
             straight arm.
+        point: Name of the marker that counts as the tip, such as that of a tool; by default that
+            of the design. Of a tip map its own counts.
         memory: Limit for more than three free bundles [bytes]; by default a quarter of what is
             free. Cells do not become smaller than it allows.
         progress: Called with the number of grid vertices or cells done since its last call.
@@ -95,7 +98,7 @@ def reachable_set(
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)
     memory = None if memory is None else as_number("memory", memory, _SIZES)
-    rod = effective(tip_map(arm, tol, frame=frame))
+    rod = effective(tip_map(arm, tol, frame=frame, point=point))
     m = rod.box.dimension
     if m > 1 and (plane := plane_of_tips(rod)) is not None:
         return planar_set(rod, plane, accuracy, progress)

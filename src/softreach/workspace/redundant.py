@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
-from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -132,7 +131,7 @@ def lost_share(rod: TipMap) -> float:
     if not rod.supports_unstable:
         return 0.0
     (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.dimension, 0, _SAMPLES)
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    tips = rod.tips(rod.box.from_free_cube(cube))
     return float(np.isnan(tips[:, 0]).mean())
 
 
@@ -194,7 +193,7 @@ def cloud_on_faces(rod: TipMap, seed: int) -> tuple[Array, Array]:
     bound = rng.random((_CLOUD, m)).argsort(axis=1) >= free[:, None]
     cube[bound] = rng.integers(0, 2, int(bound.sum()))
     gamma = np.ascontiguousarray(box.from_free_cube(cube))
-    tips = stable_tips(rod).tips(gamma)
+    tips = rod.tips(gamma)
     if not rod.supports_unstable:
         return gamma, tips
     stable = np.isfinite(tips[:, 0])

@@ -15,9 +15,8 @@ from softreach.kernels.box.bounded_descent import (
     next_trials,
 )
 from softreach.kernels.box.box_projection import project
-from softreach.kernels.image.space_claims import claim_corners
+from softreach.kernels.image.raster import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap
-from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
@@ -151,7 +150,7 @@ def nearest_tips(
         enough: Distance at which a target counts as reached [m].
         stop: When to give up.
     """
-    rod, gamma = stable_tips(rod), np.ascontiguousarray(start)
+    gamma = np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
 
     def task(block: slice) -> None:
@@ -198,7 +197,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
         rod.fill(running.trial[:n], tips[:n], ahead[:n])
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, *bounds)
+        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
         slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
         low, high = running.low[:n], running.high[:n]
         multiplier[:n] = 0.0

@@ -19,9 +19,8 @@ from scipy.ndimage import maximum_filter
 
 from softreach.geometry.surface import Surface, compact_surface, level_set
 from softreach.picture.shading import vertex_normals
-from softreach.rod.driven import DrivenRod
+from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
 from softreach.support.arrays import Array, Faces, Mask
 from softreach.workspace.flux import box_slopes, face_triangles, grid_faces
 from softreach.workspace.grid import cube_grid
@@ -93,7 +92,8 @@ def box_sheets(rod: TipMap) -> Sheets:
 def _sheets(rod: TipMap, cube: Array, faces: Faces) -> Sheets:
     cube, faces = compact_surface(cube, faces)
     activation, lines = rod.box.from_free_cube(cube), _lines(cube, faces)
-    activation = rod.inputs(activation) if isinstance(rod, DrivenRod) else activation
+    if (driving := tip_map(rod).inputs.driving) is not None:
+        activation = driving.with_dead_zones(activation)
     return Sheets(vertices=_tips(rod, cube), faces=faces, lines=lines, activation=activation)
 
 
@@ -142,7 +142,7 @@ def _between(values: Array, share: Array) -> Array:
 
 
 def _tips(rod: TipMap, cube: Array) -> Array:
-    return stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    return rod.tips(rod.box.from_free_cube(cube))
 
 
 def _dets(rod: TipMap, cube: Array) -> Array:

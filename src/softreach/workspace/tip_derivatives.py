@@ -14,7 +14,6 @@ from softreach.arm.parameters import Parameter, shifted
 from softreach.arm.tables import check_extension
 from softreach.rod.rods import in_steps
 from softreach.rod.tip_map import TipMap
-from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -85,7 +84,7 @@ class TipDerivatives:
         def task(k: int) -> None:
             self._progress(0)
             for weight, rod in self._rods[k]:
-                out[:, :, k] += weight * stable_tips(rod).tips(rod.box.from_free_cube(cube))
+                out[:, :, k] += weight * rod.tips(rod.box.from_free_cube(cube))
 
         parallel.run(partial(task, k) for k in range(len(self._shifts)))
         return out

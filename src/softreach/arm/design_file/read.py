@@ -64,6 +64,7 @@ LAYOUT: Mapping[str, tuple[type, Any, bool]] = {
     "loads": (dict, Loads, False),
     "base": (dict, Base, False),
     "rest": (dict, RestShape, False),
+    "point": (str, None, False),
     "display": (dict, None, False),
 }
 """Keys at the top of a file: one table or a list of them, of what, and whether it is required."""
@@ -162,7 +163,7 @@ class _Reader:
             del fields["drives"]
         for name in ("loads", "base", "rest"):
             fields[name] = self._alone(name, LAYOUT[name][1])
-        fields["display_unit"] = self._display_unit()
+        fields["display_unit"], fields["point"] = self._display_unit(), self._document.get("point")
         return {name: value for name, value in fields.items() if value is not None}
 
     def _alone(self, name: str, kind: type[Part]) -> Any:
@@ -348,7 +349,7 @@ class _Reader:
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""
-        words = {dict: "must be a table", list: "must be a list", int: ""}
+        words = {dict: "must be a table", list: "must be a list", str: "must be text", int: ""}
         for key, (shape, _, required) in LAYOUT.items():
             if key not in self._document and required:
                 self._refuse(key, None, "required key is missing")

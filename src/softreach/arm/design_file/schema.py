@@ -74,6 +74,7 @@ def json_schema() -> dict[str, Any]:
         "drives": _list(
             _of("drive"), "Inputs that activate bundles, before the bundles that none names"
         ),
+        "point": {**_TEXT, "description": "Name of the marker that counts as the tip"},
         "markers": _list(_of("marker"), "Points that go with sections of the arm"),
         "loads": _of("loads"),
         "base": _of("base"),

@@ -55,7 +55,11 @@ def render(arm: Mapping[str, Any]) -> str:
         if material is not None and material.name:
             names.setdefault(material.name, material)
     blocks = [
-        ["version = 2"] if arm["actuators"] else ["version = 2", "actuators = []"],
+        [
+            "version = 2",
+            *([] if arm["point"] is None else [f"point = {value_text(arm['point'])}"]),
+            *([] if arm["actuators"] else ["actuators = []"]),
+        ],
         ["[profile]", *_lines(arm["profile"])],
         *(
             [f"[materials.{key_text(name)}]", *_lines(material, without=("name",))]

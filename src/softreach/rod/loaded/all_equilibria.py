@@ -27,16 +27,20 @@ from softreach.geometry.sphere_maps import (
     polished_roots,
     sphere_roots,
 )
-from softreach.rod.driven import inner_rod
-from softreach.rod.kinematics import configuration, shape_dataset, stations_along
+from softreach.rod.kinematics import (
+    configuration,
+    marked,
+    marker_sections,
+    shape_dataset,
+    stations_along,
+)
 from softreach.rod.loaded.phase import SHOT_AT_ONCE
 from softreach.rod.loaded.ring import NEUTRAL, SYMMETRIC
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import ArmMap, all_inputs, of_tip, tip_map, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import TipMap, TipStatus, has_tip
-from softreach.rod.view import PlacedRod, View
+from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, warn
 
@@ -52,7 +56,7 @@ _SMALL = 1e-9  # of a length, below which it is shown as 0, in L
 class AllEquilibria:
     """All equilibria of one arm: stable ones first, then by falling margin."""
 
-    rod: TipMap
+    rod: ArmMap
     """The arm."""
     solver: Solver | None
     """Solver that walked along it; None without loads, or with too heavy ones for a search."""
@@ -89,15 +93,17 @@ class AllEquilibria:
             stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
-        inner, of_inner = inner_rod(rod, gamma)
-        loaded = tip_map(inner, frame="base")
-        if self.solver is None or not isinstance(loaded, LoadedRod):
+        if self.solver is None or not isinstance(loaded := rod.rod, LoadedRod):
             return configuration(rod, gamma, stations)
-        z = stations_along(rod, stations)
-        shapes = self.solver.shapes_facing(of_inner, self.directions, z)[0]
-        frames = inner.placed(shapes.frames) if isinstance(inner, PlacedRod) else shapes.frames
-        strains = loaded.strains_of_shapes(z)(of_inner, shapes.moment, shapes.force)
-        return shape_dataset(rod, gamma, z, frames, strains)
+        z, inner = stations_along(rod, stations), rod.inputs.activations(gamma)
+        together = np.union1d(z, marker_sections(rod.arm))
+        shapes = self.solver.shapes_facing(inner, self.directions, together)[0]
+        frames = rod.placed(shapes.frames)
+        strains = loaded.strains_under(inner, together, shapes)
+        places = marked(rod.arm, together, frames)
+        rows = np.searchsorted(together, z)
+        shapes = Shapes(*(values[:, rows] for values in (*frames, *strains)))
+        return shape_dataset(rod, gamma, z, shapes, marker_position=places)
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `equilibrium` and `axis`."""
@@ -175,14 +181,12 @@ def equilibria(
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
     """
-    rod = tip_map(arm, tol, warn=False)  # the degree tells whether any is missing
-    gamma = _one(rod, activations)
-    if isinstance(rod, View):  # whose equilibria are those of the arm
-        rod, gamma = rod.base, rod.activations(gamma)
+    asked = of_tip(tip_map(arm, tol, warn=False))  # the degree tells whether any is missing
+    gamma = asked.inputs.every(_one(asked, activations))
+    rod = with_unstable(all_inputs(asked))
     if not rod.supports_unstable:
         return _one_of(rod, gamma, np.full((1, 3), np.nan), np.ones(1), complete=True)
-    inner, at = inner_rod(rod, gamma)
-    loaded = tip_map(inner, frame="base")  # where all directions of the search are
+    loaded, at = rod.rod, rod.inputs.activations(gamma)
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     if not loaded.tables.one_direction:
@@ -228,7 +232,7 @@ def _crossing(loads: Loads, direction: Array) -> list[str]:
 
 
 def _one_of(
-    rod: TipMap, gamma: Array, directions: Array, margin: Array, *, complete: bool
+    rod: ArmMap, gamma: Array, directions: Array, margin: Array, *, complete: bool
 ) -> AllEquilibria:
     """The posture alone."""
     return AllEquilibria(
@@ -327,7 +331,7 @@ def _tips(solver: Solver, gamma: Array, roots: _Roots) -> Array:
 
 
 def _judged(
-    rod: TipMap, solver: Solver, gamma: Array, roots: _Roots, known: Array
+    rod: ArmMap, solver: Solver, gamma: Array, roots: _Roots, known: Array
 ) -> AllEquilibria:
     axis, many = solver.tables.axes[0], np.repeat(gamma, len(roots.directions), axis=0)
     shapes, margin = solver.shapes_facing(many, roots.directions, np.array([rod.length]))

@@ -8,7 +8,7 @@ are corrected by what each step shows (BFGS), which keeps them symmetric and pos
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from softreach.arm.number import fields_of
 from softreach.arm.tables import quadrature
 from softreach.arm.tensions import LengthLaw, Tensions
-from softreach.rod.arm_rod import ArmRod
+from softreach.rod.free import ArmRod
 from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.support import parallel
 from softreach.support.arrays import rows
@@ -49,11 +49,11 @@ class _State(NamedTuple):
     """Estimate of ∂s/∂τ [m/N], shape (n, tendon, tendon)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class LoadedLengths:
     """Tensions, and their slopes, of tendons driven by length under loads."""
 
-    law: LengthLaw
+    law: LengthLaw = field(compare=False)
     """That of the arm without loads."""
     rod: ArmRod
     """The map of the inner arm under loads, accurate enough for s."""
@@ -70,10 +70,9 @@ class LoadedLengths:
         z, weights, _ = quadrature(arm, _PIECES + int(max(turns, default=0.0)))
         force, moment = self.law.loads_at(z, weights)
         moment, at_rest = moment.reshape(-1, len(self.law.columns)), self.law.at_rest
-        strains_at = self.rod.strains_at(z)
 
         def shortening(inner: Array) -> Array:
-            strains = strains_at(inner)
+            strains = self.rod.strains(inner, z)
             turn = (strains.curvature * strains.extension[..., None]).reshape(len(inner), 1, -1)
             # One product for each sample, so that none depends on those beside it.
             work = np.matmul(strains.extension[:, None] - 1.0, force) + np.matmul(turn, moment)
@@ -162,11 +161,23 @@ class LoadedLengths:
         after = _State(state.tension + step, shortening, slopes)
         return after, ~_has_nan(shortening)
 
-    def slopes(self, inner: Array) -> Array:
-        """∂s/∂γ at activations with tensions, shape (n, tendon, bundle).
+    def continued_from(self, inner: Array) -> LoadedLengths:
+        """Those of the arm in its posture at activations with tensions, shape (1, bundles)."""
+        rod = self.rod.continued_from(inner)
+        assert isinstance(rod, ArmRod)
+        return replace(self, rod=rod)
+
+    def shortening_slopes(self, inner: Array) -> Array:
+        """∂s/∂γ at activations with tensions, (n, tendon, bundle); NaN where these are.
 
         Exact where loads have a linear response, else by central differences.
         """
+        slopes = np.full((len(inner), *self.law.columns.shape, inner.shape[1]), np.nan)
+        known = ~_has_nan(inner)
+        slopes[known] = self._slopes(inner[known])
+        return slopes
+
+    def _slopes(self, inner: Array) -> Array:
         if self._measures is not None:
             table, measures = self._measures
             state = rod_state(self.rod, inner, table)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Self
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.loads import Loads
-from softreach.arm.tables import tables
 from softreach.kernels.lanes import LANES
-from softreach.rod.arm_rod import ArmRod
-from softreach.rod.free import FreeRod, linear_strains, per_length
+from softreach.rod.free import (
+    ArmRod,
+    FreeRod,
+    add_offset,
+    linear_strains,
+    per_length,
+    tables_at,
+)
 from softreach.rod.loaded.postures import Postures
-from softreach.rod.loaded.shapes import Shapes
+from softreach.rod.loaded.shapes import LoadedShapes
 from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.steps import (
@@ -29,20 +32,24 @@ from softreach.rod.loaded.steps import (
     tip_differences,
 )
 from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
+from softreach.rod.response import (
+    NodeTables,
+    linear_response,
+    node_tables,
+    rod_state,
+    step_grid,
+)
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
+    Shapes,
     Status,
-    StrainRange,
     Strains,
     TipStatus,
     drop,
     has_tip,
-    loads_too_heavy,
-    no_equilibrium_message,
     position_slopes,
-    sampled_range,
 )
 from softreach.support import parallel
 from softreach.support.lazy import lazy
@@ -52,6 +59,7 @@ __all__ = ["LoadedRod"]
 Array = NDArray[np.float64]
 
 _BLOCK = BLOCK // 8  # samples per task
+_RESPONSE_STEPS = 48
 _OF_LINES = 32 * LANES  # samples per task that follows branches
 _SIDES = 1e-3  # [rad], between postures of two sides
 
@@ -64,7 +72,7 @@ class LoadedRod(ArmRod):
     The equilibrium is the posture that the arm comes to when it hangs first and is then activated.
     """
 
-    @property
+    @lazy
     def supports_unstable(self) -> bool:
         return True
 
@@ -97,17 +105,18 @@ class LoadedRod(ArmRod):
         Raises:
             InvalidInput: None is enough.
         """
-        return checked(self._tip_steps, self.tol)
+        return checked(self._tip_steps, self._tip_tol)
 
     @lazy
     def _tip_steps(self) -> int | None:
         """Steps with which `tol` holds for tips, if any are enough, theory (72)."""
-        return self._fewest(self.tables.phase.fewest_steps, tip_differences)
+        fewest = self.tables.phase.fewest_steps
+        return self.fixed_steps or self._fewest(fewest, tip_differences)
 
     @lazy
     def _shape_steps(self) -> int | None:
         """Steps with which `tol` holds all along the arm, if any are enough."""
-        return self._fewest(self.steps, shape_differences)
+        return self.fixed_steps or self._fewest(self.steps, shape_differences)
 
     def _fewest(self, steps: int, differences: Differences) -> int | None:
         gamma = pilot_activations(self.arm, self.box)
@@ -117,10 +126,10 @@ class LoadedRod(ArmRod):
     @lazy
     def unloaded_steps(self) -> int:
         """Steps that `tol` needs without loads."""
-        return FreeRod(self.arm, self.tol).steps
+        return FreeRod(self.arm, self._tip_tol).steps
 
     def _solver_of(self, steps: int) -> Solver:
-        return Solver(self.tables, steps, self.tol)
+        return Solver(self.tables, steps, self._tip_tol)
 
     @lazy
     def solver(self) -> Solver:
@@ -134,15 +143,11 @@ class LoadedRod(ArmRod):
 
     @lazy
     def _shape_solver(self) -> Solver:
-        return self._solver_of(checked(self._shape_steps, self.tol))
+        return self._solver_of(checked(self._shape_steps, self._tip_tol))
 
     @lazy
     def _mirrored(self) -> Postures:
         return self.postures.mirrored.with_flood()
-
-    def in_steps(self, steps: int) -> Self:
-        vars(self).update(_tip_steps=steps, _shape_steps=steps)
-        return self
 
     def _prepare(self) -> None:
         self.postures  # noqa: B018
@@ -150,7 +155,7 @@ class LoadedRod(ArmRod):
     def continued_from(self, gamma: Array) -> LoadedRod:
         frame = self.equilibria(gamma).frame
         postures = self.postures.continued_from(gamma, frame)
-        rod = _ContinuedRod(self.arm, self.tol)
+        rod = _ContinuedRod(self.arm, self.tol, self.fixed_steps)
         vars(rod).update({"origin": self, **vars(self), "postures": postures})
         return rod
 
@@ -182,17 +187,41 @@ class LoadedRod(ArmRod):
     ) -> None:
         """Put tips, and what else is asked for, into place; each equilibrium is found once."""
         known = self.postures.find(gamma)
-        if slopes is not None or twists is not None or directions is not None:
-            response = self.solver.respond(gamma, known, directions=directions is not None)
-            if slopes is not None:
-                position_slopes(response.tips, response.twists, slopes)
-            if twists is not None:
-                twists[:] = response.twists
-            if directions is not None:
-                directions[:] = response.directions
-        tips[:] = known.tips
+        is_moving = slopes is not None or twists is not None
         if status is not None:
             status[:] = known.status
+        if self.end < self.length:
+            shapes = self._shape_solver.shapes(gamma, np.array([self.end]), known)
+            tips[:], directors = shapes.frames.position[:, 0], shapes.frames.directors[:, 0]
+            moved = self._section_twists(gamma) if is_moving else None
+        else:
+            tips[:], directors, moved = known.tips, None, None
+            if is_moving or directions is not None or self.reach > 0.0:
+                has_directors = directions is not None or self.reach > 0.0
+                response = self.solver.respond(gamma, known, directors=has_directors)
+                directors, moved = response.directors, response.twists
+        if directors is not None and len(directors):
+            add_offset(tips, self.offset, directors)
+            if directions is not None:
+                directions[:] = directors[:, 2]
+        if slopes is not None and moved is not None:
+            position_slopes(tips, moved, slopes)
+        if twists is not None and moved is not None:
+            twists[:] = moved
+
+    def _section_twists(self, gamma: Array) -> Array:
+        """(v, ω) of the section of a marker per unit of each activation, shape (n, 6, bundles)."""
+        state = rod_state(self, gamma, self._node_tables)
+        response = linear_response(self._node_tables, state, [])
+        turns = response.turns[:, 0]
+        velocities = response.moves[:, 0] - np.cross(turns, state.position[:, 0, :, None], axis=1)
+        return np.concatenate([velocities, turns], axis=1)
+
+    @lazy
+    def _node_tables(self) -> NodeTables:
+        z = np.array([self.end])
+        grid = step_grid(self.arm, z, max(_RESPONSE_STEPS, self.steps))
+        return node_tables(self.arm, z, grid)
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
@@ -224,16 +253,38 @@ class LoadedRod(ArmRod):
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
         return leans
 
-    def frames(
-        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
-    ) -> Frames:
-        gamma, z = self.box.check(activations), self.check_stations(stations)
-        return self.shapes(gamma, z, status).frames
+    def shapes(
+        self,
+        activations: ArrayLike,
+        framed: ArrayLike,
+        strained: ArrayLike,
+        status: Status | None = None,
+    ) -> Shapes:
+        """Frames, and (û + K⁻¹m) η/ζ and ζ = ζ̂ + η n3/K0.
 
-    def shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
-        """Shapes at ascending stations; each equilibrium is found once."""
+        Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
+        """
+        gamma = self.box.check(activations)
+        z, at, found = np.asarray(framed, float), np.asarray(strained, float), self._found(gamma)
+        framed_shapes = strained_shapes = self._walked(found, z, status)
+        if not np.array_equal(z, at):
+            strained_shapes = self._walked(found, at, status)
+        return Shapes(*framed_shapes.frames, *self.strains_under(gamma, at, strained_shapes))
+
+    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
+        shapes = self._walked(self._found(gamma), z, status)
+        return shapes.frames, shapes.moment
+
+    def _found(self, gamma: Array) -> tuple[Array, NDArray[np.intp], Equilibria]:
         gamma, lost = self.with_arms(gamma)
-        known = self.equilibria(gamma)
+        return gamma, lost, self.equilibria(gamma)
+
+    def _walked(
+        self, found: tuple[Array, NDArray[np.intp], Equilibria], z: Array, status: Status | None
+    ) -> LoadedShapes:
+        gamma, lost, known = found
+        if not len(z):
+            return LoadedShapes.empty(len(gamma), 0)
         shapes = self._shape_solver.shapes(gamma, z, known, status=status)
         if status is not None:
             gone = np.isnan(shapes.frames.position[:, 0, 0])
@@ -241,47 +292,18 @@ class LoadedRod(ArmRod):
         drop(lost, status, *shapes.frames, shapes.moment, shapes.force)
         return shapes
 
-    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """(û + K⁻¹m) η/ζ and ζ = ζ̂ + η n3/K0 at stations Z [m] as a function of activations.
-
-        Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
-        """
-        z = self.check_stations(stations, ascending=False)
-        of_shapes = self.strains_of_shapes(z)
-        ascending, back = np.unique(z, return_inverse=True)
-
-        def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
-            gamma = self.box.check(activations)
-            shape = self.shapes(gamma, ascending, status)
-            return of_shapes(gamma, shape.moment[:, back], shape.force[:, back])
-
-        return strains
-
-    def strains_of_shapes(self, z: Array) -> Callable[[Array, Array, Array], Strains]:
-        """The strains at stations Z [m] as a function of activations, and of m and n there."""
-        table, (axial, bending, torsion) = tables(self.arm, z), self.body.compliance(z)
+    def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
+        """The strains at stations Z [m], from m and n in the directors of the shapes there."""
+        axial, bending, torsion = _compliance_at(self.body, z.tobytes())
+        u, extension, growth = linear_strains(tables_at(self.arm, z), gamma)
+        extension = extension + growth * shapes.force[..., 2] * axial
         yielded = np.stack([bending, bending, torsion], axis=1)
+        return per_length(u + shapes.moment * yielded, extension, growth)
 
-        def strains(gamma: Array, moment: Array, force: Array) -> Strains:
-            u, extension, growth = linear_strains(table, gamma)
-            extension = extension + growth * force[..., 2] * axial
-            return per_length(u + moment * yielded, extension, growth)
 
-        return strains
-
-    def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] over the pilot of the activation box.
-
-        Unlike those of a free rod they are no bounds: others may strain it a little more.
-
-        Raises:
-            InvalidInput: None of the pilot has an equilibrium.
-        """
-        gamma = pilot_activations(self.arm, self.box)
-        strains = self.strains_at(stations)(gamma)
-        if np.isnan(strains.extension).all():
-            raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
-        return sampled_range(strains)
+@lru_cache(maxsize=64)
+def _compliance_at(body: Body, stations: bytes) -> tuple[Array, Array, Array]:
+    return body.compliance(np.frombuffer(stations))
 
 
 class _ContinuedRod(LoadedRod):

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from softreach.arm.base import rotation_matrices
 from softreach.rod.tip_map import Frames
 
-__all__ = ["Shapes", "shapes_of"]
+__all__ = ["LoadedShapes", "shapes_of"]
 
 Array = NDArray[np.float64]
 
 
-class Shapes(NamedTuple):
+class LoadedShapes(NamedTuple):
     """Arms at stations."""
 
     frames: Frames
@@ -25,28 +25,28 @@ class Shapes(NamedTuple):
     """n [N] in the directors, shape (n, station, 3)."""
 
     @classmethod
-    def empty(cls, n: int, stations: int) -> Shapes:
+    def empty(cls, n: int, stations: int) -> LoadedShapes:
         """Room for n."""
         position, moment, force = np.empty((3, n, stations, 3))
         return cls(Frames(position, np.empty((n, stations, 3, 3))), moment, force)
 
-    def put(self, rows: slice, some: Shapes) -> None:
+    def put(self, rows: slice, some: LoadedShapes) -> None:
         """Put some into place."""
         self.frames.position[rows], self.frames.directors[rows] = some.frames
         self.moment[rows], self.force[rows] = some.moment, some.force
 
-    def on_base(self) -> Shapes:
+    def on_base(self) -> LoadedShapes:
         """Moved and turned so that their last station stands on the base, and without it."""
         (position, directors), moment, force = self
         turn = np.swapaxes(directors[:, -1], -1, -2)
         position, directors = (position - position[:, -1:]) @ turn, directors @ turn[:, None]
         frames = Frames(position[:, :-1], directors[:, :-1])
-        return Shapes(frames, moment[:, :-1], force[:, :-1])
+        return LoadedShapes(frames, moment[:, :-1], force[:, :-1])
 
 
 def shapes_of(
     tips: Array, trace: Array, rows: NDArray[np.intp], force: Array, stations: Array
-) -> Shapes:
+) -> LoadedShapes:
     """Shapes from what the kernel keeps of sections; NaN where a tip is.
 
     Args:
@@ -68,7 +68,7 @@ def shapes_of(
     thrust = _rows(force + trace[..., 16:19], world)[..., 0, :]
     for values in (position, directors, moment, thrust):
         values[np.isnan(tips).any(axis=1)] = np.nan
-    return Shapes(Frames(position, directors), moment, thrust)
+    return LoadedShapes(Frames(position, directors), moment, thrust)
 
 
 def _rows(vectors: Array, matrices: Array) -> Array:

@@ -179,8 +179,8 @@ class Response(NamedTuple):
     """(v, ω) per activation, shape (n, 6, bundles)."""
     compliance: Array
     """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
-    directions: Array
-    """Tangents d3 of the tips [-], shape (n, 3), or (0, 3)."""
+    directors: Array
+    """Directors of the tips as rows [-], shape (n, 3, 3), or (0, 3, 3)."""
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
 

@@ -13,7 +13,7 @@ from softreach.arm.tables import tables
 from softreach.geometry.sphere_maps import Map
 from softreach.kernels.loaded.response import TRACE
 from softreach.rod.free import linear_strains
-from softreach.rod.loaded.shapes import Shapes, shapes_of
+from softreach.rod.loaded.shapes import LoadedShapes, shapes_of
 from softreach.rod.loaded.shooting import (
     ALL_LOADS,
     MARGIN_ALONE,
@@ -135,7 +135,7 @@ class Solver:
 
     def shapes_facing(
         self, gamma: Array, directions: Array, stations: Array
-    ) -> tuple[Shapes, Array]:
+    ) -> tuple[LoadedShapes, Array]:
         """Shapes of arms whose tips see gravity along given directions, and their margins.
 
         Nothing is searched: the directions (n, 3), as in `base_map`, are those of equilibria
@@ -166,7 +166,7 @@ class Solver:
         known: Equilibria,
         *,
         compliance: bool = False,
-        directions: bool = False,
+        directors: bool = False,
     ) -> Response:
         """Tips with their derivatives, theory (74); NaN where there is no equilibrium.
 
@@ -174,21 +174,21 @@ class Solver:
             gamma: Activations (n, bundles).
             known: Their equilibria, with these steps.
             compliance: Whether to tell ∂r/∂F.
-            directions: Whether to tell the tangents of the tips.
+            directors: Whether to tell the directors of the tips.
         """
         lost = ~has_tip(known.status)
         rows = np.where(lost, lost.argmin(), np.arange(len(gamma)))  # none is walked in vain
-        answers = {"slopes": True, "compliance": compliance, "trace": directions}
+        answers = {"slopes": True, "compliance": compliance, "trace": directors}
         walked = walk(gamma[rows], self.tables, known.frame[rows], self._steps, **answers)
-        tips, d3 = known.tips.copy(), np.empty((0, 3))
+        tips, at_tips = known.tips.copy(), np.empty((0, 3, 3))
         for values in (tips, walked.slopes, walked.compliance):
             if len(values):
                 values[lost] = np.nan
-        if directions:
+        if directors:
             at, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
             shapes = shapes_of(tips, walked.trace, at, self._force_at(self._steps, at), at_tip)
-            d3 = shapes.frames.directors[:, 0, 2]
-        return Response(tips, walked.slopes, walked.compliance, d3, known.status)
+            at_tips = shapes.frames.directors[:, 0]
+        return Response(tips, walked.slopes, walked.compliance, at_tips, known.status)
 
     def shapes(
         self,
@@ -197,7 +197,7 @@ class Solver:
         known: Equilibria,
         *,
         status: NDArray[np.int8] | None = None,
-    ) -> Shapes:
+    ) -> LoadedShapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
 
         Args:
@@ -209,7 +209,7 @@ class Solver:
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
-        shapes = Shapes.empty(len(gamma), len(stations))
+        shapes = LoadedShapes.empty(len(gamma), len(stations))
 
         def fill(block: slice) -> None:
             equilibria = known.of(block)

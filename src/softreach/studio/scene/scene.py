@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.rest_shape import STRAIGHT
-from softreach.arm.skin import inside
+from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
-from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
-from softreach.rod.kinematics import configuration
+from softreach.rod.kinematics import configuration, rest_configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.axes import NumberedBox, add_label
 from softreach.studio.scene.camera import Viewpoint, way_to

@@ -1,0 +1,174 @@
+"""Inputs of a tip map: γ(x), the activations of a rod at what a user or a search changes.
+
+x are some inputs in other units, so that changes of different kinds compare. Drives, tendons that
+are driven by length and a shape at rest lead from inputs to activations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.driving import Driving, inner_arm
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.activation_box import ActivationBox
+from softreach.support.lazy import lazy
+
+__all__ = ["Inputs", "activation_measures"]
+
+Array = NDArray[np.float64]
+
+_OF_LENGTHS = 0.03
+"""Tolerance of shapes of which lengths are taken, over that of tips."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The map γ(x), γ = γ(offset + scale ∘ x)."""
+
+    whole: ActivationBox
+    """Bounds of all inputs, each in its own unit."""
+    driving: Driving | None
+    """The drives, lengths and shape at rest of an arm; None if inputs are activations."""
+    scale: tuple[float, ...]
+    """Size of one unit of x, for each input."""
+    free: tuple[int, ...]
+    """The inputs that x has; the others are fixed at their lower bounds."""
+
+    @classmethod
+    def of(cls, whole: ActivationBox, driving: Driving | None = None) -> Inputs:
+        """All inputs in their own units."""
+        return cls(whole, driving, (1.0,) * whole.bundles, tuple(range(whole.bundles)))
+
+    @classmethod
+    def of_drives(cls, arm: Manipulator, tol: float) -> Inputs:
+        """Those of an arm whose inputs are not the activations of its sections."""
+        driving = Driving(arm)
+        return cls.of(_bounds(driving), driving).to_tolerance(tol)
+
+    def to_tolerance(self, tol: float) -> Inputs:
+        """The same with tensions for a tolerance of tips [L]."""
+        driving = self.driving
+        if driving is None or driving.arm.loads is None or not driving.has_length_tendons:
+            return self
+        from softreach.rod.loaded.pulled import LoadedLengths
+        from softreach.rod.loaded.rod import LoadedRod
+
+        # A tip moves by far more than the length by which a tendon near the axis is off.
+        rod = LoadedRod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, 1e-12))
+        return replace(self, driving=replace(driving, lengths=LoadedLengths(driving.law, rod)))
+
+    def effective(self) -> Inputs:
+        """Inputs that begin beyond the dead zones of drives."""
+        assert self.driving is not None
+        driving = replace(self.driving, is_effective=True)
+        return replace(self, whole=_bounds(driving), driving=driving)
+
+    def only(self, columns: Sequence[int]) -> Inputs:
+        """Those of some columns of x; the others are fixed at their lower bounds."""
+        return replace(self, free=tuple(self.free[k] for k in columns))
+
+    def measured(self, arm: Manipulator) -> Inputs:
+        """The same in `activation_measures`."""
+        measures, names = activation_measures(arm), arm.input_names
+        return replace(
+            self, scale=tuple(float(measures[names.index(name)]) for name in self.whole.names)
+        )
+
+    def continued_from(self, activation: Array) -> Inputs:
+        """Those of an arm that is in its posture at an activation of the rod (1, bundles)."""
+        if self.driving is None or self.driving.lengths is None:
+            return self
+        lengths = self.driving.lengths.continued_from(activation)
+        return replace(self, driving=replace(self.driving, lengths=lengths))
+
+    @lazy
+    def box(self) -> ActivationBox:
+        """Bounds of x."""
+        if self.is_plain:
+            return self.whole
+        ends = np.stack([self.whole.low, self.whole.high], axis=1)[self._columns]
+        names = [self.whole.names[j] for j in self.free]
+        return ActivationBox.between(ends / self.measures[:, None], names)
+
+    @lazy
+    def measures(self) -> Array:
+        """Size of one unit of each x in the unit of its input, shape (bundles,)."""
+        return np.array(self.scale, float)[self._columns]
+
+    @lazy
+    def _columns(self) -> NDArray[np.intp]:
+        return np.array(self.free, np.intp)
+
+    @lazy
+    def is_plain(self) -> bool:
+        """True if x are all inputs in their own units."""
+        return len(self.free) == len(self.scale) and all(factor == 1.0 for factor in self.scale)
+
+    @lazy
+    def are_activations(self) -> bool:
+        """True if γ(x) = x."""
+        return self.is_plain and self.driving is None
+
+    @property
+    def kinks(self) -> list[Array]:
+        """Values of each x at which a tendon goes slack, whatever the others are."""
+        if self.driving is None:
+            return [np.empty(0)] * len(self.free)
+        return [self.driving.kinks[j] / self.scale[j] for j in self.free]
+
+    def every(self, x: Array) -> Array:
+        """All inputs in their own units, at checked x (n, bundles)."""
+        if self.is_plain:
+            return x
+        inputs = np.tile(self.whole.low, (len(x), 1))
+        inputs[:, self._columns] = x * self.measures
+        return inputs
+
+    def activations(self, x: Array) -> Array:
+        """γ of the rod, (n, its bundles), at checked x; NaN where no tensions are found."""
+        inputs = self.every(x)
+        return inputs if self.driving is None else self.driving.activations(inputs)
+
+    def with_slopes(self, x: Array) -> tuple[Array, Array | None]:
+        """γ with ∂γ/∂(inputs); None where inputs are activations."""
+        inputs = self.every(x)
+        return (inputs, None) if self.driving is None else self.driving.with_slopes(inputs)
+
+    def along_x(self, slopes: Array, of_drives: Array | None, out: Array) -> None:
+        """Put derivatives along x (n, ..., bundles) into place, from those along activations."""
+        if of_drives is not None:
+            slopes = np.matmul(slopes, of_drives, out=out if self.is_plain else None)
+        if not self.is_plain:
+            np.multiply(slopes[:, :, self._columns], self.measures, out=out)
+
+    def widths(self, half_widths: Array) -> Array | None:
+        """Largest changes of activation for |dx| <= half_widths; None where γ(x) has kinks."""
+        if not self.is_plain:
+            own, half_widths = half_widths * self.measures, np.zeros(len(self.scale))
+            half_widths[self._columns] = own
+        if self.driving is None:
+            return half_widths
+        return self.driving.widths @ half_widths if self.driving.is_affine else None
+
+
+def _bounds(driving: Driving) -> ActivationBox:
+    return ActivationBox.between(driving.driven.input_bounds, driving.driven.input_names)
+
+
+def activation_measures(arm: Manipulator) -> Array:
+    """Measures in which changes of each activation are counted, shape (bundles,).
+
+    Strains count as they are. Where all bundles share another unit, the widest range is 1, so that
+    distances keep their proportions; where units differ, the range of each bundle is.
+    """
+    units = set(arm.input_units)
+    ranges = np.diff(arm.input_bounds, axis=1)[:, 0]
+    if units == {"1"} or not ranges.any():
+        return np.ones(arm.inputs)
+    if len(units) == 1:
+        return np.full(arm.inputs, ranges.max())
+    return np.where(ranges > 0, ranges, np.maximum(np.abs(arm.input_bounds[:, 1]), 1.0))
