@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,7 @@ from softreach.support.errors import InvalidInput
 from tests.bodies import by_lines, oracle_rod, rubber
 from tests.oracles import loaded_rod
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 TARGETS = slice(40, 60)  # with one tip of several stable activations among them
 
 
@@ -209,3 +212,13 @@ def test_a_path_ends_by_name_where_its_posture_loses_its_stability(start, ahead)
     status, margins = zip(*(equilibrium_at(arm, *each) for each in at), strict=True)
     assert set(status) == {TipStatus.STABLE}
     assert margins[0] > 2 * margins[1] > 10 * margins[2]
+
+
+def test_solutions_say_where_the_arm_leans_to_one_of_two_sides():
+    """Both tendons pulled alike keep a hanging tentacle in its plane, up to the pitchfork."""
+    arm = Manipulator.load(EXAMPLES / "tentacle.toml")
+    arm = arm.replace(loads=arm.loads.replace(payload=0.02))
+    targets = tip_map(arm).tips([[6.0, 6.0], [6.3, 6.3]])
+    planar, leaning = solve_inverse(arm, targets)
+    assert planar.leans.tolist() == [False]
+    assert leaning.leans.tolist() == [True]

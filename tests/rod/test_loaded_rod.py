@@ -9,9 +9,7 @@ import pytest
 
 from softreach.arm import Base, Chamber, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
-from softreach.arm.tables import tables
 from softreach.cloud.curvature import stream_statistics
-from softreach.kernels.loaded import loaded_reference
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import rod as loaded_module
 from softreach.rod.loaded import solver as equilibrium
@@ -345,38 +343,3 @@ def test_loads_that_are_no_numbers_are_refused_by_name():
         Loads(gravity=(0, 0))
     with pytest.raises(InvalidDesign, match="payload"):
         Loads(payload=-1)
-
-
-def rest_turn(arm, gamma, steps=400):
-    """Directors of the unloaded tip as rows."""
-    return FreeRod(arm, 1e-12).frames(gamma, [arm.length]).directors[:, 0]
-
-
-def test_the_walk_is_that_of_the_reference():
-    found = loaded(Loads(gravity=SIDE, payload=0.3, payload_arm=(0.0, 0.05, 0.1)))
-    gamma, of_tables = GAMMA[:1], found.tables
-    solved = found.equilibria(gamma)
-    turn = rest_turn(TRUNK, gamma)[0]
-
-    def weight(z):
-        f = np.pi * 1000.0 * 9.81 * TRUNK.profile.radius(z) ** 3 / (3 * math.tan(math.radians(2)))
-        return f
-
-    def section(z):
-        at = tables(TRUNK, [z])
-        axial, bending, torsion = (float(c[0]) for c in found.body.compliance(np.array([z])))
-        force = float(weight(z) - weight(TRUNK.length)) + 0.3 * 9.81
-        return loaded_reference.Section(
-            1.0 + float(at.extension[0] @ gamma[0]),
-            1.0 + float(at.growth[0] @ gamma[0]),
-            at.curvature[0] @ gamma[0],
-            np.array([bending, bending, torsion]),
-            axial,
-            force,
-        )
-
-    g = turn @ solved.frame[0]
-    m = np.cross(of_tables.at_tip[3:6], of_tables.at_tip[0] * g)
-    seen, _, tip = loaded_reference.walk(section, TRUNK.length, g, m, 600)
-    np.testing.assert_allclose(seen, of_tables.axes[0], atol=1e-7)
-    np.testing.assert_allclose(tip, solved.tips[0], atol=1e-7)

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from softreach.arm import Manipulator, designs
+from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.all_equilibria import equilibria
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
-from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import oracle_rod, rubber
 from tests.oracles import column
 from tests.oracles.chain import Chain
 
 UP, SIDE, ASLANT = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (3.0, 4.0, -8.0)
-EXAMPLES = Path(__file__).parents[2] / "examples"
 CYLINDER, TRUNK = designs.minimal_trunk(taper=0.0), designs.minimal_trunk()
 # Bent in the plane of symmetry, upright arms may fall out of it.
 SYMMETRIC = np.array([[-0.5, -0.5, -0.6], [-1.2, -1.2, -1.4], [-1.3, -1.3, -1.4]])
@@ -149,45 +146,6 @@ def test_every_equilibrium_has_the_index_of_its_energy(arm, load, gamma):
         ways = index(chain, moments(chain, turn @ direction), tip)
         assert (ways == 0) == (status == TipStatus.STABLE)
         assert of_map == (-1) ** ways
-
-
-def hanging_tentacle(payload):
-    """A silicone cone that hangs, with two tendons beside its plane of symmetry."""
-    arm = Manipulator.load(EXAMPLES / "tentacle.toml")
-    return arm.replace(loads=arm.loads.replace(payload=payload))
-
-
-def test_a_hanging_arm_leans_to_a_side_where_its_plane_of_symmetry_loses_its_stability():
-    """At a pitchfork: continuously, and to the other side with the other twist."""
-    rod = tip_map(hanging_tentacle(0.02), 1e-8)
-    postures = Postures.of(rod.rod.solver)
-    planar = postures.find(np.array([[6.25, 6.25]]))
-    assert planar.status[0] == TipStatus.STABLE
-    assert abs(planar.tips[0, 1]) < 1e-9
-    beyond = np.array([[6.26, 6.26]])
-    sides = [replace(postures, side=side).find(beyond).tips[0, 1] for side in (1, -1)]
-    assert abs(sides[0]) > 1e-4
-    np.testing.assert_allclose(sides[0], -sides[1], atol=1e-7)
-    other = replace(postures, side=-1).find(np.array([[8.0, 2.0]])).tips
-    there = np.array([[-15.40592, 85.85417, -246.39666]])
-    np.testing.assert_allclose(1e3 * rod.pose.to_world(other), there, atol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("payload", "gamma", "tip"),
-    [
-        (0.02, (2.0, 3.0), (17.49238, -16.45184, -327.82713)),
-        (0.02, (6.0, 6.0), (81.23935, 0.0, -277.04289)),
-        (0.02, (8.0, 2.0), (55.22934, 17.88536, -246.39666)),
-        (0.1, (6.0, 4.0), (5.20014, 12.19369, -318.78130)),
-        (0.5, (8.0, 2.0), (-20.49970, 9.87300, -340.94453)),
-    ],
-)
-def test_a_tentacle_that_hangs_first_is_where_a_shooting_from_the_base_has_it(payload, gamma, tip):
-    """By DOP853 from the base [mm], refined; under up to 500 g, in one to eight segments."""
-    found, status = tip_map(hanging_tentacle(payload), warn=False).tips_and_status([gamma])
-    assert status[0] == TipStatus.STABLE
-    np.testing.assert_allclose(1e3 * found[0], tip, atol=1e-3)
 
 
 # What turns, mirrors or scales an arm together with its loads does the same to its shape

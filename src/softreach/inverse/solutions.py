@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import Frame
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ class Solution:
     """Condition numbers of ∂r/∂γ of the free bundles, infinite on a fold, shape (k,)."""
     margins: Array
     """Distance to the nearest bound of a free bundle, relative to its range, shape (k,)."""
+    leans: Mask
+    """Mask of those whose posture leans to one of two sides, under loads, shape (k,)."""
     nearest: Array
     """The reachable point nearest to the target that was found [m], shape (3,)."""
     nearest_activation: Array
@@ -97,6 +99,8 @@ class Solutions(Sequence[Solution]):
     """Shape (n,) [-]."""
     margins: Array
     """Shape (n,) [-]."""
+    leans: Mask
+    """Shape (n,)."""
     statuses: NDArray[np.int8]
     """`Status` of each target, shape (t,)."""
     nearest: Array
@@ -177,6 +181,7 @@ class Solutions(Sequence[Solution]):
             residuals=self.residuals[rows],
             conditions=self.conditions[rows],
             margins=self.margins[rows],
+            leans=self.leans[rows],
             nearest=self.nearest[i],
             nearest_activation=self.nearest_activations[i],
             gap=float(self.gaps[i]),
@@ -217,6 +222,7 @@ class Solutions(Sequence[Solution]):
                 "residual": ("solution", self.residuals, {"units": "m"}),
                 "condition": ("solution", self.conditions, {"units": "1"}),
                 "margin": ("solution", self.margins, {"units": "1"}),
+                "leans": ("solution", self.leans),
             },
             {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)},
             provenance(self.arm, self.frame),
@@ -231,4 +237,4 @@ _PER_TARGET = (
     "gaps",
     "gap_bounds",
 )
-_PER_SOLUTION = ("activations", "residuals", "conditions", "margins")
+_PER_SOLUTION = ("activations", "residuals", "conditions", "margins", "leans")

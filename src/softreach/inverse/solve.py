@@ -28,10 +28,12 @@ from softreach.inverse.roots import (
     roots_at,
 )
 from softreach.inverse.solutions import Solutions, Status
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_number
-from softreach.support.arrays import Array, as_directions, joined, rows
+from softreach.support.arrays import Array, Mask, as_directions, joined, rows
 from softreach.support.errors import Range
 from softreach.workspace.search import Nearest
 
@@ -67,8 +69,9 @@ def solve_inverse(
     proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
 
-    Of an arm under loads every activation given holds the arm in its posture; nothing is proved, so
-    that a target that no search reaches is `NOT_FOUND`.
+    Of an arm under loads every activation given holds the arm in its posture; `leans` says where it
+    leans there to one of two sides. Nothing is proved, so that a target that no search reaches is
+    `NOT_FOUND`.
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
@@ -204,19 +207,29 @@ def _solutions(
     points[off] = placed(rod, gamma[off])
     points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
+    activations = prepared.whole.box.with_fixed(roots.gamma)
     return Solutions(
         arm=prepared.whole.arm,
         frame=prepared.whole.frame,
         bundles=prepared.whole.box.names,
         targets=request.targets,
         offsets=np.searchsorted(roots.target, np.arange(count + 1)),
-        activations=prepared.whole.box.with_fixed(roots.gamma),
+        activations=activations,
         residuals=roots.residual,
         conditions=conditions(roots.slope),
         margins=rod.box.margin(roots.gamma),
+        leans=_leans(prepared.whole, activations),
         statuses=statuses,
         nearest=points,
         nearest_activations=prepared.whole.box.with_fixed(gamma),
         gaps=gaps,
         gap_bounds=proved_gaps,
     )
+
+
+def _leans(rod: TipMap, activations: Array) -> Mask:
+    """Mask of activations at which an arm under loads leans to one of two sides."""
+    known = tip_map(rod)
+    if isinstance(known.rod, LoadedRod):
+        return known.rod.leans(known.inputs.activations(activations))
+    return np.zeros(len(activations), bool)

@@ -1,6 +1,8 @@
-"""Values between the nodes of an even grid over a box, cubic where the values are smooth."""
+"""Directions between the nodes of an even grid over a box, cubic where they are smooth."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -14,11 +16,12 @@ def interpolate(values, is_smooth, points, sizes, out):
     """Interpolate by Lagrange's polynomials, in smooth cells cubic in each axis, linear in others.
 
     Args:
-        values: At the nodes (node, component), the last axis of the grid varying fastest.
+        values: Directions at the nodes (node, 3 direction), the last axis of the grid varying
+            fastest.
         is_smooth: Whether cells are, and those beside them (cell,).
         points: Places in cells from the first node (n, 3); outside the nearest cell is continued.
         sizes: Nodes of every axis, 1 or at least 4 (3,).
-        out: Filled, (n, component).
+        out: Filled with unit vectors, (n, 3 direction).
     """
     weights, first, count = np.zeros((3, 4)), np.zeros(3, np.int64), np.zeros(3, np.int64)
     for n in range(points.shape[0]):
@@ -31,17 +34,19 @@ def interpolate(values, is_smooth, points, sizes, out):
             if count[axis] == 4:
                 first[axis] = min(max(first[axis] - 1, 0), sizes[axis] - 4)
             _weigh(weights[axis], points[n, axis] - first[axis], count[axis])
-        for component in range(out.shape[1]):
-            out[n, component] = 0.0
-        for i in range(count[0]):
-            for j in range(count[1]):
-                row = ((first[0] + i) * sizes[1] + first[1] + j) * sizes[2] + first[2]
-                weight = weights[0, i] * weights[1, j]
-                for component in range(out.shape[1]):
-                    value = 0.0
+        for c in range(0, out.shape[1], 3):
+            x = y = z = 0.0
+            for i in range(count[0]):
+                for j in range(count[1]):
+                    row = ((first[0] + i) * sizes[1] + first[1] + j) * sizes[2] + first[2]
+                    of_row = weights[0, i] * weights[1, j]
                     for k in range(count[2]):
-                        value += weights[2, k] * values[row + k, component]
-                    out[n, component] += weight * value
+                        weight = of_row * weights[2, k]
+                        x += weight * values[row + k, c]
+                        y += weight * values[row + k, c + 1]
+                        z += weight * values[row + k, c + 2]
+            size = max(math.sqrt(x * x + y * y + z * z), 1e-300)
+            out[n, c], out[n, c + 1], out[n, c + 2] = x / size, y / size, z / size
 
 
 @inline

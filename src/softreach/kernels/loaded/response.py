@@ -73,17 +73,8 @@ def _step_state(w, c):
     for i in range(LANES):
         s, at = frame_tip(frame_nodes(w, w, REST, c, i), get_four(w, G, i))
         put_four(w, G, i, s)
-        put_four(w, STAGES, i, at[0])
-        put_four(w, STAGES + 12 * LANES, i, at[1])
-        put_four(w, STAGES + 24 * LANES, i, at[2])
-        put_four(w, STAGES + 36 * LANES, i, at[3])
-        put_four(w, STAGES + 48 * LANES, i, at[4])
-        put_four(w, STAGES + 60 * LANES, i, at[5])
-        put_four(w, STAGES + 72 * LANES, i, at[6])
-        put_four(w, STAGES + 84 * LANES, i, at[7])
-        put_four(w, STAGES + 96 * LANES, i, at[8])
-        put_four(w, STAGES + 108 * LANES, i, at[9])
-        put_four(w, STAGES + 120 * LANES, i, at[10])
+        for n in range(11):
+            put_four(w, STAGES + 12 * n * LANES, i, at[n])
 
 
 @pasted

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.lanes import LANES, get, put
+from softreach.kernels.lanes import LANES, get, put, turn_at
 from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.frames import (
     adjugate_rows,
@@ -198,18 +198,7 @@ def _watch_directions(w, i):
     """
     carry_normal(w, G, get(w, H, i), i)
     _, a, b = _turns_about(w, i)
-    p, q, r, s = (
-        w[TURNS + i],
-        w[TURNS + LANES + i],
-        w[TURNS + 2 * LANES + i],
-        w[TURNS + 3 * LANES + i],
-    )
-    c, d, e, f = (
-        w[CARRIED + i],
-        w[CARRIED + LANES + i],
-        w[CARRIED + 2 * LANES + i],
-        w[CARRIED + 3 * LANES + i],
-    )
+    (p, q, r, s), (c, d, e, f) = turn_at(w, TURNS, i), turn_at(w, CARRIED, i)
     t, u, v, z = a[1] * c + b[1] * e, a[1] * d + b[1] * f, a[2] * c + b[2] * e, a[2] * d + b[2] * f
     before, after = p * p + q * q + r * r + s * s, t * t + u * u + v * v + z * z
     determinant = 2.0 * (t * z - u * v) / after
@@ -234,12 +223,7 @@ def _first_directions(w, i):
 
 @inline
 def _next_directions(w, i):
-    p, q, r, s = (
-        w[TURNS + i],
-        w[TURNS + LANES + i],
-        w[TURNS + 2 * LANES + i],
-        w[TURNS + 3 * LANES + i],
-    )
+    p, q, r, s = turn_at(w, TURNS, i)
     f = 1.0 / math.sqrt(p * p + q * q + r * r + s * s)
     _put_square(w, TURNS, i, f * p, f * q, f * r, f * s)
     _put_square(w, CARRIED, i, f * p, f * q, f * r, f * s)

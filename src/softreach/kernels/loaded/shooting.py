@@ -150,16 +150,12 @@ def _chords(w, nodes, count, turn, least):
 
 
 @inline
-def _aim(node, work, axes, again):
-    """The world as the base sees it, in the frame of the walk, theory (65).
-
-    Again, on other tables, the tangents know a normal of one direction already.
-    """
+def _aim(node, work, axes):
+    """The world as the base sees it, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(node, WORLD, i, turned(q, (axes[0, 0], axes[0, 1], axes[0, 2])))
-        if not again:
-            put(node, WORLD + 3 * LANES, i, turned(q, (axes[1, 0], axes[1, 1], axes[1, 2])))
+        put(node, WORLD + 3 * LANES, i, turned(q, (axes[1, 0], axes[1, 1], axes[1, 2])))
 
 
 @inline
@@ -205,99 +201,90 @@ def _store(w, nodes, work, first, here, tiny, out):
             out[row, -1] = AT_WORK
 
 
-def _search_with(in_space):  # noqa: C901
-    """A search over all samples, for forces along one direction or, in space, for any loads."""
-    parts = IN_SPACE if in_space else ALONG_ONE
-    step_walk, step_tip, watch, begin, go_on, turns, missing = parts
+def _walk_with(in_space, tangents):  # noqa: C901
+    """A walk from tip to base, with tangents of turns of the world or with the tip."""
+    step_walk, step_tip, watch, begin, go_on, turns, missing = IN_SPACE if in_space else ALONG_ONE
+    step = step_walk if tangents else step_tip
 
     @inline
-    def start(w, nodes, tip, i):
-        put(w, G, i, get(nodes[0], WORLD, i))
-        put(w, H, i, get(nodes[0], WORLD + 3 * LANES, i))
+    def set_out(w, node, tip, i):
+        put(w, G, i, get(node, WORLD, i))
+        put(w, H, i, get(node, WORLD + 3 * LANES, i))
         begin_tip(w, tip, i)
+        if tangents:
+            begin_tangents(w, tip, i)
+            begin(w, i)
+            w[MARGIN + i] = 1.0
 
     @inline
-    def arrive(w, node, i):
+    def enter(w, before, node, i):
+        if not in_space and tangents:
+            carry_normal(node, WORLD, get(w, H, i), i)
+        elif not in_space:
+            put_world(w, G, i, get(w, G, i), get(node, WORLD + 3 * LANES, i))
         put(node, MISSING, i, missing(world(w, G, i), world(node, WORLD, i)))
+        if tangents:
+            _answer(w, turns(w, i), before, node, i)
+        _enter(w, node, i)
+        if tangents:
+            put_three(w, THETA, i, world(w, G, i))
+            put_three(w, MOMENT, i, three(node, ANSWER, i))
+            put_three(w, FORCE, i, three(node, ANSWER + 9 * LANES, i))
+            go_on(w, i)
 
     @pasted
     def walk(w, nodes, rest, table, tip):
         firsts, scalars, moments = table[5], table[2], table[4]
         for i in range(LANES):
-            start(w, nodes, tip, i)
-            begin_tangents(w, tip, i)
-            begin(w, i)
-            w[MARGIN + i] = 1.0
+            set_out(w, nodes[0], tip, i)
         for n in range(firsts.shape[0] - 1):
             for k in range(firsts[n], firsts[n + 1]):
                 r, c = rest[k], scalars[k]
                 if in_space and moments[k].any():
                     for i in range(LANES):
-                        push(w, moments[k], True, i)
+                        push(w, moments[k], tangents, i)
                 for i in range(LANES):
-                    step_walk(w, r, c, i)
-                for i in range(LANES):
-                    watch(w, i)
+                    step(w, r, c, i)
+                if tangents:
+                    for i in range(LANES):
+                        watch(w, i)
             before, node = nodes[n], nodes[n + 1]
             for i in range(LANES):
-                if not in_space:
-                    carry_normal(node, WORLD, get(w, H, i), i)
-                arrive(w, node, i)
-                _answer(w, turns(w, i), before, node, i)
-                _enter(w, node, i)
-                put_three(w, THETA, i, world(w, G, i))
-                put_three(w, MOMENT, i, three(node, ANSWER, i))
-                put_three(w, FORCE, i, three(node, ANSWER + 9 * LANES, i))
-                go_on(w, i)
+                enter(w, before, node, i)
+
+    return walk
+
+
+def _search_with(in_space):
+    """A search over all samples, for forces along one direction or, in space, for any loads."""
+    walk, walk_tip = _walk_with(in_space, tangents=True), _walk_with(in_space, tangents=False)
 
     @pasted
-    def walk_tip(w, nodes, rest, table, tip):
-        firsts, scalars, moments = table[5], table[2], table[4]
-        for i in range(LANES):
-            start(w, nodes, tip, i)
-        for n in range(firsts.shape[0] - 1):
-            for k in range(firsts[n], firsts[n + 1]):
-                r, c = rest[k], scalars[k]
-                if in_space and moments[k].any():
-                    for i in range(LANES):
-                        push(w, moments[k], False, i)
-                for i in range(LANES):
-                    step_tip(w, r, c, i)
-            node = nodes[n + 1]
-            for i in range(LANES):
-                if not in_space:
-                    put_world(w, G, i, get(w, G, i), get(node, WORLD + 3 * LANES, i))
-                arrive(w, node, i)
-                _enter(w, node, i)
-
-    @pasted
-    def search(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+    def search(gamma, axes, tip, guesses, steps, limits, most, shares, out):
         widest, small, tiny = limits
-        count = coarse[5].shape[0] - 1
-        lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
+        count = steps[5].shape[0] - 1
+        lanes = np.zeros((steps[0].shape[2] - 1, LANES))
         work, w = np.zeros(REST_WORK), np.zeros(SIZE)
         nodes = np.zeros((count + 1, NODE))
-        rest = np.zeros((max(coarse[1].shape[0], fine[1].shape[0]), STEP_ROWS * LANES))
+        rest = np.zeros((steps[1].shape[0], STEP_ROWS * LANES))
         for first in range(0, gamma.shape[0], LANES):
             here = min(LANES, gamma.shape[0] - first)
             load_all(lanes, gamma, first, here)
-            rest_frames(work, lanes, coarse[0], coarse[1], rest[: coarse[1].shape[0]])
-            _aim(nodes[count], work, axes, False)
+            rest_frames(work, lanes, steps[0], steps[1], rest)
+            _aim(nodes[count], work, axes)
             _set_out(w, nodes, work, guesses, first, here)
             for i in range(LANES):
                 w[SHARE + i] = shares[min(first + min(i, here - 1), shares.shape[0] - 1)]
                 w[DONE + i], w[LEFT + i] = AT_WORK, widest
             for _ in range(most[0]):
-                walk(w, nodes, rest, coarse, tip)
+                walk(w, nodes, rest, steps, tip)
                 if _newton(w, nodes, count, small) == 0:
                     break
-            rest_frames(work, lanes, fine[0], fine[1], rest[: fine[1].shape[0]])
-            _aim(nodes[count], work, axes, not in_space)
             for i in range(LANES):
                 if w[DONE + i] == FOUND:
                     _move(nodes, count, i)
             for turn in range(most[1]):
-                walk_tip(w, nodes, rest, fine, tip)
+                walk_tip(w, nodes, rest, steps, tip)
                 if _chords(w, nodes, count, turn, tiny * tiny) == 0:
                     break
             _store(w, nodes, work, first, here, tiny, out)
@@ -309,7 +296,7 @@ _search_directions, _search_frames = _search_with(in_space=False), _search_with(
 
 
 @kernel
-def solve_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+def solve_directions(gamma, axes, tip, guesses, steps, limits, most, shares, out):
     """Equilibria under forces along one direction, with three numbers for each node.
 
     Args:
@@ -318,40 +305,39 @@ def solve_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shar
         tip: Weight of the payload along them, its lever, force and moment that follow (12,).
         guesses: G of the nodes, tip first, as the base of the unloaded arm sees them, (n, 3 node)
             or (0, 3 node).
-        coarse: Tables (pieces, lengths, scalars, bends, moments, firsts) for Newton steps.
-        fine: Tables for the last steps.
-        limits: Longest first Newton step [rad] that is trusted; step at which the coarse tables
-            have done their work; what the fine ones may leave.
-        most: Walks (coarse, fine) allowed.
+        steps: Tables (pieces, lengths, scalars, bends, moments, firsts).
+        limits: Longest first Newton step [rad] that is trusted; step from which on the last
+            matrices do; what may be left.
+        most: Walks allowed, with tangents and without.
         shares: Shares of the loads (n,), or (1,) for all.
         out: Filled with the tip, G of the nodes, the margin, and the state (0 not found, 1 found, 3
             given up), (n, 5 + 3 node).
     """
-    _search_directions(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out)
+    _search_directions(gamma, axes, tip, guesses, steps, limits, most, shares, out)
 
 
 @kernel
-def solve_frames(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out):
+def solve_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out):
     """The same under any loads, with six numbers for each node: G, H."""
-    _search_frames(gamma, axes, tip, guesses, coarse, fine, limits, most, shares, out)
+    _search_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out)
 
 
 @kernel
-def base_directions(gamma, tip, directions, fine, out):
+def base_directions(gamma, tip, directions, steps, out):
     """Directions of the forces that the base must see, for those that the tip of one rod sees.
 
     Args:
         gamma: One activation (1, bundle).
         tip: As of `solve_directions`.
         directions: G(L) as the base of the unloaded arm sees them (n, 3).
-        fine: As of `solve_directions`.
+        steps: As of `solve_directions`.
         out: Filled, (n, 3).
     """
-    lanes = np.zeros((fine[0].shape[2] - 1, LANES))
+    lanes = np.zeros((steps[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(SIZE)
-    rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
+    rest = np.zeros((steps[1].shape[0], STEP_ROWS * LANES))
     load_all(lanes, gamma, 0, 1)
-    rest_frames(work, lanes, fine[0], fine[1], rest)
+    rest_frames(work, lanes, steps[0], steps[1], rest)
     for first in range(0, directions.shape[0], LANES):
         here = min(LANES, directions.shape[0] - first)
         for i in range(LANES):
@@ -360,7 +346,7 @@ def base_directions(gamma, tip, directions, fine, out):
             put_world(w, G, i, g, h)
             begin_tip(w, tip, i)
         for k in range(rest.shape[0]):
-            r, c = rest[k], fine[2][k]
+            r, c = rest[k], steps[2][k]
             for i in range(LANES):
                 step_direction_tip(w, r, c, i)
         for i in range(here):

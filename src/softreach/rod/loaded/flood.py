@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from softreach.kernels.loaded.grid_values import interpolate
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.loaded.following import Path, follow
-from softreach.rod.loaded.shooting import Shots, turn_between, units
+from softreach.rod.loaded.following import follow
+from softreach.rod.loaded.shooting import Shots, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.support.lazy import lazy
 
@@ -78,7 +78,7 @@ class Flood:
         interpolate(of_nodes, rough.ravel() < _UNEVEN, places, sizes, frames)
         rough = rough[self._cells_at(gamma)]
         frames[np.isinf(rough)] = of_nodes[self.held.is_found.argmax()]
-        return units(frames), rough
+        return frames, rough
 
     @lazy
     def _rough(self) -> Array:
@@ -139,7 +139,7 @@ class _Flooding:
     def run(self, rest: Array, start: Shots) -> Flood:
         self.rest = rest
         nearest = int((((self.gamma - rest) / self.box.scales) ** 2).sum(axis=1).argmin())
-        found = self._followed(rest[None], self.gamma[[nearest]], start, None)
+        found = follow(self.solver, rest[None], self.gamma[[nearest]], start).shots
         self._keep(np.array([nearest]), found)
         front = np.flatnonzero(self.is_known)
         while len(front):
@@ -147,9 +147,6 @@ class _Flooding:
         self._link()
         held = self._shots(np.arange(len(self.gamma)))
         return Flood(self.box, self.sizes, held, self._whole_cells())
-
-    def _followed(self, begin: Array, end: Array, start: Shots, slope: Array | None) -> Shots:
-        return follow(self.solver, Path.under_all_loads(begin, end), start, slope=slope).shots
 
     def _keep(self, nodes: Index, found: Shots) -> None:
         good = found.is_found
@@ -201,7 +198,8 @@ class _Flooding:
                 known = inside & self.is_known[back]
                 ahead = self.states.frame[origin[rows]] - self.states.frame[back]
                 slopes[rows] = np.where(known[:, None], ahead, 0.0)
-        found = self._followed(self.gamma[origin], self.gamma[to], self._shots(origin), slopes)
+        ends = self.gamma[origin], self.gamma[to]
+        found = follow(self.solver, *ends, self._shots(origin), slopes).shots
         self._keep(to, found)
         good = found.is_found
         lower = np.where(way > 0, origin, to)
@@ -222,9 +220,8 @@ class _Flooding:
             self.linked[axis, low[smooth]] = True
             doubtful = low[~self.linked[axis, low]]
             high, _ = self._neighbors(doubtful, axis, 1)
-            found = self._followed(
-                self.gamma[doubtful], self.gamma[high], self._shots(doubtful), None
-            )
+            ends = self.gamma[doubtful], self.gamma[high]
+            found = follow(self.solver, *ends, self._shots(doubtful)).shots
             apart = turn_between(found.frame, self.states.frame[high])
             moved = np.linalg.norm(found.tips - self.states.tips[high], axis=1)
             same = found.is_found & (apart < _SAME_FRAME)

@@ -1,24 +1,23 @@
-"""Branches of equilibria, followed along paths of activations and loads.
+"""Branches of equilibria, followed along ways of activations or loads.
 
-A step along a path predicts how the nodes of an arm see the world by the slope of the last one,
+A step along a way predicts how the nodes of an arm see the world by the slope of the last one,
 and corrects that by Newton's method. It counts where the correction is small, of the frames and of
 the tip, and where the equilibrium is stable; otherwise it is tried at half its length.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.loaded.shooting import Shots, turn_between, units
+from softreach.rod.loaded.shooting import ALL_LOADS, Shots, turn_between, units
 
 if TYPE_CHECKING:
     from softreach.rod.loaded.solver import Solver
 
-__all__ = ["Followed", "Path", "follow"]
+__all__ = ["Followed", "follow"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,53 +28,38 @@ _SHORTEST = 2.0**-20  # of the path, below which the branch has ended
 _MOST_STEPS = 3000
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
-    """Straight ways from activations and shares of the loads to others, each from 0 to 1."""
-
-    begin: Array
-    """Activations, shape (n, bundles)."""
-    end: Array
-    from_share: Array
-    """Of the loads, shape (n,)."""
-    to_share: Array
-
-    @classmethod
-    def under_all_loads(cls, begin: Array, end: Array) -> Path:
-        """From activations to others."""
-        ones = np.ones(len(begin))
-        return cls(begin, end, ones, ones)
-
-    def at(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
-        """Activations and shares at places of some paths."""
-        gamma = self.begin[rows] + t[:, None] * (self.end[rows] - self.begin[rows])
-        share = self.from_share[rows] + t * (self.to_share[rows] - self.from_share[rows])
-        return gamma, share
-
-
 class Followed(NamedTuple):
     """Branches as far as they were followed."""
 
     shots: Shots
-    """The last equilibrium; found where it is that of the end of the path."""
+    """The last equilibrium; found where it is that of the end of the way."""
     has_ended: Mask
-    """Mask of branches that end before the path does, shape (n,)."""
+    """Mask of branches that end before the way does, shape (n,)."""
 
 
-def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None) -> Followed:
-    """Branches of stable equilibria along paths, each by itself.
+def follow(
+    solver: Solver,
+    begin: Array,
+    end: Array,
+    start: Shots,
+    slope: Array | None = None,
+    *,
+    hangs: bool = True,
+) -> Followed:
+    """Branches of stable equilibria along straight ways between activations, each by itself.
 
     Args:
         solver: That of the arm.
-        path: Paths.
-        start: Equilibria at their beginning.
-        slope: Change of the frame along the path, if it is known, shape (n, component).
+        begin: Activations, shape (n, bundles).
+        end: Others.
+        start: Equilibria at the beginning.
+        slope: Change of the frame along the way, if it is known, shape (n, component).
+        hangs: Whether the loads are on; if not, they are put on along the way.
     """
-    n, length = len(path.begin), solver.tables.arm.length
+    n, length = len(begin), solver.tables.arm.length
     allowed = _CORRECTION if solver.tables.segments == 1 else _CORRECTION_OF_NODES
     tips, frame, margin = start.tips.copy(), start.frame.copy(), start.margin.copy()
-    goes_on = np.any(path.begin != path.end, axis=1) | (path.from_share != path.to_share)
-    place, step = np.where(goes_on, 0.0, 1.0), np.ones(n)
+    place, step = np.where(hangs & (begin == end).all(axis=1), 1.0, 0.0), np.ones(n)
     slopes = np.zeros_like(frame) if slope is None else slope.copy()
     moves, steps_known = np.zeros((n, 3)), np.zeros(n, int)
     ended = ~start.is_found
@@ -86,8 +70,8 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
         to = np.minimum(1.0, place[rows] + step[rows])
         h = to - place[rows]
         guess = units(frame[rows] + h[:, None] * slopes[rows])
-        gamma, share = path.at(rows, to)
-        found = solver.careful(gamma, guess, share)
+        gamma = begin[rows] + to[:, None] * (end[rows] - begin[rows])
+        found = solver.careful(gamma, guess, ALL_LOADS if hangs else to)
         with np.errstate(all="ignore"):  # of what is not found
             turn = turn_between(found.frame, guess)
             missed = found.tips - tips[rows] - h[:, None] * moves[rows]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.flood import PARTS, Flood, grid_sizes
-from softreach.rod.loaded.following import Followed, Path, follow
+from softreach.rod.loaded.following import Followed, follow
 from softreach.rod.loaded.ring import Ring
 from softreach.rod.loaded.shooting import Equilibria, Shots, turn_between
 from softreach.rod.tip_map import TipStatus
@@ -32,7 +32,8 @@ __all__ = ["Postures"]
 Array = NDArray[np.float64]
 
 _TWIST = 1e-4  # [rad], of the twin over its length
-_DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
+_OF_TWIN = 1e-3  # [L], its tolerance, as postures are polished on the arm
+_DOUBTFUL = 0.02  # margin below which what is found from the unloaded arm may not be its posture
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
@@ -54,6 +55,7 @@ class Postures:
     box: ActivationBox
     side: int = 1
     _nearness: ClassVar[float] = np.inf  # [rad], of what is found from guesses
+    _least: ClassVar[float] = _DOUBTFUL  # margin of what is found from guesses
 
     @classmethod
     def of(cls, solver: Solver) -> Postures:
@@ -66,7 +68,7 @@ class Postures:
         """The solver of the twin."""
         tables = self.solver.tables
         twist = self.side * _TWIST / tables.arm.length
-        return replace(self.solver, tables=replace(tables, twist=twist))
+        return replace(self.solver, tables=replace(tables, twist=twist), tol=_OF_TWIN)
 
     @lazy
     def rest_activation(self) -> Array:
@@ -85,9 +87,8 @@ class Postures:
 
     def _hung(self, gamma: Array) -> Followed:
         """Loads put on the twin at fixed activations."""
-        path = Path(gamma, gamma, np.zeros(len(gamma)), np.ones(len(gamma)))
-        start = self.twin.careful(gamma, None, path.from_share)
-        return follow(self.twin, path, start)
+        start = self.twin.careful(gamma, None, np.zeros(1))
+        return follow(self.twin, gamma, gamma, start, hangs=False)
 
     @lazy
     def _ring(self) -> Ring | None:
@@ -110,7 +111,7 @@ class Postures:
         order, guesses = self._guesses(gamma[at])
         at = at[order]
         shots = self.solver.quick(gamma[at], guesses)
-        good = shots.is_found & (shots.margin > _DOUBTFUL)
+        good = shots.is_found & (shots.margin > self._least)
         if guesses is not None:
             good &= turn_between(shots.frame, guesses) < self._nearness
         self.solver.put(gamma, at, shots._replace(is_found=good), equilibria)
@@ -169,7 +170,7 @@ class Postures:
             start = self.rest.of(np.zeros(len(gamma), np.intp))
         else:
             begin, start = self._leaning(gamma)
-        return follow(self.twin, Path.under_all_loads(begin, gamma), start)
+        return follow(self.twin, begin, gamma, start)
 
     def _leaning(self, gamma: Array) -> tuple[Array, Shots]:
         """Places on lines where the twin leans that nothing holds at rest, and how it does."""
@@ -210,6 +211,7 @@ class FloodedPostures(Postures):
 
     flood: Flood = field(kw_only=True)
     _nearness: ClassVar[float] = 0.15
+    _least: ClassVar[float] = 0.0
 
     def _guesses(self, gamma: Array) -> tuple[NDArray[np.intp], Array | None]:
         """Those of uncut cells, rough ones last: lanes wait for the slowest among them."""
@@ -218,29 +220,36 @@ class FloodedPostures(Postures):
         return order, frames[order]
 
     def followed(self, gamma: Array) -> Followed:
-        """From where the lines meet the first cut; in uncut cells at once, or from a node."""
-        rest, uncut = self.rest_activation, self.flood.is_uncut(gamma)
-        way, clear = gamma - rest, np.where(uncut, 1.0, self.flood.clear(rest, gamma))[:, None]
-        begin = np.where(clear < 1.0, rest + clear * way, gamma)
-        guesses = self.flood.at(begin)[0]
-        before = self.flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
-        slopes = (1.0 - clear) * PARTS * (guesses - before)
-        start = self.twin.careful(begin, guesses)
-        lost = ~start.is_found | (start.margin <= 0.0)
-        lost |= turn_between(start.frame, guesses) > self._nearness
-        nodes, held = self.flood.nearest(gamma)
-        for values, at_nodes, at_rest in zip(start, held, self.rest, strict=True):
-            values[lost] = at_rest[0]
-            values[lost & uncut] = at_nodes[lost & uncut]
-        begin[lost] = np.where(uncut[:, None], nodes, rest)[lost]
-        slopes[lost] = np.where(uncut[:, None], guesses - held.frame, 0.0)[lost]
-        followed = follow(self.twin, Path.under_all_loads(begin, gamma), start, slopes)
+        """In uncut cells from the nearest node, else from where the lines meet the first cut."""
+        uncut = self.flood.is_uncut(gamma)
+        begin, start = self.flood.nearest(gamma)
+        slopes = self.flood.at(gamma)[0] - start.frame
+        cut = np.flatnonzero(~uncut)
+        if len(cut):
+            begin[cut], of_cut, slopes[cut] = self._before_cuts(gamma[cut])
+            start.put(cut, of_cut)
+        followed = follow(self.twin, begin, gamma, start, slopes)
         lost = np.flatnonzero(uncut & ~followed.shots.is_found)
         if len(lost):
             by_line = super().followed(gamma[lost])
             followed.has_ended[lost] = by_line.has_ended
             followed.shots.put(lost, by_line.shots)
         return followed
+
+    def _before_cuts(self, gamma: Array) -> tuple[Array, Shots, Array]:
+        """Where lines meet their first cut, else rest; postures there, and changes of frames."""
+        rest, clear = self.rest_activation, self.flood.clear(self.rest_activation, gamma)[:, None]
+        way = gamma - rest
+        begin = rest + clear * way
+        guesses = self.flood.at(begin)[0]
+        before = self.flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
+        slopes = (1.0 - clear) * PARTS * (guesses - before)
+        start = self.twin.careful(begin, guesses)
+        lost = ~start.is_found | (start.margin <= 0.0)
+        lost = np.flatnonzero(lost | (turn_between(start.frame, guesses) > self._nearness))
+        start.put(lost, self.rest.of(np.zeros(len(lost), np.intp)))
+        begin[lost], slopes[lost] = rest, 0.0
+        return begin, start, slopes
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import TipForceTables
+from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus, position_slopes
 from softreach.support.lazy import lazy
 
@@ -68,8 +68,8 @@ class PushingTip:
         return self.rod.box
 
     @lazy
-    def _tables(self) -> TipForceTables:
-        return TipForceTables(self.rod.arm, self.rod.loads, self.rod.body, -self.direction)
+    def _tables(self) -> LoadTables:
+        return LoadTables(self.rod.arm, self.rod.loads, self.rod.body, direction=-self.direction)
 
     def _solver(self, force: float, steps: int) -> Solver:
         return Solver(self._tables.under(force), steps, self.rod.tol)

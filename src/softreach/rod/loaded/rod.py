@@ -20,7 +20,7 @@ from softreach.rod.free import (
 )
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shapes import LoadedShapes
-from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.steps import (
     UNJUDGED,
@@ -61,6 +61,7 @@ Array = NDArray[np.float64]
 _BLOCK = BLOCK // 8  # samples per task
 _RESPONSE_STEPS = 48
 _OF_LINES = 32 * LANES  # samples per task that follows branches
+_SIDES = 1e-3  # [rad], between postures of two sides
 
 
 @dataclass(frozen=True, repr=False)
@@ -143,6 +144,10 @@ class LoadedRod(ArmRod):
     @lazy
     def _shape_solver(self) -> Solver:
         return self._solver_of(checked(self._shape_steps, self._tip_tol))
+
+    @lazy
+    def _mirrored(self) -> Postures:
+        return self.postures.mirrored.with_flood()
 
     def _prepare(self) -> None:
         self.postures  # noqa: B018
@@ -230,6 +235,23 @@ class LoadedRod(ArmRod):
 
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
         return compliance
+
+    def leans(self, activations: ArrayLike) -> NDArray[np.bool_]:
+        """Mask of activations at which the arm leans to one of two sides, shape (n,).
+
+        With the other twist it leans to the other.
+        """
+        self.prepare()
+        gamma, sides = self.box.check(activations), (self.postures, self._mirrored)
+        leans = np.empty(len(gamma), bool)
+
+        def fill(block: slice) -> None:
+            here, there = (side.find(gamma[block]) for side in sides)
+            leans[block] = has_tip(here.status) & has_tip(there.status)
+            leans[block] &= turn_between(here.frame, there.frame) > _SIDES
+
+        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
+        return leans
 
     def shapes(
         self,

@@ -15,6 +15,9 @@ from softreach.rod.tip_map import TipStatus
 Array = NDArray[np.float64]
 
 
+ALL_LOADS = np.ones(1)
+
+
 class Shots(NamedTuple):
     """Ends of searches."""
 
@@ -48,10 +51,10 @@ class Search(NamedTuple):
     """Walks allowed, with tangents and without."""
 
 
-QUICK = Search(1.2, 5e-3, (8, 12))
-"""On half as many steps, but for the last."""
+QUICK = Search(1.2, 5e-3, (5, 12))
+"""From a start that is near."""
 CAREFUL = Search(1.2, 1e-3, (8, 12))
-"""On all steps, to follow a branch."""
+"""To follow a branch, also where it is about to end."""
 MARGIN_ALONE = Search(np.inf, np.inf, (1, 0))
 """One walk from where it is."""
 
@@ -71,11 +74,10 @@ def shoot(
     gamma: Array,
     tables: LoadTables,
     guesses: Array | None,
-    coarse: StepTables,
-    fine: StepTables,
-    search: Search,
+    steps: StepTables,
     tiny: float,
-    shares: Array,
+    search: Search = CAREFUL,
+    shares: Array = ALL_LOADS,
 ) -> Shots:
     """Searches for equilibria; see `solve_directions`.
 
@@ -83,25 +85,19 @@ def shoot(
         gamma: Activations, shape (n, bundles).
         tables: Of the arm.
         guesses: Frames as in `Equilibria`; None for those of the unloaded arm.
-        coarse: Its steps for walks with tangents.
-        fine: Its steps for the others.
-        search: Settings.
+        steps: Its steps.
         tiny: Turn that may be left [rad].
+        search: Settings.
         shares: Of the loads, shape (n,), or (1,) for all.
     """
     size = tables.frame_size
     out = np.empty((len(gamma), 5 + size))
     solve = kernels.solve_directions if tables.one_direction else kernels.solve_frames
     given = np.zeros((0, size)) if guesses is None else np.ascontiguousarray(guesses)
-    limits = search.widest, search.small, tiny
-    steps = tuple(coarse), tuple(fine)
+    arm = _columns(gamma), tables.axes, tables.at_tip, given, tuple(steps)
     solve(
-        _columns(gamma),
-        tables.axes,
-        tables.at_tip,
-        given,
-        *steps,
-        limits,
+        *arm,
+        (search.widest, search.small, tiny),
         search.walks,
         shares,
         out,
@@ -131,10 +127,12 @@ def walk(
     return Walked(answers[0][:, :, : gamma.shape[1]], *answers[1:])
 
 
-def base_directions(gamma: Array, tables: LoadTables, directions: Array, fine: StepTables) -> Array:
+def base_directions(
+    gamma: Array, tables: LoadTables, directions: Array, steps: StepTables
+) -> Array:
     """Directions of gravity at the base of one arm (1, bundles), for those at its tip, (n, 3)."""
     out = np.empty_like(directions)
-    kernels.base_directions(_columns(gamma), tables.at_tip, directions, tuple(fine), out)
+    kernels.base_directions(_columns(gamma), tables.at_tip, directions, tuple(steps), out)
     return out
 
 
@@ -197,4 +195,4 @@ def units(frames: Array) -> Array:
 def turn_between(frames: Array, others: Array) -> Array:
     """The largest change of a direction [rad], shape (n,)."""
     change = (frames - others).reshape(len(frames), frames.shape[1] // 3, 3)
-    return np.linalg.norm(change, axis=2).max(axis=1)
+    return np.sqrt(np.einsum("nki,nki->nk", change, change).max(axis=1))

@@ -15,7 +15,7 @@ from softreach.kernels.loaded.response import TRACE
 from softreach.rod.free import linear_strains
 from softreach.rod.loaded.shapes import LoadedShapes, shapes_of
 from softreach.rod.loaded.shooting import (
-    CAREFUL,
+    ALL_LOADS,
     MARGIN_ALONE,
     QUICK,
     Equilibria,
@@ -35,7 +35,6 @@ from softreach.support.lazy import lazy
 Array = NDArray[np.float64]
 
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
-_ALL = np.ones(1)
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
 
 
@@ -45,7 +44,7 @@ class Solver:
 
     Args:
         tables: Of the arm and its loads.
-        steps: Least number of steps, coarse ones apart; no fewer than the phase of the loads needs.
+        steps: Least number of steps; no fewer than the phase of the loads needs.
         tol: Largest tip error, in L, of which the search uses up a hundredth.
     """
 
@@ -57,13 +56,8 @@ class Solver:
         object.__setattr__(self, "steps", max(self.steps, self.tables.phase.fewest_steps))
 
     @lazy
-    def _fine(self) -> StepTables:
+    def _steps(self) -> StepTables:
         return self.tables.uniform(self.steps)
-
-    @lazy
-    def _coarse(self) -> StepTables:
-        fewest = self.tables.phase.fewest_steps
-        return self.tables.uniform(max(fewest, (self.steps + 1) // 2))
 
     @property
     def _tiny(self) -> float:
@@ -80,13 +74,11 @@ class Solver:
 
     def quick(self, gamma: Array, guesses: Array | None) -> Shots:
         """Searches from frames as in `Equilibria`, or from the unloaded arm."""
-        parts = self._coarse, self._fine, QUICK, self._tiny, _ALL
-        return shoot(gamma, self.tables, guesses, *parts)
+        return shoot(gamma, self.tables, guesses, self._steps, self._tiny, QUICK)
 
-    def careful(self, gamma: Array, guesses: Array | None, shares: Array = _ALL) -> Shots:
+    def careful(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Shots:
         """The same under shares of the loads, to follow a branch."""
-        parts = self._fine, self._fine, CAREFUL, self._tiny, shares
-        return shoot(gamma, self.tables, guesses, *parts)
+        return shoot(gamma, self.tables, guesses, self._steps, self._tiny, shares=shares)
 
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
@@ -136,7 +128,7 @@ class Solver:
 
         def image(points: Array) -> Array:  # steps do not keep the length
             directions = np.ascontiguousarray(points)
-            images = base_directions(gamma, self.tables, directions, self._fine)
+            images = base_directions(gamma, self.tables, directions, self._steps)
             return images / np.linalg.norm(images, axis=1, keepdims=True)
 
         return image
@@ -151,21 +143,21 @@ class Solver:
         """
         edges = self.tables.edges(stations, self.steps)
         z = self.tables.arm.profile.station(edges)
-        is_uniform = len(edges) == len(self._fine.lengths) + 1  # stations at ends of steps alone
-        table = self._fine if is_uniform else self.tables.of_edges(edges)
+        is_uniform = len(edges) == len(self._steps.lengths) + 1  # stations at ends of steps alone
+        table = self._steps if is_uniform else self.tables.of_edges(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
         trace = walk(gamma, self.tables, directions, table, trace=True).trace
-        margin = shoot(gamma, self.tables, directions, table, table, MARGIN_ALONE, 0.0, _ALL).margin
+        margin = shoot(gamma, self.tables, directions, table, 0.0, MARGIN_ALONE).margin
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
         shapes = shapes_of(at, trace, rows, self._force_at(table, rows), nowhere)
         return shapes.on_base(), margin
 
     def frames_facing(self, gamma: Array, directions: Array) -> Array:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
-        whole = self._fine._replace(firsts=np.array([0, len(self._fine.lengths)]))
+        whole = self._steps._replace(firsts=np.array([0, len(self._steps.lengths)]))
         tables = self.tables.in_one_segment
         trace = walk(gamma, tables, directions, whole, trace=True).trace
-        seen = trace[:, self._fine.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
+        seen = trace[:, self._steps.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
         return units(seen.reshape(len(gamma), self.tables.frame_size))
 
     def respond(
@@ -184,18 +176,17 @@ class Solver:
             compliance: Whether to tell ∂r/∂F.
             directors: Whether to tell the directors of the tips.
         """
-        fine = self._fine
         lost = ~has_tip(known.status)
         rows = np.where(lost, lost.argmin(), np.arange(len(gamma)))  # none is walked in vain
         answers = {"slopes": True, "compliance": compliance, "trace": directors}
-        walked = walk(gamma[rows], self.tables, known.frame[rows], fine, **answers)
+        walked = walk(gamma[rows], self.tables, known.frame[rows], self._steps, **answers)
         tips, at_tips = known.tips.copy(), np.empty((0, 3, 3))
         for values in (tips, walked.slopes, walked.compliance):
             if len(values):
                 values[lost] = np.nan
         if directors:
             at, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
-            shapes = shapes_of(tips, walked.trace, at, self._force_at(fine, at), at_tip)
+            shapes = shapes_of(tips, walked.trace, at, self._force_at(self._steps, at), at_tip)
             at_tips = shapes.frames.directors[:, 0]
         return Response(tips, walked.slopes, walked.compliance, at_tips, known.status)
 
@@ -237,7 +228,7 @@ class Solver:
     ) -> tuple[Array, Array]:
         """Tips and sections of arms near known ones on the steps of a table."""
         at = np.where(lost, lost.argmin(), np.arange(len(gamma)))
-        shots = shoot(gamma[at], self.tables, frame[at], table, table, CAREFUL, 1e-12, _ALL)
+        shots = shoot(gamma[at], self.tables, frame[at], table, 1e-12)
         trace = walk(gamma[at], self.tables, shots.frame, table, trace=True).trace
         return np.where((lost | ~shots.is_found)[:, None], np.nan, shots.tips), trace
 

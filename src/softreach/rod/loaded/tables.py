@@ -84,6 +84,17 @@ class LoadTables:
     """Phase of the longest segment between nodes [rad]."""
     twist: float = field(default=0.0, kw_only=True)
     """Of the arm at rest [rad/m], beside that of its design."""
+    direction: Array | None = field(default=None, kw_only=True)
+    """Unit vector in the base frame of one more force on the tip."""
+    force: float = field(default=0.0, kw_only=True)
+    """Of that [N]; nodes, axes and phase are the same for all."""
+
+    def under(self, force: float) -> LoadTables:
+        """The same with another size of that force [N]."""
+        kept = {name: getattr(self, name) for name in ("axes", "one_direction", "phase", "_made")}
+        tables = replace(self, force=force)
+        vars(tables).update(kept)
+        return tables
 
     @lazy
     def nodes(self) -> Array:
@@ -110,7 +121,8 @@ class LoadTables:
         """
         forces = [self._at_tip, *(np.array(load.force) for load in self.loads.point_loads)]
         forces = [np.array(self.loads.gravity), np.array(self.loads.force_per_length), *forces]
-        first = next((f for f in forces if np.any(f)), np.array([0.0, 0.0, -1.0]))
+        last = np.array([0.0, 0.0, -1.0]) if self.direction is None else self.direction
+        first = next((f for f in forces if np.any(f)), last)
         first = first / np.linalg.norm(first)
         other = np.eye(3)[np.argmin(np.abs(first))]
         second = np.cross(first, other)
@@ -123,6 +135,7 @@ class LoadTables:
         loads = self.loads
         dead = [self._at_tip, loads.gravity, loads.force_per_length]
         dead += [load.force for load in loads.point_loads]
+        dead += [] if self.direction is None else [self.direction]
         across = np.array(dead) @ self.axes[1:].T
         size = np.abs(np.array(dead)).max(axis=1, keepdims=True)
         moments = [loads.tip_moment, loads.follower_force]
@@ -167,7 +180,12 @@ class LoadTables:
         """At least `steps` steps, with boundaries where the arm or its loads are not smooth."""
         if steps not in self._made:
             self._made[steps] = self.of_edges(self.edges(np.array([]), steps))
-        return self._made[steps]
+        made = self._made[steps]
+        if self.direction is None:
+            return made
+        scalars = made.scalars.copy()
+        scalars[..., 3:] += self.force * (self.axes @ self.direction)
+        return made._replace(scalars=scalars)
 
     def edges(self, stations: Array, steps: int) -> Array:
         """Boundaries S of steps from tip to base, among them stations Z [m], nodes and breaks.
@@ -268,59 +286,3 @@ def _inward(z: Array) -> Array:
     inward[:, :1] -= hair
     inward[:, -1:] += hair
     return inward
-
-
-@dataclass(frozen=True, eq=False)
-class TipForceTables(LoadTables):
-    """Tables under the given loads and one more force on the tip.
-
-    Its axes do not depend on the size of the force, so that all sizes share one set of steps.
-    """
-
-    direction: Array
-    """Unit vector of the force in the base frame."""
-    force: float = 0.0
-    """[N]."""
-    origin: TipForceTables | None = None
-    """The tables of another size of the force, with which all that does not change is shared."""
-
-    def under(self, force: float) -> TipForceTables:
-        """The same with another size of the force [N]."""
-        kept = self.origin or self
-        parts = self.arm, self.loads, self.body, self.direction, force
-        return TipForceTables(*parts, origin=kept, longest=self.longest, twist=self.twist)
-
-    @lazy
-    def _given(self) -> LoadTables:
-        return LoadTables(self.arm, self.loads, self.body, longest=self.longest, twist=self.twist)
-
-    @lazy
-    def axes(self) -> Array:
-        """Those of the loads; where no force acts otherwise, the first is along this one."""
-        if self.origin is not None:
-            return self.origin.axes
-        loads = self.loads
-        forces = [loads.gravity, loads.force_per_length, loads.tip_force]
-        if any(map(any, (*forces, *(load.force for load in loads.point_loads)))):
-            return self._given.axes
-        alone = loads.replace(tip_force=tuple(self.direction))
-        return LoadTables(self.arm, alone, self.body).axes
-
-    @lazy
-    def one_direction(self) -> bool:
-        """True if all forces, this one included, are dead and along the first axis."""
-        if self.origin is not None:
-            return self.origin.one_direction
-        along = np.abs(self.axes[1:] @ self.direction).max() <= 1e-14
-        return bool(along) and self._given.one_direction
-
-    @lazy
-    def phase(self) -> LoadPhase:
-        """Phase that the other loads give the tangents."""
-        return self._given.phase if self.origin is None else self.origin.phase
-
-    def uniform(self, steps: int) -> StepTables:
-        made = super(TipForceTables, self.origin or self).uniform(steps)
-        scalars = made.scalars.copy()
-        scalars[..., 3:] += self.force * (self.axes @ self.direction)
-        return made._replace(scalars=scalars)
