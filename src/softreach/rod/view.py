@@ -21,6 +21,7 @@ from softreach.rod.tip_map import (
     Array,
     Frame,
     Frames,
+    Held,
     Status,
     StrainRange,
     Strains,
@@ -141,6 +142,9 @@ class DerivedMap(TipMap):
         base = self.base.continued_from(self.activations(gamma))
         return self if base is self.base else replace(self, base=base)
 
+    def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held | None:
+        return self.base.held(self.activations(gamma), sizes)
+
     def farthest(self) -> float:
         return self.base.farthest()
 
@@ -205,6 +209,13 @@ class PlacedRod(DerivedMap):
                 v, w = twists[:, :3], twists[:, 3:]
                 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                     v[:, i] += position[j] * w[:, k] - position[k] * w[:, j]
+
+    def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held | None:
+        held = super().held(gamma, sizes)
+        if held is not None:
+            for tips in (held.tips, held.end_tips):
+                move(tips, np.array(self.pose.rotation), np.array(self.pose.position))
+        return held
 
     def frames(
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None

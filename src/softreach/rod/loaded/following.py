@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 
 _CORRECTION, _CORRECTION_OF_NODES = 0.12, 0.03  # [rad], of one segment and of several
 _TIP = 3.0  # weight of the correction of a tip [rad/L]
-_SHORTEST = 2.0**-20  # of the path, below which the branch has ended
+_SHORTEST = 2.0**-20  # of a path, below which its branch has ended
 _MOST_STEPS = 3000
 
 
@@ -62,7 +62,13 @@ class Followed(NamedTuple):
     """Mask of branches that end before the path does, shape (n,)."""
 
 
-def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None) -> Followed:
+def follow(
+    solver: Solver,
+    path: Path,
+    start: Shots,
+    slope: Array | None = None,
+    shortest: float = _SHORTEST,
+) -> Followed:
     """Branches of stable equilibria along paths, each by itself.
 
     Args:
@@ -70,6 +76,7 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
         path: Paths.
         start: Equilibria at their beginning.
         slope: Change of the frame along the path, if it is known, shape (n, component).
+        shortest: Step, over the length of the path, below which a branch has ended.
     """
     n, length = len(path.begin), solver.tables.arm.length
     allowed = _CORRECTION if solver.tables.segments == 1 else _CORRECTION_OF_NODES
@@ -107,6 +114,6 @@ def follow(solver: Solver, path: Path, start: Shots, slope: Array | None = None)
         step[rows] = h * np.where(
             good, np.clip(wanted, 0.5, 4.0), np.where(wanted > 0.1, 0.4, 0.25)
         )
-        ended[rows] = ~good & (step[rows] < _SHORTEST)
+        ended[rows] = ~good & (step[rows] < shortest)
     shots = Shots(tips, frame, margin, start.is_found & (place >= 1.0))
     return Followed(shots, ended)

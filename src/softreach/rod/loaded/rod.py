@@ -15,6 +15,7 @@ from softreach.arm.tables import tables
 from softreach.kernels.lanes import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod, linear_strains, per_length
+from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shapes import Shapes
 from softreach.rod.loaded.shooting import Equilibria
@@ -33,6 +34,7 @@ from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
+    Held,
     Status,
     StrainRange,
     Strains,
@@ -135,6 +137,10 @@ class LoadedRod(ArmRod):
     def _shape_solver(self) -> Solver:
         return self._solver_of(checked(self._shape_steps, self.tol))
 
+    @lazy
+    def _mirrored(self) -> Postures:
+        return self.postures.mirrored.with_flood()
+
     def in_steps(self, steps: int) -> Self:
         vars(self).update(_tip_steps=steps, _shape_steps=steps)
         return self
@@ -188,6 +194,10 @@ class LoadedRod(ArmRod):
         tips[:] = known.tips
         if status is not None:
             status[:] = known.status
+
+    def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held:
+        self.prepare()
+        return held_over(self.postures, self._mirrored, gamma, sizes)
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
