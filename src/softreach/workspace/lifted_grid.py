@@ -151,14 +151,22 @@ def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
         rows = np.flatnonzero(near & (ends >= 0).all(axis=1))
         pairs.append(np.stack([number[rows, a, i], number[rows, b, j]], axis=1))
     cell, corner, place = np.nonzero(states >= 0)
-    count, label = _components(np.concatenate(pairs), len(cell))
-    sheet = np.full((2, count, states.shape[1]), -1)  # around a cusp a corner has two on one branch
-    of_cell = np.empty(count, np.int64)
+    links_of_cells, state = np.concatenate(pairs), states[cell, corner, place]
+    _, label = _components(links_of_cells, len(cell))
+    sheet = np.full((label.max(initial=-1) + 1, states.shape[1]), -1)
+    sheet[label, corner] = state
+    of_cell = np.empty(len(sheet), np.int64)
     of_cell[label] = cell
-    for some, way in zip(sheet, (slice(None), slice(None, None, -1)), strict=True):
-        some[label[way], corner[way]] = states[cell, corner, place][way]
-    double = np.flatnonzero((sheet[0] != sheet[1]).any(axis=1))
-    return np.concatenate([of_cell, of_cell[double]]), np.concatenate([sheet[0], sheet[1, double]])
+    # Around a pitchfork or a cusp corners have two on one branch: there it is parted again.
+    forked = np.bincount(label * states.shape[1] + corner)[label * states.shape[1] + corner] > 1
+    _, part = _components(links_of_cells[forked[links_of_cells].all(axis=1)], len(cell))
+    _, first, part = np.unique(part[forked], return_index=True, return_inverse=True)
+    parted = label[forked][first]
+    parts = sheet[parted]
+    parts[part, corner[forked]] = state[forked]
+    whole = np.setdiff1d(np.arange(len(sheet)), parted)
+    cells = np.concatenate([of_cell[whole], of_cell[parted]])
+    return cells, np.concatenate([sheet[whole], parts])
 
 
 def _weights(held: Held, n: int, m: int) -> Array:
@@ -180,6 +188,7 @@ def _edges(held: Held, states: Index, corners: Index, weight: Array) -> tuple[In
         held: The postures.
         states: Numbers of those at the corners of cells, -1 for none, shape (k, 2^m).
         corners: Their nodes, shape (k, 2^m).
+        weight: Of each place among those beside one node, shape (ends,).
 
     Returns:
         Number of its place for each corner without a posture, 0 for others, (k, 2^m), and places.

@@ -16,7 +16,7 @@ from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
-from softreach.workspace.boundary import boundary_surface
+from softreach.workspace.boundary import boundary_surface, wrapped_surface
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import DIAGONAL, Image
@@ -235,9 +235,9 @@ class ReachableSolid(ReachableSet):
     def _boundary(self) -> Surface:
         if isinstance(self._covering, ReachedCells):
             return self._covering.wrap
-        surface, cell = boundary_surface(self._covering, self.volume), self.image.lattice.cell
         if self.tip_map.supports_unstable:
-            return surface
+            return wrapped_surface(self._covering, self.volume)
+        surface, cell = boundary_surface(self._covering, self.volume), self.image.lattice.cell
         corners = self.tip_map.tips(self.tip_map.box.corners())
         outer = corners[~self._covering.are_deep(corners)]
         if (surface.distance(outer) > DIAGONAL * cell).any():  # a spike that no center is in

@@ -27,7 +27,7 @@ Index = NDArray[np.intp]
 
 _NODES = {1: 33, 2: 33, 3: 17}
 """Nodes per free bundle: at most a few thousand postures."""
-_SAME_FRAME, _SAME_TIP = 0.02, 0.02  # [rad], [L]
+_SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
 _UNEVEN = 1e3  # roughness of whole cells beside others
 PARTS = 64  # of a line, at which it is asked for cuts
@@ -245,12 +245,12 @@ class _Flooding:
         return whole
 
 
-def are_same(shots: Shots, others: Shots, length: float) -> Mask:
-    """Mask of those that are the same posture of an arm of a length [m]."""
+def are_same(shots: Shots, others: Shots, length: float, within: float = _SAME) -> Mask:
+    """Mask of those that are the same posture of an arm of a length [m], to so much [rad, L]."""
     with np.errstate(invalid="ignore"):  # of what is not found
         moved = np.linalg.norm(shots.tips - others.tips, axis=1)
         apart = turn_between(shots.frame, others.frame)
-    near = (apart < _SAME_FRAME) & (moved < _SAME_TIP * length)
+    near = (apart < within) & (moved < within * length)
     return np.asarray(near & shots.is_found & others.is_found)
 
 

@@ -29,14 +29,13 @@ Mask = NDArray[np.bool_]
 
 _MOST = 4  # postures of one node
 _END = 2.0**-10  # of an edge, to which the end of a branch is found
+_SAME = 2e-3  # [rad, L], of postures of the arm itself
 _POLISHED = 0.1  # [rad], by which the arm may differ from its twin
 _EVERY = 4  # nodes along each axis to one that lines lead to, where there is no flood
 _UNKNOWN, _NONE = -2, -1
 
 
-def held_over(
-    postures: Postures, mirrored: Postures, gamma: Array, sizes: tuple[int, ...]
-) -> Held:
+def held_over(postures: Postures, mirrored: Postures, gamma: Array, sizes: tuple[int, ...]) -> Held:
     """The postures of both sides over a grid, see `TipMap.held`."""
     grid = _Grid(postures.solver, gamma, sizes)
     grid.fill(postures, grid.has_arm)
@@ -119,7 +118,7 @@ class _Grid:
             at = self.states[nodes[open_], place]
             same = at >= 0
             old = self.shots.of(at[same])
-            same[same] = are_same(shots.of(open_[same]), old, self.length)
+            same[same] = are_same(shots.of(open_[same]), old, self.length, _SAME)
             numbers[open_[same]] = at[same]
             new = open_[at < 0]
             numbers[new] = self.states[nodes[new], place] = len(self.node) + np.arange(len(new))
@@ -200,7 +199,8 @@ class _Grid:
             shots.put(arrived[good], polished.of(good))
             out.put(some, shots)
 
-        parallel.run(partial(run, b) for b in parallel.blocks(len(state), max(8 * LANES, len(state) // 4)))
+        size = max(8 * LANES, len(state) // 4)
+        parallel.run(partial(run, b) for b in parallel.blocks(len(state), size))
         return out
 
 
