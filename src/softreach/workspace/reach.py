@@ -26,7 +26,8 @@ from softreach.workspace.thin import thin_set
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26
-_TORN = 2.0  # times the error asked for, with which sets of several sheets are left
+_QUICK = 24  # cells, up to which sheets take no time
+_TORN = 2.0  # times the error asked for, with which they are left then
 
 ACCURACIES = Range(1e-6, 0.2)
 """Relative errors of a volume that can be asked for."""
@@ -154,14 +155,15 @@ def rasterized_set(
 def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
     """True if the volume errs by more than asked, and grids that memory holds may be fine enough.
 
-    Of several sheets the error falls as 1/n and no faster: twice what is asked has to do for them.
+    Of several sheets the error falls as 1/n and no faster: twice what is asked has to do for them,
+    but on grids that take no time.
     """
     cells, wanted = 2 * solid.cells, accuracy * solid.volume
-    if solid.volume_error <= (_TORN if solid.is_torn else 1.0) * wanted:
-        return False
-    while solid.is_torn and solid.volume_error > _TORN * wanted * (cells / solid.cells):
-        cells *= 2
-    return (cells + 1) ** 3 <= _MOST_VERTICES
+    if solid.is_torn and solid.cells > _QUICK:
+        wanted *= _TORN
+    return solid.volume_error > wanted and (cells + 1) ** 3 <= _MOST_VERTICES / (
+        4.0 if solid.is_torn else 1.0
+    )
 
 
 def _of_three(
