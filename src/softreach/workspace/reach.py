@@ -67,9 +67,9 @@ def reachable_set(
     activation that reaches it; parts that no search meets may be missing, gaps below 1.5 h are
     filled. The convex volume lies between the hull of tips and the planes that none goes beyond.
 
-    Under loads only stable equilibria count as reached. Where the activation box has none, or the
-    arm snaps from one to another, cells are left out and never bridged: `lost_share` tells their
-    share of the box. What they still reach at the edge is estimated, and is part of the error.
+    Under loads all postures count that are held without a snap from rest, on as many sheets as there
+    are, up to the edges of these: `hysteresis_share` tells where two are held, `lost_share` where
+    none is. Of more bundles than three, and in one plane, only the posture of each activation does.
 
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
