@@ -194,7 +194,8 @@ class _Grid:
         """Postures of the arm at the ends of branches of the twin, or where these end."""
         start = self.shots.of(state)
         back = self.next[state, column ^ 1]
-        slopes = np.where((back >= 0)[:, None], start.frame - self.shots.frame[back], 0.0)
+        before = self.shots.frame[np.maximum(back, 0)]
+        slopes = np.where((back >= 0)[:, None], start.frame - before, 0.0)
         out = start.of(np.arange(len(state)))
 
         def run(rows: slice) -> None:
