@@ -82,20 +82,14 @@ def grid_stretches(rod: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Arr
     used = corners_of(~is_lifted).ravel()
     determinants = np.where(used, stretches(tips, np.array([cells] * 3)), 0.0)
     determinants *= cells**3 / (8.0 * rod.box.volume)
-    largest = _largest(rod, np.abs(determinants[used]))
+    share = _NEARLY_ALL if rod.supports_unstable else 1.0  # |det J| grows toward instability
+    largest = float(np.quantile(np.abs(determinants[used]), share)) if used.any() else 0.0
     unsure = np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
     small = np.flatnonzero((unsure | (not rod.is_smooth)) & used)
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
     determinants[small] = _stretch(rod, rod.box.from_free_cube(places))
     determinants[~np.isfinite(determinants)] = 0.0
     return determinants
-
-
-def _largest(rod: TipMap, stretch: Array) -> float:
-    """The largest |det J|; nearly so where it has no bound, as it grows toward instability."""
-    if rod.supports_unstable and len(stretch):
-        return float(np.quantile(stretch, _NEARLY_ALL))
-    return float(stretch.max(initial=0.0))
 
 
 def cube_grid(cells: int, m: int = 3) -> Array:
@@ -109,13 +103,6 @@ def corners_of(cells: Mask) -> Mask:
         none = np.zeros_like(np.take(cells, [0], axis))
         cells = np.concatenate([cells, none], axis) | np.concatenate([none, cells], axis)
     return cells
-
-
-def every_second(values: Array, cells: int, m: int) -> Array:
-    """Values at the vertices of the grid of half as many cells."""
-    fields = values.shape[1:]
-    every = values.reshape(*(cells + 1,) * m, *fields)[(slice(None, None, 2),) * m]
-    return np.ascontiguousarray(every).reshape(-1, *fields)
 
 
 def image_measure(rod: TipMap, nodes: int) -> float:

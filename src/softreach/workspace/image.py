@@ -300,7 +300,8 @@ def image_of(
     gaps = np.zeros(cells, bool) if is_lifted is None else is_lifted
     others = np.empty((0, 8), np.int64) if lifted is None else lifted
     grid = scaled[: len(stretches)].reshape(*(n + 1 for n in cells), 3)
-    longest = max(float(np.sum([_longest_edge(grid, gaps, axis) for axis in range(3)])), 1.0)
+    steps = [np.nanmax(np.abs(np.diff(grid, axis=axis))) for axis in range(3)]
+    longest = max(float(np.sum(steps)), 1.0)
     longest = max(longest, float(np.ptp(scaled[others], axis=1).sum(axis=1).max(initial=0.0)))
     # Determinants of the kernels are then exact, as rounding adds no more than 1 unit.
     unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
@@ -331,18 +332,6 @@ def _lifted_triangles(vertices: Array, cells: Index) -> Index:
     balance = np.stack(sums, axis=1).astype(np.int64)
     kept = balance.any(axis=1)
     return np.concatenate([faces[kept], balance[kept]], axis=1)
-
-
-def _longest_edge(grid: Array, is_lifted: Mask, axis: int) -> float:
-    """The largest change of a coordinate along edges of the boxes that are mapped as such."""
-    steps = np.abs(np.diff(grid, axis=axis))
-    if not is_lifted.any():
-        return float(steps.max())
-    used = np.pad(~is_lifted, [(int(other != axis),) * 2 for other in range(3)])
-    for other in {0, 1, 2} - {axis}:
-        rows = np.moveaxis(used, other, 0)
-        used = np.moveaxis(rows[:-1] | rows[1:], 0, other)
-    return float(steps[used].max(initial=0.0))
 
 
 def _critical_triangles(

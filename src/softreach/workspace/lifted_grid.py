@@ -95,7 +95,7 @@ def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
     is_lifted = binary_dilation(~_is_plain(held, count == 1, n, m), np.ones((3,) * m))
     corners = _corners(n, m)[is_lifted.ravel()]
     cell, states = _sheets(held, at_node[corners])
-    beyond, end_tips = _edges(held, states, corners[cell], _weights(held, n, m))
+    beyond, end_tips = _edges(held, states, corners[cell])
     return LiftedGrid(
         np.concatenate([tips, end_tips]),
         is_lifted,
@@ -131,6 +131,8 @@ def _is_plain(held: Held, is_single: Mask, n: int, m: int) -> Mask:
 def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
     """Cells of each branch over some cells.
 
+    Around a pitchfork or a cusp corners have two postures on one branch: it is parted there again.
+
     Args:
         held: The postures.
         states: Numbers of those at the corners of cells, -1 for none, (cells, 2^m, postures).
@@ -138,48 +140,40 @@ def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
     Returns:
         Numbers of the cells, and one posture or -1 for each corner, shapes (k,) and (k, 2^m).
     """
-    total = len(held.node)
-    links = np.sort(np.sort(held.links, axis=1) @ [total, 1])
+    corners, joined = states.shape[1], _joined(held, states)
+    cell, corner, _ = np.nonzero(states >= 0)
+    state, label = states[states >= 0], _components(joined, len(cell))
+    sheet = np.full((label.max(initial=-1) + 1, corners), -1)
+    sheet[label, corner] = state
+    of_cell = np.empty(len(sheet), np.int64)
+    of_cell[label] = cell
+    forked = np.bincount(label * corners + corner)[label * corners + corner] > 1
+    part = _components(joined[forked[joined].all(axis=1)], len(cell))[forked]
+    _, first, part = np.unique(part, return_index=True, return_inverse=True)
+    parted = label[forked][first]
+    parts = sheet[parted]
+    parts[part, corner[forked]] = state[forked]
+    whole = np.setdiff1d(np.arange(len(sheet)), parted)
+    every = np.concatenate([whole, parted])
+    return of_cell[every], np.concatenate([sheet[whole], parts])
+
+
+def _joined(held: Held, states: Index) -> Index:
+    """Pairs of postures of cells that are linked, numbered in order, shape (k, 2)."""
+    total, pairs = len(held.node), [np.empty((0, 2), np.int64)]
+    links = np.sort(np.append(np.sort(held.links, axis=1) @ [total, 1], -1))
     number = np.cumsum(states >= 0).reshape(states.shape) - 1
-    pairs = [np.empty((0, 2), np.int64)]
-    for (a, b), i, j in product(
-        _edges_of_cell(states.shape[1].bit_length() - 1), *[range(states.shape[2])] * 2
-    ):
+    places = range(states.shape[2])
+    for (a, b), i, j in product(_edges_of_cell(states.shape[1].bit_length() - 1), places, places):
         ends = np.stack([states[:, a, i], states[:, b, j]], axis=1)
         key = np.sort(ends, axis=1) @ [total, 1]
         near = links[np.searchsorted(links, key).clip(max=len(links) - 1)] == key
         rows = np.flatnonzero(near & (ends >= 0).all(axis=1))
         pairs.append(np.stack([number[rows, a, i], number[rows, b, j]], axis=1))
-    cell, corner, place = np.nonzero(states >= 0)
-    links_of_cells, state = np.concatenate(pairs), states[cell, corner, place]
-    _, label = _components(links_of_cells, len(cell))
-    sheet = np.full((label.max(initial=-1) + 1, states.shape[1]), -1)
-    sheet[label, corner] = state
-    of_cell = np.empty(len(sheet), np.int64)
-    of_cell[label] = cell
-    # Around a pitchfork or a cusp corners have two on one branch: there it is parted again.
-    forked = np.bincount(label * states.shape[1] + corner)[label * states.shape[1] + corner] > 1
-    _, part = _components(links_of_cells[forked[links_of_cells].all(axis=1)], len(cell))
-    _, first, part = np.unique(part[forked], return_index=True, return_inverse=True)
-    parted = label[forked][first]
-    parts = sheet[parted]
-    parts[part, corner[forked]] = state[forked]
-    whole = np.setdiff1d(np.arange(len(sheet)), parted)
-    cells = np.concatenate([of_cell[whole], of_cell[parted]])
-    return cells, np.concatenate([sheet[whole], parts])
+    return np.concatenate(pairs)
 
 
-def _weights(held: Held, n: int, m: int) -> Array:
-    """Of places where branches end, little where a node on a face of the box is left inwards."""
-    place, before = (
-        np.stack(np.unravel_index(node, (n + 1,) * m), axis=1)
-        for node in (held.ends[:, 1], held.node[held.ends[:, 0]])
-    )
-    inward = (place != before) & ((place == 0) | (place == n))
-    return np.where(inward.any(axis=1), 1e-6, 1.0)
-
-
-def _edges(held: Held, states: Index, corners: Index, weight: Array) -> tuple[Index, Array]:
+def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
     """Places where branches end on the way to corners that they do not reach.
 
     All cells of a branch share its place beside one node, so that its sheet has no cracks.
@@ -188,7 +182,6 @@ def _edges(held: Held, states: Index, corners: Index, weight: Array) -> tuple[In
         held: The postures.
         states: Numbers of those at the corners of cells, -1 for none, shape (k, 2^m).
         corners: Their nodes, shape (k, 2^m).
-        weight: Of each place among those beside one node, shape (ends,).
 
     Returns:
         Number of its place for each corner without a posture, 0 for others, (k, 2^m), and places.
@@ -199,12 +192,12 @@ def _edges(held: Held, states: Index, corners: Index, weight: Array) -> tuple[In
     key = corners[row, corner][slot] * total + states[row[slot], other]
     keys, of_key = np.unique(key, return_inverse=True)
     pairs = np.stack([slot, len(row) + of_key], axis=1)
-    _, label = _components(pairs, len(row) + len(keys))
+    label = _components(pairs, len(row) + len(keys))
     groups, group = np.unique(label[: len(row)], return_inverse=True)
     found = np.searchsorted(keys, ends := held.ends @ [1, total]).clip(max=max(len(keys) - 1, 0))
     known = np.flatnonzero(keys[found] == ends) if len(keys) else found[:0]
     group_of_end = np.searchsorted(groups, label[len(row) + found[known]])
-    tips = _means(held.end_tips[known], group_of_end, len(groups), weight[known])
+    tips = _means(held.end_tips[known], group_of_end, len(groups))
     for _ in range(corners.shape[1]):  # corners that no edge of a cell leads to
         around = _means(tips[group], row, len(states))
         tips = np.where(np.isnan(tips), _means(around[row], group, len(groups)), tips)
@@ -214,18 +207,18 @@ def _edges(held: Held, states: Index, corners: Index, weight: Array) -> tuple[In
     return numbers, np.where(np.isnan(tips), at_others, tips)
 
 
-def _components(pairs: Index, size: int) -> tuple[int, Index]:
+def _components(pairs: Index, size: int) -> Index:
     graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
-    return connected_components(graph, directed=False)
+    return connected_components(graph, directed=False)[1]
 
 
-def _means(places: Array, number: Index, size: int, weight: Array | float = 1.0) -> Array:
+def _means(places: Array, number: Index, size: int) -> Array:
     """Means of the places of each number that are known, shape (size, 3); NaN where none is."""
-    weight = np.where(np.isfinite(places[:, 0]), weight, 0.0)
-    total = np.bincount(number, weight, size)[:, None]
-    sums = [np.bincount(number, column, size) for column in np.nan_to_num(places).T * weight]
+    known = np.isfinite(places[:, 0])
+    count = np.bincount(number[known], minlength=size)
+    sums = [np.bincount(number[known], column, size) for column in places[known].T]
     with np.errstate(invalid="ignore"):
-        return np.stack(sums, axis=1) / total
+        return np.stack(sums, axis=1) / count[:, None]
 
 
 def _share(nodes: Mask, n: int, m: int) -> float:

@@ -116,7 +116,7 @@ def fold_volume(image: Image) -> float:
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
     """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
-    return extrapolated_hull(outer_places(fine), outer_places(coarse))
+    return extrapolated_hull(*(image.places[outer_vertices(image)] for image in (fine, coarse)))
 
 
 def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
@@ -127,11 +127,6 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
     fine, coarse = convex_hull(points).volume, convex_hull(fewer).volume
     removed = (fine - coarse) / 3.0
     return Estimate(fine + removed, _LEFT * abs(removed))
-
-
-def outer_places(image: Image) -> Array:
-    """Places [m] of `outer_vertices`, shape (n, 3)."""
-    return image.places[outer_vertices(image)]
 
 
 def outer_vertices(image: Image) -> Index:

@@ -16,7 +16,7 @@ from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.flux import grid_faces, signed_volume
-from softreach.workspace.grid import every_second, grid_stretches
+from softreach.workspace.grid import grid_stretches
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.lifted_grid import LiftedGrid
 from softreach.workspace.planar import planar_set, plane_of_tips
@@ -67,9 +67,9 @@ def reachable_set(
     activation that reaches it; parts that no search meets may be missing, gaps below 1.5 h are
     filled. The convex volume lies between the hull of tips and the planes that none goes beyond.
 
-    Under loads all postures count that are held without a snap from rest, on as many sheets as there
-    are, up to the edges of these: `hysteresis_share` tells where two are held, `lost_share` where
-    none is. Of more bundles than three, and in one plane, only the posture of each activation does.
+    Under loads all postures count that are held without a snap from rest, on all their sheets and
+    up to the edges of these: `hysteresis_share` tells where two are held, `lost_share` where none
+    is. Of more bundles than three, and in one plane, only the posture of each activation does.
 
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
@@ -294,4 +294,5 @@ class _Grid(NamedTuple):
         n = self.cells
         if self.lifted.is_torn:
             return _Grid.of(rod, n // 2)
-        return _Grid(self.lifted.coarser(rod), every_second(self.stretches, n, 3))
+        every_second = self.stretches.reshape((n + 1,) * 3)[::2, ::2, ::2]
+        return _Grid(self.lifted.coarser(rod), every_second.ravel())
