@@ -79,8 +79,10 @@ def reach(
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | _rows(reached)
-    if reached.lost_share > 0.0:  # not stable, or torn
-        rows["activation box left out"] = (100.0 * reached.lost_share, "%")
+    if reached.lost_share > 0.0:
+        rows["activations without a posture"] = (100.0 * reached.lost_share, "%")
+    if reached.hysteresis_share > 0.0:
+        rows["activations with two postures (hysteresis)"] = (100 * reached.hysteresis_share, "%")
     console.rows(f"reachable set of {design}", rows, json, lengths)
     for path in outs:
         _write(reached, path, point, lengths, overwrite)
