@@ -17,6 +17,7 @@ from softreach.paper import printed, reproduce, reproduce_paper
 from softreach.paper.claims import CLAIMS, Verdict
 from softreach.paper.notebook import QUICK, Notebook
 from softreach.paper.sections.uniqueness import uniqueness
+from softreach.plot import style
 from softreach.support.errors import InvalidInput
 
 TINY = replace(
@@ -30,6 +31,7 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduce, "QUICK", TINY)
+        patch.setattr(style, "DPI", 60)
         assert run(["paper", "--out", str(out), "--quick"]) == 0
     return out
 

@@ -50,7 +50,7 @@ WAYS: dict[str, Callable[[bytes], bytes | None]] = {
     "missing": lambda _: None,
 }
 MENDED = "one bit flipped", "missing"
-"""Ways after which the atlas is built again; the other ways are found out the same way."""
+"""Ways after which the atlas is built again, for every fifth file; all are found the same way."""
 
 
 @pytest.fixture(scope="module")
@@ -123,10 +123,10 @@ def test_damage_of_any_file_is_named_and_mended_by_the_command_that_built_the_at
             if (array, way) == ("status", "missing"):
                 assert (found.todo, found.damaged) == (1, 0)
             else:
-                number = int(np.ravel_multi_index(chunk.place[:2], (2, 2)))
+                design = int(np.ravel_multi_index(chunk.place[:2], (2, 2)))
                 assert found.damaged == 1
-                assert_named(found.messages[number], name, place)
-        if way in MENDED:
+                assert_named(found.messages[design], name, place)
+        if way in MENDED and number % 5 == MENDED.index(way):
             built(place)
             assert only_files(place) == atlas_files
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import import_module
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -293,30 +292,24 @@ def test_a_store_is_read_without_the_functions_of_its_metrics(tmp_path):
         height.value({Need.TIPS: np.zeros((1, 3))}, {})
 
 
-def process() -> ProcessPoolExecutor:
-    """One that has imported nothing of this one."""
-    return ProcessPoolExecutor(1, mp_context=get_context("spawn"))
-
-
-def test_lambdas_are_refused_in_one_line_where_processes_compute_them(tmp_path):
+def test_lambdas_are_refused_in_one_line_where_processes_compute_them(process, tmp_path):
     typed = replace(MEAN_HEIGHT, compute=lambda tips: 0.0)
     options = SMALL | {"metrics": [typed]}
-    with process() as pool, pytest.raises(InvalidInput, match=r"compute of metric .*lambda"):
-        build_atlas(small_space(), tmp_path / "a.zarr", executor=pool, **options)
+    with pytest.raises(InvalidInput, match=r"compute of metric .*lambda"):
+        build_atlas(small_space(), tmp_path / "a.zarr", executor=process, **options)
     with ThreadPoolExecutor(1) as threads:
         atlas = build_atlas(small_space(), tmp_path / "a.zarr", executor=threads, **options)
     assert (atlas.mean_height == 0).all()
 
 
-def test_processes_know_the_modules_of_actuators_and_metrics(tmp_path):
+def test_processes_know_the_modules_of_actuators_and_metrics(process, tmp_path):
     trunk = sr.designs.minimal_trunk()
     cable = Cable(place=(0.03, 0.0), name="cable", activation_bounds=(0.0, 1e-4))
     base = trunk.replace(actuators=(*trunk.actuators[:2], cable))
     space = sr.DesignSpace.grid(base, **{"cable.place[0]": [0.01, 0.03]})
     options = SMALL | {"metrics": ("convex", MEAN_HEIGHT)}
     alone = build_atlas(space, tmp_path / "a.zarr", **options).load()
-    with process() as pool:
-        found = build_atlas(space, tmp_path / "b.zarr", executor=pool, **options).load()
+    found = build_atlas(space, tmp_path / "b.zarr", executor=process, **options).load()
     assert_same(found, alone)
 
 
@@ -325,7 +318,7 @@ def test_processes_know_the_modules_of_actuators_and_metrics(tmp_path):
 
 PAYLOADS = [0.005, 0.1]  # everywhere stable, and in part [kg]
 SQUEEZING = [100.0, 4000.0]  # stable, and more than the stubby arm can carry [kg]
-N = 300
+N = 60
 
 
 def count(tips, activations):

@@ -29,7 +29,6 @@ from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.store import AtlasStore, Result
 from softreach.rod import TipMap
 from softreach.support.errors import InvalidInput, SoftreachError, SoftreachWarning
-from softreach.support.interruption import INTERRUPTED
 from tests.atlas.families import SMALL, TINY, assert_same, command, gapped_space, small_space
 from tests.atlas.scripts import build16, ended, run_script, stored_files
 from tests.laws import of_length
@@ -83,7 +82,7 @@ def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(beg
     def dies():
         raise Interrupted
 
-    for write in range(0, begun.writes, 2):
+    for write in range(0, begun.writes, 5):
         place = tmp_path / f"{write}.zarr"
         store = interrupting_store(place, write, dies)
         with pytest.raises(StoreFailed) as caught:
@@ -107,7 +106,7 @@ def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun,
         other.write(1, result)
         other.write_status(3, "no luck")
 
-    for write in range(0, begun.writes, 2):
+    for write in range(0, begun.writes, 5):
         place = tmp_path / f"{write}.zarr"
         slow = interrupting_store(place, write, overtakes)
         AtlasStore.begin(slow, command(gapped_space(), **TINY))
@@ -126,7 +125,7 @@ def test_of_two_different_commands_at_one_moment_one_is_refused(begun, tmp_path)
         accepted.append(n)
         return ""
 
-    for write in range(0, begun.writes, 2):
+    for write in range(0, begun.writes, 5):
         accepted, place = [], tmp_path / f"{write}.zarr"
         said = begin(interrupting_store(place, write, lambda at=place: begin(at, 11)), 10)
         assert ("n: 11 there, 10 here" in said) == (write == 0)
@@ -267,7 +266,7 @@ def test_lengths_that_cannot_share_a_step_are_refused(tmp_path):
 # Interrupted or refused, failed or retried, an atlas ends with the same numbers
 
 
-@pytest.mark.parametrize("kills", [2, pytest.param(30, marks=pytest.mark.large)])
+@pytest.mark.parametrize("kills", [1, pytest.param(30, marks=pytest.mark.large)])
 def test_kills_leave_the_same_bits_as_no_kill(kills, whole, tmp_path):
     """Before a file is opened to be written, or is renamed; a build has about 100 such moments."""
     body = """
@@ -284,27 +283,23 @@ def test_kills_leave_the_same_bits_as_no_kill(kills, whole, tmp_path):
         sys.addaudithook(count_down)
         build(STORE)
     """
-    build16(tmp_path / "whole.zarr")
     store, drawn = tmp_path / "killed.zarr", np.random.default_rng(kills)
     for operation in drawn.integers(1, 7 if kills > 2 else 45, kills):
         process = run_script(tmp_path, body, str(store), str(operation))
         ended(process)
         assert process.returncode == -signal.SIGKILL
     assert_same(build16(store).load(), whole)
-    found, right = (stored_files(tmp_path / f"{name}.zarr") for name in ("killed", "whole"))
-    assert found == right
+    assert stored_files(store) == stored_files(Path(whole.encoding["source"]))
 
 
-def test_ctrl_c_ends_a_process_with_a_line_and_the_same_call_continues(whole, tmp_path):
-    body = """
-        from softreach.support.interruption import run_stoppable
-        run_stoppable(
-            lambda: build(sys.argv[1], progress=lambda _: os.kill(os.getpid(), signal.SIGINT))
-        )
-    """
-    process = run_script(tmp_path, body, str(tmp_path / "a.zarr"))
-    said = ended(process)[1]
-    assert (process.returncode, said) == (130, f"{INTERRUPTED}\n")
+def test_an_interrupted_build_is_continued_by_the_same_call(whole, tmp_path):
+    """In Python, where Ctrl-C raises; `tests/abuse/test_interruption.py` has it of commands."""
+
+    def interrupts(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        build16(tmp_path / "a.zarr", progress=interrupts)
     assert 0 < atlas_status(tmp_path / "a.zarr").done < 16
     assert_same(build16(tmp_path / "a.zarr").load(), whole)
 
