@@ -11,16 +11,16 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Rows
 from softreach.cli.options import (
+    OUT,
     SAMPLING,
     AsJson,
     Durable,
     Overwrite,
     Sampling,
     check_picture,
-    out_option,
     refuse,
 )
-from softreach.cli.values import WHOLE, as_read
+from softreach.cli.values import Whole, as_read
 from softreach.support.errors import InvalidInput, MissingExtra
 from softreach.support.quantity import numbers_in
 
@@ -50,36 +50,15 @@ def build(
     store: Store,
     /,
     *,
-    vary: Annotated[
-        list[str] | None,
-        Parameter(
-            help="A parameter of the grid: taper_deg=0:3:16, left.bundles=1,2, or "
-            "rings[0].material.young_modulus_pa=1e5,1e6. May be repeated."
-        ),
-    ] = None,
-    design: Annotated[
-        str | None, Parameter(help="Design that --vary changes: minimal_trunk if left out.")
-    ] = None,
-    space: Annotated[
-        Path | None, Parameter(help="File of a design space (.toml), instead of --vary.")
-    ] = None,
+    vary: list[str] | None = None,
+    design: str | None = None,
+    space: Path | None = None,
     sampling: Sampling = SAMPLING,
-    alpha: Annotated[
-        str | None,
-        Parameter(help="Radius of the α-shapes over the length of each design: 0.05L if left out."),
-    ] = None,
-    metrics: Annotated[
-        str | None,
-        Parameter(
-            help="Groups of metrics, comma-separated, if not all: extent, convex, concave, exact, "
-            "curvature, stability; or names of metrics of your own."
-        ),
-    ] = None,
-    keep_clouds: Annotated[
-        bool, Parameter(negative="--no-keep-clouds", help="Store the tips.")
-    ] = True,
-    scheduler: Annotated[str | None, Parameter(help="Dask scheduler: tcp://host:port")] = None,
-    scheduler_file: Annotated[Path | None, Parameter(help="Dask scheduler file.")] = None,
+    alpha: str | None = None,
+    metrics: str | None = None,
+    keep_clouds: Annotated[bool, Parameter(negative="--no-keep-clouds")] = True,
+    scheduler: str | None = None,
+    scheduler_file: Path | None = None,
     shard: Shard = "0/1",
     changes: Changes = UNCHANGED,
     durable: Durable = False,
@@ -91,6 +70,18 @@ def build(
     damaged.
 
     Example: softreach atlas build a.zarr --vary taper_deg=0:3:9 --vary length_m=1,2
+
+    Args:
+        vary: A parameter of the grid: taper_deg=0:3:16, left.bundles=1,2, or
+            rings[0].material.young_modulus_pa=1e5,1e6. May be repeated.
+        design: Design that --vary changes: minimal_trunk if left out.
+        space: File of a design space (.toml), instead of --vary.
+        alpha: Radius of the α-shapes over the length of each design: 0.05L if left out.
+        metrics: Groups of metrics, comma-separated, if not all: extent, convex, concave, exact,
+            curvature, stability; or names of metrics of your own.
+        keep_clouds: Store the tips.
+        scheduler: Dask scheduler: tcp://host:port
+        scheduler_file: Dask scheduler file.
     """
     from softreach.atlas import build_atlas
     from softreach.atlas.metrics import METRIC_GROUPS
@@ -155,20 +146,23 @@ def _print_status(store: str, state: AtlasStatus, json: bool) -> None:
 @atlas.command
 def best(
     store: Store,
-    metric: Annotated[str, Parameter(help="A metric, as softreach list metrics names it.")],
+    metric: str,
     /,
     *,
-    smallest: Annotated[bool, Parameter(help="Prefer small values.")] = False,
-    where: Annotated[
-        list[str] | None,
-        Parameter(help="A constraint, unreachability<=0.4 or taper_deg>=1. May be repeated."),
-    ] = None,
-    count: Annotated[int, WHOLE, Parameter(help="Number of designs.")] = 1,
+    smallest: bool = False,
+    where: list[str] | None = None,
+    count: Whole = 1,
     json: AsJson = False,
 ) -> None:
     """Find the designs with the largest metric, under constraints.
 
     Example: softreach atlas best a.zarr exact_volume --where "taper_deg<=1"
+
+    Args:
+        metric: A metric, as softreach list metrics names it.
+        smallest: Prefer small values.
+        where: A constraint, unreachability<=0.4 or taper_deg>=1. May be repeated.
+        count: Number of designs.
     """
     from softreach.atlas import best_designs, open_atlas
 
@@ -187,10 +181,8 @@ def figures(
     store: Store,
     /,
     *,
-    panels: Annotated[
-        int, WHOLE, Parameter(help="Largest number of columns and rows of a sheet.")
-    ] = 7,
-    out: Annotated[Path, out_option("Folder for the figures.")] = Path("figures"),
+    panels: Whole = 7,
+    out: Annotated[Path, OUT] = Path("figures"),
     overwrite: Overwrite = False,
 ) -> None:
     """Draw the atlas: sheets, corners, maps, curvature.
@@ -198,6 +190,10 @@ def figures(
     Each figure is written as PNG and PDF.
 
     Example: softreach atlas figures atlas.zarr --out figures
+
+    Args:
+        panels: Largest number of columns and rows of a sheet.
+        out: Folder for the figures.
     """
     from softreach.atlas import open_atlas
     from softreach.paper.atlas_figures import atlas_figures

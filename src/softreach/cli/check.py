@@ -14,13 +14,13 @@ from softreach.cli.options import (
     OUTPUT,
     AsJson,
     Design,
+    Out,
     Overwrite,
     Unit,
     check_picture,
-    out_option,
     refuse,
 )
-from softreach.cli.values import NUMBER
+from softreach.cli.values import Number
 
 if TYPE_CHECKING:
     from softreach.requirements import Check, Finding
@@ -31,17 +31,13 @@ EXIT = {"met": 0, "missed": 1, "undecided": 3}
 
 def check(
     design: Design,
-    needs: Annotated[Path, Parameter(help="Requirements (.toml).")],
+    needs: Path,
     /,
     *,
-    accuracy: Annotated[
-        float, NUMBER, Parameter(help="Error of shares that are covered, and of volumes.")
-    ] = 1e-2,
+    accuracy: Number = 1e-2,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Draw the arm at the places (.png .pdf .svg).")] = None,
-    view: Annotated[
-        str | None, Parameter(group=OUTPUT, help="oblique (if left out), front, side or top.")
-    ] = None,
+    out: Out = None,
+    view: Annotated[str | None, Parameter(group=OUTPUT)] = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -54,6 +50,12 @@ def check(
     is 0 if all is met, 1 if something is missed, and 3 if something is undecided.
 
     Example: softreach check arm.toml needs.toml --out check.png
+
+    Args:
+        needs: Requirements (.toml).
+        accuracy: Error of shares that are covered, and of volumes.
+        out: Draw the arm at the places (.png .pdf .svg).
+        view: oblique (if left out), front, side or top.
     """
     from softreach.picture.projection import view_angles
     from softreach.requirements import Requirements

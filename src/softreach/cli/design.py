@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, Rows
-from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option, refuse
+from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output, refuse
 from softreach.cli.values import to_degrees
 from softreach.support.errors import InvalidInput, no_warnings
 
@@ -25,11 +22,9 @@ def design(
     design: Design | None = None,
     /,
     *,
-    schema: Annotated[
-        bool, Parameter(help="Print the JSON schema of design files for editors, nothing else.")
-    ] = False,
+    schema: bool = False,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Write the design to this TOML file.")] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -40,6 +35,10 @@ def design(
     with --out goes into the design file.
 
     Example: softreach design minimal_trunk --taper-deg 3
+
+    Args:
+        schema: Print the JSON schema of design files for editors, nothing else.
+        out: Write the design to this TOML file.
     """
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.rod.summary import describe

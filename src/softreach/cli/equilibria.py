@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
@@ -14,12 +11,12 @@ from softreach.cli.options import (
     Activation,
     AsJson,
     Design,
+    Out,
     Overwrite,
     Unit,
     activation_of,
     check_picture,
     is_page,
-    out_option,
     refuse,
     write_page,
 )
@@ -35,12 +32,9 @@ def equilibria(
     /,
     *,
     activation: Activation = None,
-    view: Annotated[
-        str | None,
-        Parameter(help="View of the picture: front, side, top or oblique (if left out)."),
-    ] = None,
+    view: str | None = None,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Draw them: .png .pdf .svg, or .html to turn")] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -50,6 +44,10 @@ def equilibria(
     Stable ones come first. The posture of the arm that hangs first is marked.
 
     Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
+
+    Args:
+        view: View of the picture: front, side, top or oblique (if left out).
+        out: Draw them: .png .pdf .svg, or .html to turn
     """
     from softreach.picture.projection import view_angles
     from softreach.rod import equilibria as all_of

@@ -38,7 +38,7 @@ _OTHER = "left out for ActiveFilaments.jl, whose lengths are in m"
 
 def export(
     source: Source,
-    out: Annotated[Path, Parameter(help="The file to write; its suffix chooses the format.")],
+    out: Path,
     /,
     *,
     activation: Activation = None,
@@ -54,6 +54,9 @@ def export(
     .glb .vtu .vtk), or the source of a filament of ActiveFilaments.jl (.jl).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
+
+    Args:
+        out: The file to write; its suffix chooses the format.
     """
     check_unit(unit)
     if format not in (None, "activefilaments"):

@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter
 from softreach.cli.changes import Changes, design_from, say_limits
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, check_unit
-from softreach.cli.values import WHOLE
+from softreach.cli.values import Whole
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 
 OUTPUT = Group("Output options", sort_key=3)
+
+OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
+"""The one name of the file or folder that a command writes."""
 
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
 _STORED = "left out for a stored cloud: give the design instead"
@@ -58,31 +61,24 @@ Durable = Annotated[
     bool,
     Parameter(group=OUTPUT, help="Wait until not even a power cut can lose what is written."),
 ]
-Overwrite = Annotated[
-    bool,
-    Parameter(group=OUTPUT, help="Overwrite existing output."),
-]
-
-
-def out_option(help: str) -> Parameter:
-    """`--out`, the one name of the file or folder that a command writes."""
-    return Parameter(name=("--out", "-o"), group=OUTPUT, help=help)
+Overwrite = Annotated[bool, Parameter(group=OUTPUT, help="Overwrite existing output.")]
+Out = Annotated[Path | None, OUT]
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """Options of the sampling of a cloud."""
+    """Options of the sampling of a cloud.
 
-    n: Annotated[
-        int | None,
-        WHOLE,
-        Parameter(name=("--n", "-n"), help="Number of samples: 400000 if left out."),
-    ] = None
-    seed: Annotated[int | None, WHOLE, Parameter(help="Seed of the sampler: 0 if left out.")] = None
-    sampler: Annotated[
-        str | None, Parameter(help="uniform (if left out), boundary, sobol or grid.")
-    ] = None
+    Attributes:
+        n: Number of samples: 400000 if left out.
+        seed: Seed of the sampler: 0 if left out.
+        sampler: uniform (if left out), boundary, sobol or grid.
+    """
+
+    n: Annotated[Whole | None, Parameter(name=("--n", "-n"))] = None
+    seed: Whole | None = None
+    sampler: str | None = None
 
     @property
     def count(self) -> int:

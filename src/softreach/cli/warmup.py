@@ -13,13 +13,7 @@ from softreach.cli.console import console
 
 def warmup(
     *,
-    loads: Annotated[
-        bool,
-        Parameter(
-            negative="--no-loads",
-            help="Also what arms under loads need, for half a minute more.",
-        ),
-    ] = True,
+    loads: Annotated[bool, Parameter(negative="--no-loads")] = True,
 ) -> int:
     """Compile all kernels now, so that no later command has to.
 
@@ -27,6 +21,9 @@ def warmup(
     Exits with 1 if they cannot be kept.
 
     Example: softreach warmup --no-loads
+
+    Args:
+        loads: Also what arms under loads need, for half a minute more.
     """
     from softreach.kernels.compiler import not_kept
     from softreach.support.errors import no_warnings
