@@ -21,7 +21,7 @@ from softreach.cli.options import (
     refuse,
 )
 from softreach.cli.values import Whole, as_read
-from softreach.support.errors import InvalidInput, MissingExtra
+from softreach.support.errors import InvalidInput, MissingExtra, SoftreachError
 from softreach.support.quantity import numbers_in
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def build(
 
     groups = tuple(METRIC_GROUPS) if metrics is None else tuple(metrics.split(","))
     if "concave" not in groups:
-        refuse("left out without the metrics concave", alpha=alpha)
+        refuse("without the metrics concave", alpha=alpha)
     build_atlas(
         _space_of(space, design, vary, changes),
         store,
@@ -210,7 +210,7 @@ def figures(
         pyplot().close(figure.get_figure(root=True))
 
 
-_NAMED_IN_FILE = "left out with --space, whose file names the design"
+_NAMED_IN_FILE = "with --space, whose file names the design"
 
 
 def _space_of(
@@ -221,10 +221,9 @@ def _space_of(
     from softreach.support.files.text import read_text
 
     if (path is None) == (vary is None):
-        raise InvalidInput("space", path, "given, or --vary, and not both")
+        raise SoftreachError("give either --vary or --space")
     if path is not None:
-        refuse(_NAMED_IN_FILE, design=design)
-        changes.refuse(_NAMED_IN_FILE)
+        refuse(_NAMED_IN_FILE, design=design, **changes.given)
         return parse_space(read_text("space", path, LONGEST), design_from)
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
@@ -240,7 +239,7 @@ def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
 
 def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:
     if scheduler is not None:
-        refuse("left out with --scheduler", scheduler_file=scheduler_file)
+        refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:
         return None
     try:

@@ -19,7 +19,7 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     from softreach.calibration import Calibration, Misses
 
-_COLUMNS = Group("Columns of the data, where their names do not tell", sort_key=1)
+_COLUMNS = Group("Column names", sort_key=1)
 
 
 def calibrate(
@@ -58,16 +58,16 @@ def calibrate(
             with units in their names, such as tension1_N and tip_x_mm.
         prior: What is known of a number beforehand, its width about the value of the design or
             MEAN:WIDTH: taper=1deg, rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
-        hold_out: Share of the samples, by chance, that the fit does not see.
+        hold_out: Fraction of samples held out at random.
         noise: Standard deviation of a measured coordinate, against which priors are weighed: 0.2mm.
             That of the residuals if left out.
-        robust: Let samples far off count less.
+        robust: Down-weight outliers.
         rivals: Fit constant curvature and a quadratic law beside it.
-        seed: Seed of the samples held out.
+        seed: Seed of the held-out samples.
         inputs: Column of an input: "tendon 1=tension1_N". May be repeated.
         markers: Start of the columns of a marker: tip=disk3. May be repeated.
-        run: Column that says which samples belong together, as run does.
-        order: Column in whose order samples were taken, as time_s does.
+        run: Column that groups samples into runs, if not run.
+        order: Column to sort by, if not time_s.
         out: Write the calibrated design to this TOML file.
         report: Write a report with pictures to this .html file.
         table: Write what was predicted and missed to this .csv file.
@@ -82,7 +82,7 @@ def calibrate(
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     if out is None and report is None and table is None:
-        refuse("left out where no file is written: give --out too", overwrite=overwrite)
+        refuse("without --out, --report or --table", overwrite=overwrite)
     for path, formats in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)):
         if path is not None:
             check_output(path, formats, overwrite)

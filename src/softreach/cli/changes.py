@@ -92,11 +92,6 @@ class Changes:
             raise InvalidInput("base", self.base, f"one of {', '.join([*_POSTURES, *POINTS])}")
         return arm.replace(base=arm.base.replace(points=points))
 
-    def refuse(self, why: str) -> None:
-        """Refuse whatever was given, where there is no design to change."""
-        for name, value in self.given.items():
-            raise InvalidInput(name, value, why)
-
     def _angles(self) -> dict[str, float]:
         from softreach.arm.written import from_written
 

@@ -53,7 +53,7 @@ def check(
 
     Args:
         needs: Requirements (.toml).
-        accuracy: Error of shares that are covered, and of volumes.
+        accuracy: Accuracy of coverages and volumes.
         out: Draw the arm at the places (.png .pdf .svg).
         view: oblique (if left out), front, side or top.
     """
@@ -67,7 +67,7 @@ def check(
     if view is not None:
         view_angles(view)
     if out is None:
-        refuse("left out without a picture: give --out check.png too", view=view)
+        refuse("without --out check.png", view=view)
     check_picture(out, overwrite)
     requirements = Requirements.load(needs, length=arm.length)
     shown = arm.replace(display_unit=lengths.unit.name)

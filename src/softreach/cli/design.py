@@ -10,7 +10,7 @@ from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output, refuse
 from softreach.cli.values import to_degrees
-from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -44,15 +44,14 @@ def design(
     from softreach.rod.summary import describe
 
     if schema:
-        changes.refuse("left out with --schema")
-        given = {"design": design, "out": out, "overwrite": overwrite, "unit": unit}
-        refuse("left out with --schema", **given)
+        given = {"out": out, "overwrite": overwrite, "unit": unit}
+        refuse("with --schema", **given, **changes.given)
         from softreach.arm.design_file.schema import json_schema
 
         console.json(json_schema(), indent=2)
         return
     if design is None:
-        raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
+        raise SoftreachError("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
         arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)

@@ -53,7 +53,7 @@ def equilibria(
     from softreach.rod import equilibria as all_of
 
     if out is None:
-        refuse("left out without a picture: give --out too", view=view)
+        refuse("without --out", view=view)
     elif view is not None:
         view_angles(view)  # what is wrong with it is said before anything is computed
     check_picture(out, overwrite, page=True)

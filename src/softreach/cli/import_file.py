@@ -37,7 +37,7 @@ def import_file(
         tol: Largest error of the tips that a cloud is compared with, in L (1e-6).
     """
     if source.suffix == ".json":
-        refuse("left out for a filament: it is of clouds", design=design, tol=tol)
+        refuse("on a filament, only on a cloud", design=design, tol=tol)
         _design(source, out, overwrite, unit, json)
     elif source.suffix == ".csv":
         _cloud(source, out, design, 1e-6 if tol is None else tol, overwrite, unit, json)

@@ -45,8 +45,8 @@ def plan_poses(
 
     Args:
         n: Number of poses.
-        noise: Standard deviation of a measured coordinate and of what the model lacks.
-        markers: Markers that are going to be seen, comma-separated: all if left out.
+        noise: Standard deviation of a measured coordinate, with model error.
+        markers: Markers that will be measured, comma-separated: all if left out.
         candidates: Number of poses to choose from.
         seed: Seed of candidates and of their order.
         out: Write the poses as a CSV file to fill in.

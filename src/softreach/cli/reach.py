@@ -65,7 +65,7 @@ def reach(
     outs = sorted(out or [], key=_is_picture)  # pictures come last
     _check_outputs(arm, outs, overwrite)
     if not any(map(_is_picture, outs)):
-        refuse("left out without a picture: give --out slices.png too", at=at)
+        refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)

@@ -19,7 +19,7 @@ from softreach.cli.values import Number, Whole, as_read, pairs_in
 if TYPE_CHECKING:
     from softreach.optimization import Candidate, Search
 
-_ASKED = Group("In place of what the file says", sort_key=1)
+_ASKED = Group("Override the file", sort_key=1)
 
 
 def search(
@@ -52,7 +52,7 @@ def search(
 
     Args:
         needs: Requirements (.toml), with a table [search].
-        design: Design to vary: a file (.toml) or a built-in design. Repeated, one is chosen.
+        design: Design to vary: a file (.toml) or a built-in design. Repeat to let the search choose.
         free: A free parameter, its range with units or a tie: taper_deg=0:3.2,
             left.revolution=-1rad:1rad, right.revolution=-left.revolution. May be repeated.
         choice: Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.
@@ -63,8 +63,8 @@ def search(
         accuracy: Relative error of volumes: 3e-3 if left out everywhere.
         sampler: auto, cma, tpe, nsga2, nsga3, sobol or random.
         polish: Improve designs by their derivatives.
-        storage: File in which every design is kept, a journal or SQLite (.db), by which a search
-            goes on; searches of other seeds may share it. FOLDER/search.journal if left out.
+        storage: Journal or SQLite file (.db) of all designs, to resume a search or to share it
+            with other seeds. FOLDER/search.journal if left out.
         out: Folder for the designs, tables and report.
     """
     from softreach import optimization

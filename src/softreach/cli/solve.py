@@ -10,7 +10,7 @@ from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
 from softreach.cli.options import AsJson, Design, Unit, points_in, refuse
 from softreach.cli.values import Whole, activation_text
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -48,12 +48,11 @@ def solve(
     from softreach.inverse.request import length_in, position_in
 
     if (target is None) == (targets is None):
-        raise InvalidInput("target", target, "given, or --targets, and not both")
+        raise SoftreachError("give either --target or --targets")
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
-        why = "left out for a design with three free bundles or fewer: all solutions are found"
-        refuse(why, family=family)
+        refuse("on up to three free bundles, where all solutions are found", family=family)
     if targets is None:
         points = [position_in("target", target or "", arm.length)]
     else:

@@ -47,19 +47,18 @@ def studio(
         source: Design or its file (.toml), saved state (.json) or cloud (.zarr).
         host: Address to listen on; beyond this machine the page asks for a token.
         port: A free port by default.
-        fresh: Begin with the design itself, not where the last work on it ended.
+        fresh: Ignore saved work.
         open_page: Open the page in the browser.
         token: Ask pages for a secret; by default where other machines can connect.
-        static: Write a page with sliders into this folder, which needs no studio, and end.
+        static: Write a page with sliders into this folder, and exit.
         vary: A slider of that page: taper_deg=0:3:8. May be repeated.
     """
     if static is not None:
         local = {"host": None if host == _HERE else host, "port": port}
-        refuse("left out with --static, which serves nothing", **local, fresh=fresh, token=token)
+        refuse("with --static, which serves nothing", **local, fresh=fresh, token=token)
         _write_static(source, static, vary, unit, overwrite=overwrite)
         return
-    without = "left out without --static and its folder"
-    refuse(without, vary=vary, unit=unit, overwrite=overwrite)
+    refuse("without --static", vary=vary, unit=unit, overwrite=overwrite)
     import threading
     import warnings
     import webbrowser
@@ -121,7 +120,7 @@ def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
 
     as_it_is = source.lower().endswith(".json") or start.reach is not None
     if as_it_is:
-        refuse("left out for a state or a cloud, which is always shown as it is", fresh=fresh)
+        refuse("on a state or a cloud, which is always shown as it is", fresh=fresh)
     return work_on(start.state.design, goes_on=not fresh and not as_it_is)
 
 
