@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -21,7 +20,6 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach import schema
 from softreach.atlas import DamagedStore, atlas_cloud, build_atlas, open_atlas, verify_atlas
-from softreach.atlas.command import Command
 from softreach.atlas.layout import PER_DESIGN
 from softreach.cli.app import run
 from softreach.support.errors import SoftreachError, SoftreachWarning
@@ -351,13 +349,3 @@ CHANGES: dict[str, Callable[[xr.Dataset], object]] = {
 def test_no_cloud_that_cannot_be_opened_is_saved(cloud, tmp_path, change):
     raised_by(lambda: sr.save_cloud(change(cloud), tmp_path / "cloud.zarr"))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_command_with_other_settings_is_refused(atlas_files):
-    settings = json.loads(json.loads(atlas_files["zarr.json"])["attributes"]["command"])
-    other = {"n": 2.5, "seed": "zero", "sampler": "none", "tol": "small", "keep_clouds": "yes"}
-    other |= {"metrics": [{}], "space": {"design": 7}, "stations": 7, "quantiles": 7}
-    changed = [settings | {name: value} for name, value in (other | {"atlas_version": 1}).items()]
-    lacking = [{key: settings[key] for key in settings if key != name} for name in other]
-    for text in ("{", "[]", "{}", "7", *map(json.dumps, changed + lacking)):
-        raised_by(lambda text=text: Command.from_json(text))

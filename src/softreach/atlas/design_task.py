@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import socket
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -35,17 +35,15 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
     """
     try:
         arm = store.command.design(index)
-        intermediates = Intermediates(arm, store.cube, store.command, metrics)
-        if not intermediates.stable.any():  # found now, by all threads
-            return partial(_put_unstable, store, metrics, index, intermediates)
+        found = Intermediates(arm, store.cube, store.command, metrics)
         threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
-        values = _values(threaded, intermediates, store.command.profile_sizes)
-        intermediates.forget(Need.REACHABLE_SET)
+        values = _values(store, threaded, found)  # none but NaN where nothing is stable
+        found.forget(Need.REACHABLE_SET)
     except StoreFailed:
         raise
     except Exception as error:
         return partial(_fail, store, index, error)
-    return partial(_finish, store, metrics, index, intermediates, values)
+    return partial(_finish, store, metrics, index, found, values)
 
 
 class Remote:
@@ -57,11 +55,8 @@ class Remote:
     """
 
     def __init__(self, store: AtlasStore) -> None:
-        self.command, self._location, self._durable = (
-            store.command,
-            store.location,
-            store.opened.durable,
-        )
+        self.command, self._location = store.command, store.location
+        self._durable = store.opened.durable
         self._store: AtlasStore | None = store
         self._token, self._origin = secrets.token_hex(8), (socket.gethostname(), os.getpid())
 
@@ -69,7 +64,7 @@ class Remote:
         return self.__dict__ | {"_store": None}
 
     def store(self) -> AtlasStore:
-        """The store, opened once per process; one thread is used there, unless told otherwise."""
+        """The store, opened once per process, which uses one thread by default."""
         from zarr.storage import MemoryStore
 
         if self._store is not None:
@@ -96,45 +91,33 @@ def run_remotely(remote: Remote, index: int) -> Outcome:
 
 @no_warnings()
 def _finish(
-    store: AtlasStore,
-    metrics: Sequence[Metric],
-    index: int,
-    intermediates: Intermediates,
-    values: Values,
+    store: AtlasStore, metrics: Sequence[Metric], index: int, found: Intermediates, values: Values
 ) -> Outcome:
     try:
         rest = [metric for metric in metrics if metric.name not in values]
-        values |= _values(rest, intermediates, store.command.profile_sizes)
-        result = Result(values, _kept_tips(store, intermediates))
+        values |= _values(store, rest, found)
+        tips = found.tips if store.command.keep_clouds else None
     except Exception as error:
         return _fail(store, index, error)
-    store.write(index, result)
+    if found.stable.any():
+        store.write(index, Result(values, tips))
+    else:
+        message = no_equilibrium_message(len(found.stable))
+        store.write(index, Result(values, tips), UNSTABLE, message)
     return index, ""
 
 
-def _put_unstable(
-    store: AtlasStore, metrics: Sequence[Metric], index: int, intermediates: Intermediates
-) -> Outcome:
-    """Store a design of which no sample is stable: it has no other metric than that."""
+def _values(store: AtlasStore, metrics: Sequence[Metric], found: Intermediates) -> Values:
+    """Metrics by name; where no sample is stable there is none but the share that is lost."""
     sizes = store.command.profile_sizes
-    values = {
-        metric.name: np.full([sizes[dim] for dim in metric.over], np.nan) for metric in metrics
+    if found.stable.any():
+        return {metric.name: metric.value(found, sizes) for metric in metrics}
+    return {
+        metric.name: metric.value(found, sizes)
+        if metric.needs == (Need.LOST_SHARE,)
+        else np.full([sizes[dim] for dim in metric.over], np.nan)
+        for metric in metrics
     }
-    known = [metric for metric in metrics if metric.needs == (Need.LOST_SHARE,)]
-    values |= {metric.name: metric.value(intermediates, sizes) for metric in known}
-    result = Result(values, _kept_tips(store, intermediates))
-    store.write(index, result, UNSTABLE, no_equilibrium_message(len(intermediates.stable)))
-    return index, ""
-
-
-def _values(
-    metrics: Sequence[Metric], intermediates: Intermediates, sizes: Mapping[str, int]
-) -> Values:
-    return {metric.name: metric.value(intermediates, sizes) for metric in metrics}
-
-
-def _kept_tips(store: AtlasStore, intermediates: Intermediates) -> Array | None:
-    return intermediates.tips if store.command.keep_clouds else None
 
 
 def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:

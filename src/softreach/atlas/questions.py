@@ -26,6 +26,7 @@ from softreach.support.arguments import (
     as_text,
 )
 from softreach.support.errors import InvalidInput, did_you_mean
+from softreach.support.quantity import columns
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 
 _QUICK = 3e8  # bytes of tips
+_MOST_MESSAGES = 10
 Interval = tuple[float | None, float | None]
 
 
@@ -55,6 +57,14 @@ class AtlasStatus:
     """True if stored tips were read too, or there are none."""
     messages: dict[int, str]
     """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
+
+    def __str__(self) -> str:
+        counts = ("designs", "done", "todo", "failed", "gaps", "unstable", "damaged")
+        rows = [(name, f"{getattr(self, name):,}") for name in counts]
+        verified = "yes" if self.tips_verified else "no: softreach atlas verify"
+        rows.append(("tips verified", verified))
+        rows += [(f"number {k}", text) for k, text in self.messages.items()][:_MOST_MESSAGES]
+        return "\n".join(columns(rows))
 
 
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:

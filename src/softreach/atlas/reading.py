@@ -242,9 +242,8 @@ def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
 def _coordinates(store: AtlasStore, raw: xr.Dataset) -> dict[str, Any]:
     space = store.command.space
     numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
-    coordinates: dict[str, Any] = {
+    return {
         "length": ((), space.base.length, {"units": "m"}),
         **{name: raw[name] for name in space.names},
         "number": (space.dims, numbers, {"long_name": "number of the design"}),
     }
-    return coordinates

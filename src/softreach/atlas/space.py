@@ -17,7 +17,7 @@ from softreach.arm.tables import check_extension
 from softreach.atlas.arguments import column
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput, counted
 from softreach.support.progress import Progress, silent
 
 __all__ = ["DesignSpace"]
@@ -109,6 +109,13 @@ class DesignSpace:
             points[:, counts] = np.rint(points[:, counts])
         columns = zip(ranges, points.T.tolist(), strict=True)
         return cls(base=base, parameters=_plain(dict(columns)), layout="list")
+
+    def __str__(self) -> str:
+        lines = [f"{self.layout} of {counted(self.size, 'design')}"]
+        for (name, values), parameter in zip(self.parameters, self.varied().values(), strict=True):
+            ends = f"{min(values):.6g} to {max(values):.6g} {parameter.unit}".removesuffix(" 1")
+            lines.append(f"  {name}: {counted(len(values), 'value')} from {ends}")
+        return "\n".join(lines)
 
     @property
     def names(self) -> tuple[str, ...]:

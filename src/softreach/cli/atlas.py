@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -132,15 +133,10 @@ def verify(store: Store, /, *, json: AsJson = False) -> None:
 
 
 def _print_status(store: str, state: AtlasStatus, json: bool) -> None:
-    counts = ("designs", "done", "todo", "failed", "gaps", "unstable", "damaged")
-    rows: Rows = {name: (getattr(state, name), "") for name in counts}
-    rows["tips verified"] = ("yes" if state.tips_verified else "no: softreach atlas verify", "")
     if json:
-        rows["tips verified"] = (state.tips_verified, "")
-        rows["messages"] = ({str(k): text for k, text in state.messages.items()}, "")
+        console.json(asdict(state))
     else:
-        rows |= {f"number {k}": (text, "") for k, text in list(state.messages.items())[:10]}
-    console.rows(f"atlas {store}", rows, json)
+        console.block(f"atlas {store}", state)
 
 
 @atlas.command

@@ -58,6 +58,10 @@ class Console:
         """A result in words."""
         sys.stdout.write(f"{_printable(text)}\n")
 
+    def block(self, title: str, result: object) -> None:
+        """A result that prints itself, below its title."""
+        self.line("\n  ".join([title, *str(result).splitlines()]))
+
     def json(self, value: Any, indent: int | None = None) -> None:
         """A result for machines; null where there is no number."""
         self.line(json.dumps(finite(value), indent=indent, allow_nan=False))

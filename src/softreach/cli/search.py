@@ -52,7 +52,7 @@ def search(
 
     Args:
         needs: Requirements (.toml), with a table [search].
-        design: Design to vary: a file (.toml) or a built-in design. Repeat to let the search choose.
+        design: Design file (.toml) or built-in design. Repeat to let the search choose.
         free: A free parameter, its range with units or a tie: taper_deg=0:3.2,
             left.revolution=-1rad:1rad, right.revolution=-left.revolution. May be repeated.
         choice: Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.
