@@ -116,17 +116,6 @@ def test_help_is_whole_on_terminals_of_every_width(arguments, width, streams, mo
     assert "softreachdemo--outout" in letters or "--sampler" in letters
 
 
-@pytest.mark.parametrize("variable", ["NO_COLOR", "FORCE_COLOR", "TERM", "LINES"])
-def test_colors_and_terminals_that_are_asked_for_change_no_word(variable, streams, monkeypatch):
-    out, _ = streams("ascii")
-    assert run(["design", "nowhere.toml"]) == 2
-    monkeypatch.setenv(variable, "dumb")
-    again, err = streams("ascii")
-    assert run(["design", "nowhere.toml"]) == 2
-    assert printed(again) == printed(out)
-    assert "\x1b" not in printed(err)
-
-
 def test_a_backend_that_does_not_exist_is_named():
     script = "from softreach.plot.style import pyplot; pyplot()"
     environment = os.environ | {"MPLBACKEND": "nonsense"}

@@ -173,14 +173,6 @@ def test_an_atlas_elsewhere_is_built_resumed_and_asked_as_one_on_disk(elsewhere,
         build_atlas(small_space(), elsewhere, **SMALL | {"n": 3_000})
 
 
-def test_a_url_that_holds_other_things_is_left_alone():
-    memory = pytest.importorskip("fsspec").filesystem("memory")
-    memory.pipe("/other/thesis.tex", b"precious")
-    with pytest.raises(InvalidInput, match="a new folder, or an atlas"):
-        build_atlas(small_space(), "memory://other", **SMALL)
-    assert memory.find("/other") == ["/other/thesis.tex"]
-
-
 def test_what_cannot_be_reached_is_said_in_one_line(tmp_path):
     pytest.importorskip("fsspec")
     (tmp_path / "file").touch()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
@@ -117,20 +119,25 @@ def _rows_of_matter(facts: DesignSummary) -> Rows:
 
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
+    """Bounds and effects of each activation; neighbors that are equal share a line."""
+    texts = [
+        f"{_span(arm.bounds[k])}{_suffix(unit)}: length {_span(100.0 * facts.bundle_strain[k])} %, "
+        f"ζ {_span(facts.bundle_extension[k])}, |κ| R2 {_span(facts.bundle_bending[k])}"
+        for k, unit in enumerate(arm.bundle_units)
+    ]
     rows: Rows = {}
-    for k, name in enumerate(arm.bundle_names):
-        unit = "" if arm.bundle_units[k] == "1" else f" {arm.bundle_units[k]}"
-        effects = (
-            f"length {_span(100.0 * facts.bundle_strain[k])} %",
-            f"ζ {_span(facts.bundle_extension[k])}",
-            f"|κ| R2 {_span(facts.bundle_bending[k])}",
-        )
-        rows[f"activation {name}"] = (f"{_span(arm.bounds[k])}{unit}: {', '.join(effects)}", "")
+    for text, group in groupby(zip(texts, arm.bundle_names, strict=True), itemgetter(0)):
+        first, *others = [name for _, name in group]
+        label = f"{first} to {others[-1]}" if len(others) > 1 else ", ".join([first, *others])
+        rows[f"activation {label}"] = (text, "")
     for drive in arm.drives:
-        unit = "" if drive.unit == "1" else f" {drive.unit}"
         gains = ", ".join(f"{gain:+g} {name}" for name, gain in drive.gains.items())
-        rows[f"drive {drive.name}"] = (f"{_span(drive.bounds)}{unit}: {gains}", "")
+        rows[f"drive {drive.name}"] = (f"{_span(drive.bounds)}{_suffix(drive.unit)}: {gains}", "")
     return rows
+
+
+def _suffix(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
 
 
 def _span(ends: Any) -> str:
