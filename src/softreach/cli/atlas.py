@@ -21,7 +21,7 @@ from softreach.cli.options import (
     check_picture,
     refuse,
 )
-from softreach.cli.values import Whole, as_read
+from softreach.cli.values import Whole, as_read, pairs_in
 from softreach.support.errors import InvalidInput, MissingExtra, SoftreachError
 from softreach.support.quantity import numbers_in
 
@@ -229,8 +229,8 @@ def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter
 
-    pairs = (text.rpartition("=") if "=" in text else (text, "", "") for text in vary)
-    return DesignSpace.grid(base, **dict(parse_parameter(base, key, x) for key, _, x in pairs))
+    pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8") or {}
+    return DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))
 
 
 def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:

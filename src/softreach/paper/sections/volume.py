@@ -30,8 +30,9 @@ def volume(settings: Settings, notes: Notebook) -> None:
         volumes={str(n): volume_curve(t, np.array(_RADII)).tolist() for n, t in clouds.items()},
     )
     curves = {f"{n:,} tips": volume_curve(tips, _CURVE) for n, tips in clouds.items()}
-    lines = {"exact": reached.volume, "convex": reached.convex_volume}
-    ax = plot_volume_curve(curves, _CURVE, length=arm.length, **lines)
+    ax = plot_volume_curve(
+        curves, _CURVE, length=arm.length, exact=reached.volume, convex=reached.convex_volume
+    )
     words = (
         "Volume of the α-shape of the paper's design against its radius, which the paper does not "
         "state, beside the exact volume of the reachable set and of its convex hull."
