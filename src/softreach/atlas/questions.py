@@ -13,7 +13,7 @@ from softreach.arm.written import from_written, written_name
 from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN
-from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
+from softreach.atlas.reading import EXPLAINED, command_of, contents, opened_atlas
 from softreach.atlas.store import DAMAGED, DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE, AtlasStore
 from softreach.rod.rods import tip_map
 from softreach.schema import cloud_dataset, with_status
@@ -85,9 +85,9 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     if isinstance(atlas, xr.Dataset):
         opened = opened_atlas(atlas)
         status = opened["status"].values.ravel()
-        told = np.isin(status, (*TOLD, DAMAGED))
-        numbers = opened["number"].values.ravel()[told].tolist()
-        texts = opened["message"].values.ravel()[told].tolist() if told.any() else []
+        explained = np.isin(status, (*EXPLAINED, DAMAGED))
+        numbers = opened["number"].values.ravel()[explained].tolist()
+        texts = opened["message"].values.ravel()[explained].tolist() if explained.any() else []
         return _counted(status, dict(zip(numbers, map(str, texts), strict=True)), False)
     store = AtlasStore.open(an_atlas("atlas", atlas), "r")
     command = store.command

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     AtlasLike = StoreLike | xr.Dataset
 
 
-TOLD = (FAILED, GAP, UNSTABLE)
+EXPLAINED = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
 
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
@@ -79,7 +79,7 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
             reader.read("tip", store.command.space.place(index))
     texts = {
         index: str(reader.read("message", store.command.space.place(index)).item())
-        for index in np.flatnonzero(np.isin(status, TOLD)).tolist()
+        for index in np.flatnonzero(np.isin(status, EXPLAINED)).tolist()
     }
     status[[*reader.damaged]] = DAMAGED
     messages = dict(sorted((texts | reader.damaged).items()))
@@ -174,12 +174,12 @@ class _Reader:
 
 
 def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
+    known, explained = np.isin(status, KNOWN), np.isin(status, EXPLAINED)
 
     def required(chunk: Chunk) -> bool:
         if chunk.array not in PER_DESIGN:
             return True
-        of_designs = told if chunk.array == "message" else known
+        of_designs = explained if chunk.array == "message" else known
         return chunk.array != "status" and bool(of_designs[store.number(chunk)])
 
     return required

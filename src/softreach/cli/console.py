@@ -119,7 +119,7 @@ class Console:
 
     def error(self, text: str) -> None:
         """A line on standard error."""
-        with suppress(OSError, ValueError):  # nobody reads it
+        with suppress(OSError, ValueError):  # it was closed
             sys.stderr.write(f"{_printable(text)}\n")
 
     @contextmanager

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.inverse import Solution
 
-_EXACT = 1e-6  # of L: a nearer tip is at its target, as far as tips are known
+_EXACT = 1e-6  # of L, the error of tips
 
 
 def solve(

@@ -114,7 +114,7 @@ def plot_compliance(
 ) -> Axes:
     """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
 
-    They are to scale, as far as the tip yields in proportion to the force.
+    They are to scale where the tip yields in proportion to the force.
 
     Args:
         arm: The design.
