@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import (
-    OUTPUT,
-    AsJson,
-    Design,
-    Out,
-    Overwrite,
-    Unit,
-    check_picture,
-    refuse,
-)
+from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, View, check_picture
 from softreach.cli.values import Number
 
 if TYPE_CHECKING:
@@ -37,7 +26,7 @@ def check(
     accuracy: Number = 1e-2,
     changes: Changes = UNCHANGED,
     out: Out = None,
-    view: Annotated[str | None, Parameter(group=OUTPUT)] = None,
+    view: View = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -55,20 +44,14 @@ def check(
         needs: Requirements (.toml).
         accuracy: Accuracy of coverages and volumes.
         out: Draw the arm at the places (.png .pdf .svg).
-        view: oblique (if left out), front, side or top.
     """
-    from softreach.picture.projection import view_angles
     from softreach.requirements import Requirements
     from softreach.requirements import check as checked
     from softreach.support import progress
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
-    if view is not None:
-        view_angles(view)
-    if out is None:
-        refuse("without --out check.png", view=view)
-    check_picture(out, overwrite)
+    check_picture(out, overwrite, view=view)
     requirements = Requirements.load(needs, length=arm.length)
     shown = arm.replace(display_unit=lengths.unit.name)
     with progress.bar("checking", None) as step:

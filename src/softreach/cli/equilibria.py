@@ -14,10 +14,10 @@ from softreach.cli.options import (
     Out,
     Overwrite,
     Unit,
+    View,
     activation_of,
     check_picture,
     is_page,
-    refuse,
     write_page,
 )
 from softreach.cli.values import activation_text
@@ -32,7 +32,7 @@ def equilibria(
     /,
     *,
     activation: Activation = None,
-    view: str | None = None,
+    view: View = None,
     changes: Changes = UNCHANGED,
     out: Out = None,
     overwrite: Overwrite = False,
@@ -46,17 +46,11 @@ def equilibria(
     Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
 
     Args:
-        view: View of the picture: front, side, top or oblique (if left out).
         out: Draw them: .png .pdf .svg, or .html to turn
     """
-    from softreach.picture.projection import view_angles
     from softreach.rod import equilibria as all_of
 
-    if out is None:
-        refuse("without --out", view=view)
-    elif view is not None:
-        view_angles(view)  # what is wrong with it is said before anything is computed
-    check_picture(out, overwrite, page=True)
+    check_picture(out, overwrite, view=view, page=True)
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     result = all_of(arm, activation_of(activation, arm))

@@ -63,6 +63,10 @@ Durable = Annotated[
 ]
 Overwrite = Annotated[bool, Parameter(group=OUTPUT, help="Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
+View = Annotated[
+    str | None,
+    Parameter(group=OUTPUT, help="View of the picture: oblique (if left out), front, side, top."),
+]
 
 
 @Parameter(name="*")
@@ -204,10 +208,17 @@ def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")
 
 
-def check_picture(path: Path | None, overwrite: bool, *, page: bool = False) -> None:
-    """Refuse a place for a picture, or for a page that turns, as `check_output`."""
+def check_picture(
+    path: Path | None, overwrite: bool, *, view: str | None = None, page: bool = False
+) -> None:
+    """Refuse a view, and a place for a picture or for a page that turns, as `check_output`."""
+    from softreach.picture.projection import view_angles
     from softreach.support.files.formats import PAGES, PICTURES
 
+    if path is None:
+        refuse("without --out", view=view)
+    elif view is not None:
+        view_angles(view)
     check_output(path, {**PICTURES, **PAGES} if page else PICTURES, overwrite)
 
 
