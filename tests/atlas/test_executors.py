@@ -96,7 +96,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
 
 
 DEADLY = """
-    right = design_task.Intermediates
+    right = executor.Intermediates
 
     def deadly(arm, *rest):
         guilty = arm.profile.taper > 0.05 and abs(describe(arm).revolutions[0]) < 1e-9
@@ -106,7 +106,7 @@ DEADLY = """
             die()
         return right(arm, *rest)
 
-    design_task.Intermediates = deadly
+    executor.Intermediates = deadly
 """
 
 

@@ -22,7 +22,7 @@ from softreach.atlas import (
     open_atlas,
     over_length,
 )
-from softreach.atlas.design_task import begin_design
+from softreach.atlas.executor import begin_design
 from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command

@@ -12,7 +12,7 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.free_numbers import Free, free_names, priors
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import OUTPUT, AsJson, Design, Out, Overwrite, Unit, check_output, refuse
+from softreach.cli.options import OUTPUT, AsJson, Design, Out, Overwrite, Unit, check_output
 from softreach.cli.values import Number, Whole, as_read, pairs_in
 from softreach.support.errors import InvalidInput
 
@@ -81,11 +81,9 @@ def calibrate(
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
-    if out is None and report is None and table is None:
-        refuse("without --out, --report or --table", overwrite=overwrite)
-    for path, formats in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)):
-        if path is not None:
-            check_output(path, formats, overwrite)
+    outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
+    for path, formats in outputs or [(None, {})]:
+        check_output(path, formats, overwrite)
     with progress.bar("fitting", None) as step:
         result = calibration.calibrate(
             arm,

@@ -67,11 +67,9 @@ def search(
             with other seeds. FOLDER/search.journal if left out.
         out: Folder for the designs, tables and report.
     """
-    from softreach import optimization
     from softreach.optimization.folder import check_folder
     from softreach.optimization.search_file import read_search
     from softreach.requirements.requirements import LONGEST
-    from softreach.support import progress
     from softreach.support.files.text import read_text
 
     options = {"designs": designs, "seed": seed, "accuracy": accuracy, "sampler": sampler}
@@ -94,10 +92,23 @@ def search(
     if storage is None:
         out.mkdir(parents=True, exist_ok=True)
         storage = out / "search.journal"
+    result = _searched(asked, storage)
+    if json:
+        console.json(_record(result, out))
+    else:
+        console.line(result.report(lengths.unit.name))
+    result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
+    return EXIT[result.verdict]
+
+
+def _searched(asked: Any, storage: Path) -> Search:
+    from softreach import optimization
+    from softreach.support import progress
+
     watch = _Watch(asked.options)
     with progress.bar(watch.label, watch.total) as step:
-        result = optimization.search(
-            base,
+        return optimization.search(
+            asked.base,
             asked.free,
             asked.requirements,
             choices=asked.choices,
@@ -106,12 +117,6 @@ def search(
             progress=step,
             **asked.options,
         )
-    if json:
-        console.json(_record(result, out))
-    else:
-        console.line(result.report(lengths.unit.name))
-    result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
-    return EXIT[result.verdict]
 
 
 class _Watch:
