@@ -34,7 +34,6 @@ from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import SMALL, assert_same, command, similar_designs, small_space
 from tests.bodies import rubber
 from tests.cable import Cable
-from tests.laws import of_length
 
 
 def test_volume_grows_with_revolution_for_every_taper(paper):
@@ -73,11 +72,6 @@ def test_metrics_agree_with_those_of_the_cloud_alone(paper):
     )
 
 
-def test_sparse_clouds_are_warned_of(tmp_path):
-    with pytest.warns(SoftreachWarning, match="below three mean spacings of the points of 4"):
-        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"alpha_over_length": 0.05})
-
-
 # Laws of scale
 
 
@@ -109,15 +103,6 @@ def test_metrics_over_length_are_those_of_the_design_at_one_meter(tmp_path):
         np.testing.assert_allclose(
             relative.isel(length=1), atlas[metric].isel(length=1) / 2.0**power
         )
-
-
-def test_the_alpha_radius_follows_each_design(tmp_path):
-    space = DesignSpace.grid(sr.designs.minimal_trunk(), length=[0.5, 1.5])
-    atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
-    for length in (0.5, 1.5):
-        tip = sr.compute_cloud(of_length(space.base, length), n=2_000).tip
-        found = atlas.volume.sel(length=length)
-        np.testing.assert_allclose(found, sr.concave_hull(tip, 0.5 * length).volume, rtol=1e-12)
 
 
 def test_sparse_clouds_are_counted_by_the_length_of_each_design(tmp_path):
