@@ -15,6 +15,7 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.cli.app import app, run
+from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.rod.summary import describe
 
@@ -392,10 +393,10 @@ def test_a_verbose_command_says_where_an_error_comes_from(capsys):
 NUMBERS = ("rings[0].material.young_modulus=1MPa", "rings[0].material.density=1000kg/m3")
 
 
-def saved(folder, *arguments):
-    """The design that `softreach design ... --out` writes."""
-    assert run(["design", *arguments, "--out", "a.toml", "--overwrite"]) == 0
-    return sr.Manipulator.load("a.toml")
+def asked_for(*arguments):
+    """The design that a command with these options works on."""
+    _, bound, *_ = app.parse_args(["design", *arguments], exit_on_error=False, print_error=False)
+    return design_from(*bound.args, **bound.kwargs)
 
 
 @pytest.mark.parametrize(
@@ -418,15 +419,15 @@ def saved(folder, *arguments):
 )
 def test_loads_are_those_of_the_library(options, loads, folder):
     expected = sr.designs.lce_arm().replace(loads=sr.Loads(**loads))
-    assert saved(folder, "lce_arm", *options) == expected
+    assert asked_for("lce_arm", *options) == expected
 
 
 def test_options_change_the_loads_that_a_design_has(folder):
     loads = sr.Loads(gravity=(0, 0, 9.81), payload=0.001)
     sr.designs.lce_arm().replace(loads=loads).save("loaded.toml")
-    made = saved(folder, "loaded.toml", "--payload", "3g")
+    made = asked_for("loaded.toml", "--payload", "3g")
     assert made.loads == loads.replace(payload=0.003)
-    bare = saved(folder, "loaded.toml", "--payload", "0g", "--gravity", "none")
+    bare = asked_for("loaded.toml", "--payload", "0g", "--gravity", "none")
     assert bare == sr.designs.lce_arm()
 
 
@@ -446,12 +447,12 @@ def test_options_change_the_loads_that_a_design_has(folder):
     ],
 )
 def test_settings_are_parameters_of_the_library(options, values, folder):
-    assert saved(folder, "minimal_trunk", *options) == changed(sr.designs.minimal_trunk(), values)
+    assert asked_for("minimal_trunk", *options) == changed(sr.designs.minimal_trunk(), values)
 
 
 def test_moduli_and_densities_may_come_with_the_loads_that_need_them(folder):
     settings = [word for text in NUMBERS for word in ("--set", text)]
-    made = saved(folder, "minimal_trunk", "--payload", "200g", *settings)
+    made = asked_for("minimal_trunk", "--payload", "200g", *settings)
     material = made.section.rings[0].material
     assert (material.young_modulus, material.density) == (1e6, 1000.0)
     assert made.loads == sr.Loads(payload=0.2)
@@ -462,18 +463,18 @@ def test_moduli_and_densities_may_come_with_the_loads_that_need_them(folder):
     [("hanging", "down"), ("upright", "up"), ("down", "down"), ("x", "x"), ("-y", "-y")],
 )
 def test_the_base_points_the_way_that_is_said(folder, word, points):
-    assert saved(folder, "minimal_trunk", "--base", word).base == sr.Base(points=points)
+    assert asked_for("minimal_trunk", "--base", word).base == sr.Base(points=points)
 
 
 def test_the_place_and_the_turn_of_a_file_stay(folder):
     base = sr.Base(position=(0, 0, 2), points="x", turn=0.3)
     sr.designs.minimal_trunk().replace(base=base).save("posed.toml")
-    made = saved(folder, "posed.toml", "--base", "hanging", "--set", "base.turn=0.4rad")
+    made = asked_for("posed.toml", "--base", "hanging", "--set", "base.turn=0.4rad")
     assert made.base == base.replace(points="down", turn=0.4)
 
 
 def test_gravity_down_beside_a_hanging_base_pulls_along_the_arm(folder, capsys):
-    made = saved(folder, "lce_arm", "--base", "hanging", "--gravity", "down")
+    made = asked_for("lce_arm", "--base", "hanging", "--gravity", "down")
     assert (made.base.points, made.loads) == ("down", sr.Loads())
     assert run(["design", "lce_arm", "--base", "hanging", "--gravity", "down", "--json"]) == 0
     *_, last = capsys.readouterr().out.splitlines()
@@ -550,4 +551,4 @@ def test_loads_ask_in_one_line_for_what_the_arm_lacks(options, lacking, capsys):
 
 
 def test_no_gravity_on_an_arm_without_loads_changes_nothing(folder):
-    assert saved(folder, "minimal_trunk", "--gravity", "none") == sr.designs.minimal_trunk()
+    assert asked_for("minimal_trunk", "--gravity", "none") == sr.designs.minimal_trunk()
