@@ -144,3 +144,12 @@ def test_sampled_spaces_can_be_written_too():
     text = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
     space = parse_space(text, builtin)
     assert (space.dims, space.shape) == (("design",), (5,))
+
+
+def test_a_space_prints_its_parameters_with_their_ends():
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), taper=[0.0, 0.02], length=[1.0, 0.5])
+    assert str(space).splitlines() == [
+        "list of 2 designs",
+        "  taper: 2 values from 0 to 0.02 rad",
+        "  length: 2 values from 0.5 to 1 m",
+    ]
