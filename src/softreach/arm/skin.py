@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.arm.manipulator import Manipulator
-
-    Shape = xr.Dataset | "Centerline"
 
 __all__ = [
     "Centerline",
@@ -118,6 +116,9 @@ class Centerline:
         d1 = _unit(d1)
         d2 = _unit(_across(d2, d1))
         return middle, np.stack([d1, d2, np.cross(d1, d2)], axis=1)
+
+
+Shape: TypeAlias = "xr.Dataset | Centerline"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

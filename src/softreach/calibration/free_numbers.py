@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.base import Base, rotation_matrices
+from softreach.arm.body import RestShape
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import (
     Parameter,
@@ -22,7 +23,6 @@ from softreach.arm.parameters import (
     parts,
     with_values,
 )
-from softreach.arm.rest_shape import RestShape
 from softreach.support.arguments import as_mapping, as_names, plain
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
 

@@ -13,7 +13,7 @@ from softreach.arm.driving import inner_arm
 from softreach.arm.load_number import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
-from softreach.kernels.rod.placing import move, turn
+from softreach.kernels.rod.frames import move, turn
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import ArmRod, FreeRod
 from softreach.rod.inputs import Inputs
@@ -337,7 +337,7 @@ def all_inputs(rod: TipMap) -> ArmMap:
     known = tip_map(rod)
     if known.inputs.is_plain:
         return known
-    return replace(known, inputs=Inputs.of(known.inputs.whole, known.inputs.driving))
+    return replace(known, inputs=Inputs.of(known.inputs.own_box, known.inputs.driving))
 
 
 def with_unstable(rod: TipMap) -> ArmMap:

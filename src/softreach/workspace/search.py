@@ -15,7 +15,7 @@ from softreach.kernels.box.bounded_descent import (
     next_trials,
 )
 from softreach.kernels.box.box_projection import project
-from softreach.kernels.image.space_claims import claim_corners
+from softreach.kernels.points.point_distances import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask

@@ -1,13 +1,15 @@
-"""Distance from points to triangles."""
+"""Distances of points: from triangles, and of a lattice from the nearest of many."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from softreach.kernels.compiler import strict
+from softreach.kernels.compiler import kernel, strict
 from softreach.kernels.strict_vector import dot, minus, row, times
 
-__all__ = ["distances_to_faces"]
+__all__ = ["claim_corners", "distances_to_faces", "nearest_faces"]
 
 
 @strict
@@ -58,3 +60,53 @@ def segment(p, a, b):
         t = min(max(dot(u, w) / square, 0.0), 1.0)
     apart = minus(w, times(t, u))
     return dot(apart, apart)
+
+
+@strict
+def nearest_faces(points, vertices, faces, centers, radii, face, out):
+    """Nearest triangle of each point and the distance to it; spheres around triangles cull.
+
+    Args:
+        points: Points, shape (n, 3).
+        vertices: Corners, shape (v, 3).
+        faces: Indices of the corners, shape (f, 3).
+        centers: Centers of spheres around the triangles, shape (f, 3).
+        radii: Radii of these, shape (f,).
+        face: Result, index of the triangle, shape (n,).
+        out: Result, distance, shape (n,).
+    """
+    for i in range(len(points)):
+        best, near, p = np.inf, np.inf, row(points, i)
+        face[i] = 0
+        for f in range(len(faces)):
+            apart = minus(p, row(centers, f))
+            limit = near + radii[f]
+            if dot(apart, apart) >= limit * limit:
+                continue
+            a, b, c = faces[f]
+            square = squared_distance(p, row(vertices, a), row(vertices, b), row(vertices, c))
+            if square < best:
+                best, near, face[i] = square, np.sqrt(square), f
+        out[i] = near
+
+
+@kernel
+def claim_corners(points, number, steps, closest, owner):
+    """Let each point claim the corners of its cube that none before it is as close to.
+
+    Args:
+        points: In cells from the first center, within the lattice, shape (n, 3).
+        number: Number to write where a point is closest, shape (n,).
+        steps: From a center to the next along each axis in the flat arrays, shape (3,).
+        closest: Distance in cells below which a claim counts, lowered to the closest, flat.
+        owner: Filled with the number of the closest, flat.
+    """
+    for n in range(len(points)):
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        i, j, k = np.int64(x), np.int64(y), np.int64(z)
+        for corner in range(8):
+            a, b, c = i + (corner >> 2), j + (corner >> 1 & 1), k + (corner & 1)
+            away = math.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2)
+            cell = a * steps[0] + b * steps[1] + c * steps[2]
+            if away < closest[cell]:
+                closest[cell], owner[cell] = away, number[n]

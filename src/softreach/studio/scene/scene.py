@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.rest_shape import STRAIGHT
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
