@@ -172,7 +172,7 @@ class Scene:
         self._spines[path] = centers / arm.length, radii / arm.length  # balls that fill the arm
         if path == "/arm":
             self.pointing = shape["directors"].values[-1, 2]
-        self.draw_dots(f"{path}/markers", marker_points(arm, shape) / length, _MARKER)
+        self.draw_dots(f"{path}/markers", marker_points(arm.markers, shape) / length, _MARKER)
         meshes = _arm_meshes(arm, shape, length)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:
