@@ -165,7 +165,7 @@ def test_a_fold_at_one_corner_is_found():
     assert is_injective(dented(-0.6))
 
 
-@pytest.mark.parametrize("accuracy", [0.1, 0.02])
+@pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.02, marks=pytest.mark.large)])
 def test_folds_thinner_than_a_cell_of_the_grid_are_found_at_its_vertices(accuracy):
     # det J = 1 + 2 cos(2 π k x - phase)
     for turns in (3, 5, 7):

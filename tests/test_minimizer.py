@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from softreach.arm import designs
-from softreach.inverse.descent import Objective, minimize
+from softreach.inverse.direction import Objective, minimize
 from softreach.rod import ActivationBox, configuration, tip_map
 from softreach.workspace.search import CLOSELY, nearest_tips
 from tests.laws import in_box

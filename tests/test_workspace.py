@@ -98,7 +98,7 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
 
 def test_a_cloud_lies_inside_to_one_cell(best, folded):
     for found in (best, folded):
-        tips = compute_cloud(found.arm, n=100_000).tip.values
+        tips = compute_cloud(found.arm, n=20_000).tip.values
         outside = tips[~found.contains(tips)]
         assert len(outside) < 0.05 * len(tips)
         assert found.distance(outside).max() < found.grid.attrs["cell"]

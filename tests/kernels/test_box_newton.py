@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, minimize
 
 from softreach.arm import designs
+from softreach.inverse.least_change import sqp
 from softreach.inverse.request import Request
-from softreach.inverse.sqp import sqp
 from softreach.kernels.box.box_newton import box_steps
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.complementarity import complementary

@@ -42,7 +42,7 @@ KERNELS = {
     "volume": ROD | HULL,
     "reach": SLOPES | REACH,
     "solve": SLOPES | MESH | NEWTON,
-    "demo": ROD | HULL | {"frames.frames", "triangle_pixels.fill_triangles"},
+    "demo": ROD | HULL | {"frames.frames", "triangles.fill_triangles"},
 }
 """The kernels of each command, every one for one set of types."""
 

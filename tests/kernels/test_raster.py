@@ -23,7 +23,7 @@ from softreach.kernels.box.simplices import (
     kuhn_simplices,
     strides,
 )
-from softreach.kernels.image import contour, point_cover, raster
+from softreach.kernels.image import contour, raster
 from softreach.kernels.image.activation_mesh import ActivationMesh, face_planes
 from softreach.rod import tip_map, tip_positions
 from tests.inverse.test_many_bundles import six_bundles
@@ -188,9 +188,9 @@ def test_any_map_covers_what_its_tetrahedra_hold_less_those_turned_against_the_s
     stretches = rng.integers(-1000, 1001, len(vertices)).astype(float)
     triangles = critical(vertices, cells, stretches)
     where = rng.integers(0, 768, (5, 3)).astype(float)  # seldom on a face
-    members, starts = point_cover.bin_triangles(vertices, triangles, UNIT, (12, 12))
+    members, starts = raster.bin_triangles(vertices, triangles, UNIT, (12, 12))
     found = np.empty(5, np.int64)
-    point_cover.cover_at(vertices, triangles, UNIT, (12, 12), members, starts, where, found)
+    raster.cover_at(vertices, triangles, UNIT, (12, 12), members, starts, where, found)
     for point, count in zip(where, found, strict=True):
         held = holders(vertices, cells, point)
         assert count == sum(k if stretches[tet].sum() > 0 else -k for tet, k in held)
@@ -204,10 +204,10 @@ def test_points_and_centers_of_any_map_are_counted_alike(seed):
     cover, degree = counts(vertices, cells, 12)
     triangles = critical(vertices, cells, contour.stretches(vertices, np.array(cells)))
     at = rng.integers(0, 12, (9, 3))
-    members, starts = point_cover.bin_triangles(vertices, triangles, UNIT, (12, 12))
+    members, starts = raster.bin_triangles(vertices, triangles, UNIT, (12, 12))
     found = np.empty(9, np.int64)
     arguments = (members, starts, UNIT * at, found)
-    point_cover.cover_at(vertices, triangles, UNIT, (12, 12), *arguments)
+    raster.cover_at(vertices, triangles, UNIT, (12, 12), *arguments)
     assert (found == cover[tuple(at.T)]).all()
     off = UNIT * at + [1e-3, 1e-6, 0.0]  # as a center counts: never on a face
     held = [holders(1e6 * vertices, cells, np.rint(1e6 * p)) for p in off]

@@ -21,7 +21,7 @@ HARMLESS = (
 """Errors of viser's in the console."""
 
 CHEAP = """
-    window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 100);
+    window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 150);
     window.cancelAnimationFrame = clearTimeout;
     const context = HTMLCanvasElement.prototype.getContext;
     HTMLCanvasElement.prototype.getContext = function (kind, options) {
@@ -33,7 +33,7 @@ CHEAP = """
         document.head.append(style);
     });
 """
-"""Ten pictures a second, with jagged edges and nothing that glides: there is no graphics card."""
+"""Seven pictures a second, with jagged edges and nothing that glides: there is no graphics card."""
 
 
 FLASH = """

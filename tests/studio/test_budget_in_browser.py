@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-
 import pytest
 
 from softreach.arm import designs
@@ -11,7 +9,6 @@ from softreach.arm.parameters import changed
 from softreach.studio import Quality
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
-from softreach.studio.work import Latest
 from tests.studio.conftest import SMALL
 
 ENDLESS = Quality(coarse_level=12, fine_level=12, fine_accuracy=1e-5, most_seconds=3600.0)
@@ -27,6 +24,7 @@ def begin_endless(tab):
     tab.page.get_by_text("computing the exact set").first.wait_for()
 
 
+@pytest.mark.large
 def test_a_running_computation_is_canceled_and_taken_up_again(tab):
     begin_endless(tab)
     tab.press("Cancel")
@@ -53,31 +51,6 @@ def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, mo
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
     tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).first.wait_for()
-
-
-@pytest.mark.large
-def test_what_is_shown_of_the_design_before_is_marked(tab, monkeypatch):
-    go, made = threading.Event(), stages.compute_cloud
-
-    def waits(*given, **options):
-        go.wait(60)
-        return made(*given, **options)
-
-    monkeypatch.setattr(stages, "compute_cloud", waits)
-    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.02})))
-    tab.page.get_by_text("of the design before").first.wait_for()
-    go.set()
-    tab.settle()
-    tab.page.get_by_text("of the design before").first.wait_for(state="hidden")
-
-
-@pytest.mark.large
-def test_an_idle_page_has_nothing_done_by_the_server(tab, monkeypatch):
-    tab.page.wait_for_timeout(500)
-    done = []
-    monkeypatch.setattr(Latest, "submit", lambda _, job: done.append(job))
-    tab.page.wait_for_timeout(3000)
-    assert done == []
 
 
 @pytest.mark.large

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import softreach as sr
-import softreach.studio.jobs.calibration as jobs
 from softreach.arm import Marker, designs
 from softreach.arm.parameters import changed
 from softreach.rod.kinematics import marker_positions
@@ -139,6 +138,7 @@ def test_a_fit_finds_the_numbers_of_the_arm_and_applying_it_can_be_undone(sessio
     assert session.state.design == ARM
 
 
+@pytest.mark.large
 def test_a_design_that_was_changed_since_the_fit_is_not_replaced(session):
     panel = loaded(session)
     fitted(panel, session, "pose.position")
@@ -150,28 +150,6 @@ def test_a_design_that_was_changed_since_the_fit_is_not_replaced(session):
     with pytest.raises(sr.InvalidInput, match="changed since the fit"):
         panel._applied()
     assert session.state.design == other
-
-
-def test_a_fit_tells_its_steps_and_ends_when_it_is_canceled(session, monkeypatch):
-    panel, told = loaded(session), []
-    plain = jobs.calibrate
-
-    def canceled_at_once(*arguments, progress, **options):
-        def step(done):
-            progress(done)
-            told.append(session.doing)
-            session.cancel()
-
-        return plain(*arguments, progress=step, **options)
-
-    monkeypatch.setattr(jobs, "calibrate", canceled_at_once)
-    fitted(panel, session, "pose")
-    assert told == ["calibrating, step 1"]
-    assert session.bench.result is None
-    assert "Canceled" in session.note
-    monkeypatch.undo()
-    fitted(panel, session, "pose.position")
-    assert session.bench.result is not None
 
 
 def test_data_of_another_arm_is_no_longer_shown(session):

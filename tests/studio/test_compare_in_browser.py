@@ -37,6 +37,7 @@ def become(tab, **values):
     tab.settle()
 
 
+@pytest.mark.large
 def test_snapshots_are_taken_compared_restored_and_deleted(tab):
     tab.open("Compare")
     first, wide = tab.session.reach.size, take(tab)
@@ -98,15 +99,3 @@ def test_a_snapshot_is_drawn_around_the_design_beside_it_or_not_at_all(tab):
     tab.wait(lambda: not tab.drawn("/reference"), "what is deleted is not drawn")
     tab.wait(lambda: not far(tab, eye), "the eye is back")
     assert tab.session.state.reference is None
-
-
-def test_what_an_older_state_draws_without_a_snapshot_has_a_row_and_can_be_taken_away(tab):
-    older = tab.session.state.replace(reference=changed(TRUNK, {"taper": 0.013}))
-    tab.session.restore(older)
-    tab.settle()
-    tab.open("Compare")
-    tab.wait(lambda: "reference" in [row[0] for row in cells(tab)], "it has a row")
-    tab.choose("snapshot", "reference")
-    tab.choose("draw", "not drawn")
-    tab.wait(lambda: not tab.drawn("/reference"), "it is drawn no more")
-    tab.wait(lambda: "reference" not in [row[0] for row in cells(tab)], "its row is gone")

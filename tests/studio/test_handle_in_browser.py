@@ -9,7 +9,7 @@ import pytest
 
 import softreach as sr
 from softreach.rod import tip_map
-from softreach.studio.jobs.inverse import DragTip, SolveInverse
+from softreach.studio.jobs.inverse import SolveInverse
 
 
 @pytest.fixture
@@ -72,6 +72,7 @@ FOLDED = (-0.48, -0.16, -1.23)
 START = (-0.7, -0.4, -0.9)
 
 
+@pytest.mark.large
 def test_a_tip_inside_the_exact_surface_is_dragged(inverse_tab):
     tab = inverse_tab
     tab.session.update(lambda s: s.showing(surface=True, cloud=False))
@@ -103,21 +104,6 @@ MOVES = """async ([x, y]) => {
         await null;
     }
 }"""
-
-
-def test_every_place_of_a_dragged_tip_is_told_at_once(inverse_tab, monkeypatch):
-    tab, told = inverse_tab, []
-    begin = pose(tab, START)
-    drag_tip(tab, begin, begin + [0.0, 0.0, 0.05], steps=2)
-    tab.settle()
-    monkeypatch.setattr(tab.session, "follow", told.append)
-    tab.page.evaluate(MOVES, screen(tab, begin))
-    tab.wait(lambda: len(told) >= 8, "all are told")
-    monkeypatch.undo()
-    tab.page.mouse.up()
-    tab.wait(lambda: not tab.session.is_dragged, "the drag rests")
-    tab.settle()
-    assert told == [DragTip] * 8
 
 
 def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(full_tab):
@@ -202,27 +188,3 @@ def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_t
     tab.page.mouse.up()
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
     tab.settle()
-
-
-@pytest.mark.large
-def test_the_handle_is_dark_on_a_light_page_and_light_on_a_dark_one(inverse_tab):
-    tab = inverse_tab
-    begin = pose(tab, START)
-    tab.wait(lambda: np.median(around(tab, begin)) < 0.3, "it is dark")
-    tab.session.update(lambda s: s.showing(dark=True))
-    tab.wait(lambda: np.median(around(tab, begin)) > 0.5, "it is light")
-    tab.session.update(lambda s: s.showing(dark=False))
-    tab.wait(lambda: np.median(around(tab, begin)) < 0.3, "it is dark again")
-
-
-@pytest.mark.large
-def test_the_cloud_is_whole_again_after_a_drag_that_ends_outside_of_the_window(full_tab):
-    tab = full_tab
-    begin = pose(tab, START)
-    drag_tip(tab, begin, begin + [0.0, 0.0, 0.1])
-    tab.wait(lambda: len(tab.drawn("/cloud").points) <= 1 << 13, "the cloud is thin")
-    tab.page.mouse.move(screen(tab, begin)[0], -40, steps=4)
-    tab.page.mouse.up()
-    tab.wait(lambda: not tab.session.is_dragged, "the drag rests")
-    tab.wait(lambda: len(tab.drawn("/cloud").points) > 1 << 13, "the cloud is whole")
-    tab.wait(lambda: tab.session.state.target is not None, "the end of the drag is a target")

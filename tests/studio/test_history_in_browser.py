@@ -10,7 +10,6 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.studio import Start, Studio, StudioState
 from softreach.studio.captions import size_text
 from softreach.studio.start import KeptWork
-from softreach.studio.work import all_cores
 from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
 
@@ -61,33 +60,6 @@ def test_a_dragged_slider_is_one_step_that_buttons_and_keys_undo(tab):
     assert tab.session.reach.arm == second
 
 
-def test_where_there_is_nothing_to_redo_the_page_says_so_and_no_tab_jumps(tab):
-    bar = tab.page.get_by_role("tablist").first.bounding_box()
-    redo = tab.page.get_by_role("button", name="Redo", exact=True)
-    tab.session.update(lambda s: s.replace(activation=(-0.1, 0.0, 0.0)))
-    tab.wait(redo.is_disabled, "Redo is gray")
-    tab.session.step(back=False)
-    tab.page.get_by_text("There is nothing to redo.").wait_for()
-    assert tab.page.get_by_role("tablist").first.bounding_box() == bar
-    tab.press("Undo")
-    tab.wait(redo.is_enabled, "Redo is there")
-    tab.page.get_by_text("There is nothing to redo.").wait_for(state="detached")
-    tab.settle()
-    assert tab.page.get_by_role("tablist").first.bounding_box() == bar
-
-
-def test_no_tab_jumps_when_the_button_that_cancels_comes_and_goes(tab):
-    tabs = tab.page.get_by_role("tablist")
-    cancel = tab.page.get_by_role("button", name="Cancel", exact=True)
-    cancel.wait_for(state="hidden")
-    before = tabs.first.bounding_box()
-    with all_cores:  # so that the new volume waits
-        tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.02})))
-        cancel.wait_for(state="visible")
-        assert tabs.first.bounding_box() == before
-    cancel.wait_for(state="hidden")
-
-
 def reloaded(tab, studio):
     """The session of a page after it was loaded again."""
     known = set(studio.sessions)
@@ -99,6 +71,7 @@ def reloaded(tab, studio):
     return session
 
 
+@pytest.mark.large
 def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, folder):
     with Studio(start(), work=KeptWork(folder)) as studio:
         tab = Tab(browser, studio)

@@ -12,16 +12,13 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
-from softreach.studio import page
 from softreach.studio.captions import size_text
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
-from softreach.studio.reach import Quality, cloud_points, stages
-from softreach.studio.scene.camera import in_the_way
+from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.clouds import in_slice, sample_values
-from softreach.studio.scene.scene import Scene
 from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
-from softreach.studio.state import Camera, Slice, StudioState
+from softreach.studio.state import Slice, StudioState
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
@@ -129,21 +126,6 @@ def test_a_saved_page_holds_everything_itself(fine):
     assert "taper_deg = 2.0" in saved
     assert '<script src="http' not in saved
     assert '<link href="http' not in saved
-
-
-def test_a_saved_page_is_cut_free_for_its_camera_as_the_tab_is(fine, monkeypatch):
-    made = []
-    monkeypatch.setattr(page, "Scene", lambda api: made.append(Scene(api)) or made[-1])
-    camera = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
-    state = StudioState(design=fine.arm, camera=camera)
-    points = cloud_points(fine, 12)
-    for cut in "window", "none":
-        static_page(state.showing(cut=cut), fine)
-        viewpoint = made[-1].viewpoint(camera, state)
-        assert len(viewpoint.centers) > 2
-        hidden = in_the_way(points, viewpoint, cut)
-        assert hidden.any() == (cut == "window")
-        np.testing.assert_array_equal(made[-1].clouds.hidden(points), hidden)
 
 
 def test_a_design_file_changes_the_design_alone(trunk):

@@ -69,6 +69,7 @@ def mirrored_unstable(arm):
     return gamma[sr.rod.tip_map(arm).status(gamma) == TipStatus.UNSTABLE][0]
 
 
+@pytest.mark.large
 def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path):
     tab, free = loads_tab, loads_tab.session.reach
     tab.choose("gravity", "up")
@@ -85,11 +86,10 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     tab.page.get_by_text("every sample rests in a stable equilibrium").wait_for()
 
     before = loads(tab)
-    for text in ("-5", "1000000000"):
-        typed(tab, "payload [g]", text)
-        alert = tab.page.get_by_role("alert").filter(has_text="payload = ")
-        alert.wait_for()
-        assert loads(tab) == before
+    typed(tab, "payload [g]", "-5")
+    alert = tab.page.get_by_role("alert").filter(has_text="payload = ")
+    alert.wait_for()
+    assert loads(tab) == before
     enter(
         tab,
         "payload [g]",
@@ -113,12 +113,6 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     tab.wait(lambda: tab.field("gravity").input_value() == "none", "the fields are empty")
     told = tab.page.get_by_text("equilibrium")
     tab.wait(lambda: told.count() == 0, "nothing is said of equilibria")
-
-    tab.session.update(lambda s: s.replace(design=designs.minimal_trunk()))
-    tab.settle()
-    tab.choose("gravity", "sideways")
-    tab.page.get_by_role("alert").filter(has_text="on the tab Parts").wait_for()
-    assert loads(tab) is None
 
 
 @pytest.mark.large
@@ -192,6 +186,7 @@ def test_needs_are_seen_met_and_missed_and_follow_a_slider(tab):
 # End to end: the reachable set in the plane of the slice
 
 
+@pytest.mark.large
 def test_the_section_is_that_of_the_exact_set(tab):
     tab.open("Plots")
     tab.page.get_by_label("section", exact=True).check()
@@ -205,21 +200,6 @@ def test_the_section_is_that_of_the_exact_set(tab):
     assert all(np.array_equal(curve[0], curve[-1]) for curve in curves)
     onto = reach.exact.distance(points[::10] * reach.arm.length)
     assert np.abs(onto).max() < 2 * reach.exact.image.lattice.cell
-
-
-def test_the_picture_of_a_section_is_told_in_words_and_scrolled_by_keys(tab):
-    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
-    picture = tab.page.locator("img:visible").first
-    tab.wait(lambda: "one closed curve" in (picture.get_attribute("alt") or ""), "it has words")
-    area = tab.page.get_by_role("group", name="figures")
-    tab.wait(lambda: area.get_attribute("tabindex") == "0", "keys reach what scrolls")
-    before = tab.session.camera.actual()
-    area.evaluate("area => area.style.height = '200px'")
-    for key in ("ArrowDown", "ArrowLeft"):  # these turn the camera elsewhere
-        area.press(key, delay=200)
-    tab.wait(lambda: area.evaluate("area => area.scrollTop") > 0, "it is scrolled")
-    tab.settle()
-    assert tab.session.camera.actual() == before
 
 
 @pytest.mark.large
@@ -240,34 +220,6 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     changed = enclosed_area(section_curves(tab.session.reach, cut), 2)
     assert changed != area
     tab.page.get_by_text(f"{changed:.4g} m²").wait_for()
-
-
-@pytest.mark.large
-def test_the_section_is_drawn_for_a_dark_page_too(tab):
-    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings(shown=("section",))))
-    tab.settle()
-    light = tab.session.figures.plots["section"].image
-    tab.session.update(lambda s: s.showing(dark=True))
-    tab.settle()
-    dark = tab.session.figures.plots["section"].image
-    assert np.median(light) > 200
-    assert (light.min(axis=-1) < 60).any()
-    assert dark[0].max() < 60
-    assert not (dark == 255).all(axis=-1).any()
-    shown = tab.page.locator("img:visible").first
-    wide = dark.shape[1]
-    tab.wait(lambda: shown.evaluate("image => image.naturalWidth") == wide, "it is shown")
-    tab.session.update(lambda s: s.showing(dark=False, plots=PlotSettings()))
-    tab.settle()
-
-
-@pytest.mark.large
-def test_beside_the_set_nothing_is_reached(tab):
-    cut = Slice(axis="x", center=1.4, thickness=0.1)
-    tab.session.update(lambda s: s.showing(slice=cut, plots=PlotSettings(shown=("section",))))
-    tab.page.get_by_text("Nothing is reached at x = 1.4 m.").wait_for()
-    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings()))
-    tab.settle()
 
 
 @pytest.mark.large

@@ -13,7 +13,6 @@ import pytest
 
 import softreach.studio.app
 import softreach.studio.reach as stages
-from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.inverse.prepared import prepared_map
 from softreach.studio import Studio, work
@@ -71,6 +70,7 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
     assert seen[0] == (True, True, True, "computing", True)
 
 
+@pytest.mark.large
 def test_of_tabs_that_were_closed_nothing_stays(studio):
     with page(studio):
         pass  # what is made once
@@ -91,6 +91,7 @@ def test_of_tabs_that_were_closed_nothing_stays(studio):
     until(lambda: clouds() <= 1)  # the one that all tabs begin with
 
 
+@pytest.mark.large
 def test_memory_is_returned_once_a_tab_rests_and_when_it_is_gone(studio, monkeypatch):
     returned: list[int] = []
     monkeypatch.setattr(work, "return_memory", lambda: returned.append(len(studio.sessions)))
@@ -101,14 +102,6 @@ def test_memory_is_returned_once_a_tab_rests_and_when_it_is_gone(studio, monkeyp
         del session
     until(lambda: 0 in returned)
     until(lambda: prepared() is None)
-
-
-def test_designs_prepared_for_the_inverse_are_forgotten_after_a_long_rest(studio):
-    with page(studio) as session:
-        assert session.settle(PATIENCE)
-        prepared = weakref.ref(prepared_map(designs.filament()))
-        work.return_memory_soon()
-        until(lambda: prepared() is None)
 
 
 def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_full(
@@ -122,16 +115,17 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
     with page(studio) as session:
         computed.clear()
         threads = own_threads()
-        shake(session, 100, 0.01)
+        shake(session, 40, 0.01)
         assert session.settle(PATIENCE)
         assert session.reach is not None
         assert session.reach.arm == session.state.design
         assert computed[-1] == session.state.design
-        assert len(computed) < 120  # each in two or three stages, of which the later are dropped
+        assert len(computed) < 60  # each in two or three stages, of which the later are dropped
         assert len(session.history.past) < 50
         until(lambda: own_threads() <= threads)
 
 
+@pytest.mark.large
 def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):
     """The other settles while the first is still shaken."""
     with page(studio) as shaken, page(studio) as calm:
@@ -171,19 +165,10 @@ def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, m
     until(lambda: not studio.sessions)
 
 
-def test_a_tab_that_is_closed_while_it_is_shaken_leaves_no_work(studio):
-    with page(studio) as session:
-        shake(session, 20)
-    until(lambda: not studio.sessions)
-    assert session.settle(PATIENCE)
-    assert session.reach is None
-    shake(session, 5)  # what a widget still had to say
-    assert not session.busy
-
-
 STRANGE = (None, float("nan"), "xxx", "", [], [1, 2], {"a": 1}, b"xx")
 
 
+@pytest.mark.large
 def test_values_that_no_page_sends_change_nothing_end_nothing_and_print_nothing(studio, capfd):
     known = set(studio.sessions)
     with connected(studio) as send:

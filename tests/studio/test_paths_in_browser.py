@@ -82,31 +82,6 @@ def test_the_page_says_where_the_branch_ends_and_why(tab, tmp_path):
     np.testing.assert_allclose(end.position, found.end_position / state.design.length, atol=1e-6)
 
 
-@pytest.mark.large
-def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
-    tab.choose("mouse", "adds points to the path")
-    tab.wait(lambda: tab.session.state.appearance.mouse == "path", "the mouse is for the path")
-    points = tab.session.reach.cloud.tip.values / tab.session.state.design.length
-    one, other = lowest(tab, points)  # notes of uploads cover the upper part of the canvas
-    tab.click_at(one)
-    tab.wait(lambda: tab.session.state.path is not None, "the path begins")
-    first = tab.session.state.path
-    np.testing.assert_allclose(first.points[0], tab.session.tip, atol=1e-4)
-    assert tab.session.state.target is None
-    tab.click_at(other)
-    tab.wait(lambda: tab.session.state.path != first, "the path goes on")
-    assert tab.session.state.path.points[: len(first.points)] == first.points
-    tab.press("Remove the path")
-    tab.wait(lambda: tab.session.state.path is None, "the path is gone")
-    tab.settle()
-    assert not tab.drawn("/path")
-
-
-def lowest(tab, points, count=2):
-    """Points of those given that appear low in the canvas."""
-    return [point for point in points[:2000] if tab.projected(point)[1] > 0.65][:count]
-
-
 def load(tab, path) -> None:
     with tab.page.expect_file_chooser() as caught:
         tab.press("Load a path (CSV)")

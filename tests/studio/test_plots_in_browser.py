@@ -44,6 +44,7 @@ LINES = """Object.values(window.__viserTestpoints?.uplots ?? {}).map(({chart}) =
 """Places of the two ends of the line in each chart of the page."""
 
 
+@pytest.mark.large
 def test_a_line_stands_at_the_value_of_the_slider_and_follows_it(tab):
     settings = PlotSettings(shown=("sweep",), parameter="taper")
     tab.session.update(lambda s: s.showing(plots=settings))

@@ -126,6 +126,7 @@ def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser
         page.close()
 
 
+@pytest.mark.large
 def test_no_other_page_can_frame_the_studio(browser, studio):
     page = browser.new_page()
     page.set_content(f'<iframe src="{studio.url}"></iframe>')

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import designs
-from softreach.studio import Quality, Studio
+from softreach.studio import Quality
 from softreach.studio.jobs.inverse import SolveInverse
-from softreach.studio.start import start_on_design
 from tests.studio.tab import Tab
 
 COARSE = Quality(coarse_level=12, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.1)
@@ -17,21 +15,16 @@ SHEET = "[style*='max-height: 60%']"
 SIZES = {"laptop": (1366, 768), "phone": (390, 844)}
 
 
-@pytest.fixture(scope="module")
-def opened(browser):
-    """Tabs by the kind of their window."""
-    with Studio(start_on_design(designs.minimal_trunk(), COARSE)) as studio:
-        tabs: dict[str, Tab] = {}
+@pytest.fixture
+def opened(tab):
+    """The tab in a window of a kind."""
 
-        def opened(kind: str) -> Tab:
-            if kind not in tabs:
-                tabs[kind] = Tab(browser, studio, SIZES[kind])
-                tabs[kind].session.update(lambda s: s.showing(level=12))
-            return tabs[kind]
+    def opened(kind: str) -> Tab:
+        tab.page.set_viewport_size(dict(zip(("width", "height"), SIZES[kind], strict=True)))
+        see_all(tab)
+        return tab
 
-        yield opened
-        for tab in tabs.values():
-            tab.close()
+    return opened
 
 
 def in_canvas(tab, points) -> np.ndarray:
@@ -46,6 +39,7 @@ def labels(tab) -> list:
     return [label for label in found if label is not None]
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("kind", [pytest.param("laptop", marks=pytest.mark.large), "phone"])
 def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
     tab = opened(kind)
@@ -65,16 +59,6 @@ def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
 
 
 @pytest.mark.large
-def test_the_arm_is_in_sight_in_the_window_of_a_laptop(opened):
-    tab = opened("laptop")
-    tab.settle()
-    width, height = SIZES["laptop"]
-    assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
-    places = in_canvas(tab, [(0, 0, z) for z in (0.0, 0.5, 1.0)])
-    assert (places > 0).all()
-    assert (places < (width, height)).all()
-
-
 def test_the_arm_is_in_sight_above_the_sheet_of_a_phone(opened):
     tab = opened("phone")
     tab.settle()
@@ -157,55 +141,6 @@ def see_all(tab):
     tab.settle()
     tab.session.look_from("oblique")
     tab.settle()
-
-
-@pytest.mark.large
-def test_figures_are_as_wide_as_the_sheet_of_a_phone(opened):
-    tab = opened("phone")
-    tab.open("Plots")
-    plots = "section", "V against parameter"
-    for plot in plots:
-        tab.page.get_by_label(plot, exact=True).check()
-    tab.page.locator(SHEET).get_by_text("Figures", exact=True).click()
-    tab.settle()
-    for kind in (".uplot", "img:visible"):
-        drawn = tab.page.locator(f"{SHEET} {kind}").first
-        drawn.scroll_into_view_if_needed()
-        tab.wait(lambda drawn=drawn: _right(drawn) <= 390, f"{kind} is within the sheet")
-    view = tab.page.locator(f"{SHEET} .mantine-ScrollArea-viewport").first
-    assert view.evaluate("e => e.scrollWidth <= e.clientWidth")
-    for plot in plots:
-        tab.page.get_by_label(plot, exact=True).uncheck()
-
-
-def _right(drawn) -> float:
-    place = drawn.bounding_box()
-    return place["x"] + place["width"]
-
-
-@pytest.mark.large
-def test_a_wide_table_of_designs_moves_within_the_sheet_of_a_phone(opened):
-    tab = opened("phone")
-    tab.open("Compare")
-    tab.press("Take snapshot")
-    for revolution, taper in ((1.0, 0.03), (2.0, 0.01)):
-        tab.session.update(
-            lambda s, r=revolution, t=taper: s.replace(
-                design=designs.minimal_trunk(revolution=r, taper=t)
-            )
-        )
-        tab.settle()
-        tab.press("Take snapshot")
-    tab.page.get_by_role("cell", name="design 3").wait_for()
-    assert tab.page.evaluate("document.documentElement.scrollWidth") <= 390
-    view = tab.page.locator(f"{SHEET} .mantine-ScrollArea-viewport")
-    assert view.evaluate("e => e.scrollWidth <= e.clientWidth")
-    last = tab.page.get_by_role("button", name="Delete")
-    last.scroll_into_view_if_needed()
-    place = last.bounding_box()
-    assert place["x"] >= 0
-    assert place["x"] + place["width"] <= 390
-    assert place["y"] + place["height"] <= 844
 
 
 @pytest.mark.large

@@ -13,7 +13,6 @@ from softreach.arm.parameters import find_parameter
 from softreach.studio import StudioState
 from softreach.studio.captions import size_text
 from softreach.studio.jobs.inverse import SolveInverse
-from softreach.studio.state import Slice
 from softreach.studio.tabs.inverse import InversePanel
 from softreach.studio.work import all_cores
 from tests.studio.tab import SIZE, Tab
@@ -42,26 +41,6 @@ def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(ta
     assert after.volume != before.volume
     first = slice(1 << 10)  # a tab keeps more samples than it needs
     assert not np.allclose(after.cloud.tip[first], before.cloud.tip[first])
-
-
-def test_the_tip_is_where_the_library_says(tab):
-    tab.open("Move")
-    start = tab.session.tip.copy()
-    tab.drag("γ left", -60)
-    tab.drag("γ longitudinal", -30)
-    tab.wait(lambda: np.count_nonzero(tab.session.state.activation) == 2, "two bundles pull")
-    tab.settle()
-    state = tab.session.state
-    tip = sr.tip_positions(state.design, [state.activation])[0] / state.design.length
-    assert np.linalg.norm(tip - start) > 0.05
-    np.testing.assert_allclose(tab.session.tip, tip, atol=2e-5)
-
-    def shown():
-        x, y, z = tab.session.tip
-        text = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) m, pointing along ("
-        return tab.page.get_by_text(text).count()
-
-    tab.wait(shown, "the page says where the tip is")
 
 
 def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
@@ -95,6 +74,7 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     tab.page.get_by_text("m away").wait_for()
 
 
+@pytest.mark.large
 def test_the_caption_of_a_saved_page_stands_below_its_scene(tab, tmp_path):
     tab.open("Export")
     tab.choose("picture", "web page (.html)")
@@ -113,23 +93,6 @@ def parameter(tab, name: str) -> float:
     """What the design of a tab has of a parameter."""
     design = tab.session.state.design
     return find_parameter(design, name).value(design)
-
-
-def test_the_surface_is_drawn_and_cut(tab):
-    tab.open("View")
-    tab.page.get_by_label("exact surface").check()
-    tab.wait(lambda: tab.drawn("/surface"), "it is drawn")
-    tab.settle()
-    cut = Slice(axis="y", center=0.0, thickness=0.1)
-    tab.session.update(lambda s: s.showing(slice=cut))
-    tab.settle()
-    left = tab.drawn("/surface")
-    centers = left.vertices[left.faces].mean(axis=1)
-    assert np.abs(centers[:, 1]).max() <= 0.05
-    assert tab.drawn("/slice")
-    tab.session.update(lambda s: s.showing(slice=Slice(), surface=False))
-    tab.settle()
-    assert not tab.drawn("/surface")
 
 
 def test_a_state_is_saved_and_loaded(tab, tmp_path):

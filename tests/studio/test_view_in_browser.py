@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softreach.studio.jobs.inverse import SolveInverse
-from softreach.studio.jobs.reach import FollowCamera, SweepReach
+from softreach.studio.jobs.reach import SweepReach
 from softreach.studio.scene.camera import VIEWS, framing
-from softreach.studio.serve.viser_fixes import headed
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
@@ -63,6 +61,7 @@ def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     assert hidden < 0.75 * seen
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.large)])
 def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
     def change(**look) -> np.ndarray:
@@ -79,48 +78,6 @@ def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
 def pixels_of(tab, **look) -> np.ndarray:
     show(tab, **look)
     return pixels(tab)
-
-
-@pytest.mark.large
-def test_no_point_is_drawn_before_the_arm_from_any_side(tab):
-    tab.session.update(lambda s: s.replace(activation=(-1.0, -0.2, -0.5)))
-
-    def arm(**look) -> int:
-        """Pixels of the arm."""
-        show(tab, mouse="none", **look)
-        image = pixels(tab)
-        return sum(like(image, color) for color in BUNDLES)
-
-    for view in VIEWS:
-        tab.session.look_from(view)
-        there, seen = arm(cloud=False), arm(cloud=True)
-        assert there > 50
-        assert seen > 0.9 * there
-
-
-def test_a_page_that_nobody_touches_sends_no_clouds(tab, monkeypatch):
-    pixels(tab)
-    sent = []
-    clouds = tab.session.scene.clouds
-    monkeypatch.setattr(clouds, "_send", lambda path, _: sent.append(path))
-    tab.page.wait_for_timeout(1500)
-    tab.session.follow(FollowCamera)
-    tab.settle()
-    assert sent == []
-
-
-@pytest.mark.large
-def test_the_target_is_seen_through_the_cloud(tab):
-    target = np.array([0.0, 0.1, 0.5])
-    show(tab, arm=False)
-    tab.session.job(SolveInverse).aim(target)
-    tab.wait(lambda: tab.session.answer is not None, "the target is solved for")
-    image = pixels(tab)
-    right, down = tab.projected(target)
-    mark = image[round(down * len(image)), round(right * image.shape[1])]
-    assert mark[0] > 0.6  # orange, which the scale of colors has nowhere
-    assert mark[2] < 0.3 * mark[0]
-    assert mark[1] < 0.75 * mark[0]
 
 
 @pytest.mark.large
@@ -159,6 +116,7 @@ def test_numbers_stand_outside_of_what_they_number_from_every_side(tab):
         assert ((places < low) | (places > high)).any(axis=1).all()
 
 
+@pytest.mark.large
 def test_a_saved_picture_is_drawn_anew_over_key_numbers_and_design(tab, tmp_path, monkeypatch):
     from matplotlib.image import imread
 
@@ -196,6 +154,7 @@ def test_a_scale_bar_is_as_long_as_that_length_at_the_depth_of_the_target(tab):
     assert length(0.3) < 0.95 * length(0.0)
 
 
+@pytest.mark.large
 def test_f_leaves_the_scene_with_large_numbers_and_escape_brings_the_panel_back(tab):
     page, numbers = tab.page, tab.page.locator("[data-history] b").first
     canvas, small = page.locator("canvas").first, numbers.bounding_box()["height"]
@@ -220,6 +179,7 @@ def sweep(tab, motion: str) -> None:
     tab.session.job(SweepReach).ask()
 
 
+@pytest.mark.large
 def test_the_arm_sweeps_until_a_key_and_leaves_nothing_behind(tab, monkeypatch):
     show(tab)
     session, moved = tab.session, []
@@ -239,42 +199,6 @@ def test_the_arm_sweeps_until_a_key_and_leaves_nothing_behind(tab, monkeypatch):
     assert (session.state, session.history) == before
     np.testing.assert_array_equal(session.tip, tip)
     assert not session.is_touched
-
-
-def test_no_arm_sweeps_where_less_motion_is_wanted(tab, browser, studio, monkeypatch):
-    context = browser.new_context(reduced_motion="reduce")
-    page = context.new_page()
-    page.route("**/*", lambda route: route.fulfill(body=headed("<title>Viser</title>")))
-    page.goto(studio.url)
-    assert page.evaluate("localStorage.getItem('viser-user:softreach-motion')") == ""
-    context.close()
-    monkeypatch.setattr(tab.session, "is_touched", False)
-    tips = []
-    monkeypatch.setattr(tab.session.scene, "draw_arm", lambda *_: tips.append(_))
-    monkeypatch.setattr(tab.session, "follow", lambda *_: None)
-    tab.page.evaluate("localStorage.setItem('viser-user:softreach-motion', '')")
-    tab.session.job(SweepReach).do(lambda: None)
-    assert tips == []
-
-
-@pytest.mark.large
-def test_numbers_are_dark_on_light_and_light_on_dark(tab):
-    show(tab, cloud=False, arm=False, mouse="none")
-    name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x [m]")
-
-    def around() -> np.ndarray:
-        image = pixels(tab)
-        right, down = tab.projected(name.position)
-        row, column = round(down * len(image)), round(right * image.shape[1])
-        return image[row - 6 : row + 6, column - 10 : column + 10].mean(axis=-1)
-
-    tab.wait(lambda: around().min() < 0.4, "there is text")
-    assert np.median(around()) > 0.9
-    show(tab, dark=True)
-    tab.wait(lambda: np.median(around()) < 0.2, "it gets dark")
-    tab.wait(lambda: around().max() > 0.5, "the text gets light")
-    show(tab, dark=False)
-    tab.wait(lambda: np.median(around()) > 0.9, "it gets light")
 
 
 def test_a_view_that_was_kept_on_a_phone_is_framed_anew_from_its_side(tab):

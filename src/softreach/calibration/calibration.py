@@ -223,10 +223,11 @@ def _warn_of_numbers(result: Calibration) -> None:
             f"the data does not tell {', '.join(vague)}: its standard deviation is infinite; hold "
             "it, give it a prior, or measure more"
         )
-    before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}
-    for text in design_warnings(result.arm):
-        if re.sub(r"[\d.]+", "", text) not in before:
-            warn(f"the calibrated arm: {text}")
+    if after := design_warnings(result.arm):
+        before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}
+        for text in after:
+            if re.sub(r"[\d.]+", "", text) not in before:
+                warn(f"the calibrated arm: {text}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

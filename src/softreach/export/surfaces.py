@@ -20,8 +20,7 @@ from softreach.export.formats import (
     write_vtk,
     write_vtu,
 )
-from softreach.geometry.manifold import parted
-from softreach.geometry.surface import SurfaceMesh
+from softreach.geometry.surface import SurfaceMesh, parted
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points

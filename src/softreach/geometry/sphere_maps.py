@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.points.sphere_triangles import FLAT, OPEN, judge
+from softreach.kernels.points.triangles import FLAT, OPEN, judge_images
 from softreach.support.arrays import Array, Index, Mask
 
 Indices = Index
@@ -140,7 +140,7 @@ def _candidates(seen: Map, levels: int, caution: float, most: int) -> tuple[Arra
         points, triangles = cut
         images = np.concatenate([images, seen(points[before:])])
         verdicts = np.empty(len(triangles), np.int8)
-        judge(images, parents, triangles, caution, _FLAT, verdicts)
+        judge_images(images, parents, triangles, caution, _FLAT, verdicts)
         centers.append(points[triangles[verdicts == FLAT]].mean(axis=1))
         triangles = triangles[verdicts == OPEN]
         few_enough = len(triangles) < _MOST_TRIANGLES and len(points) + 3 * len(triangles) < most

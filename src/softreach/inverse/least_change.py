@@ -10,21 +10,31 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from softreach.inverse.descent import descend
-from softreach.inverse.nearest import Reached, first_of_each, reach
+from softreach.inverse.direction import constrained_minima
+from softreach.inverse.nearest import Reached, descend, first_of_each, reach
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.sqp import Minima, constrained_minima, sqp
+from softreach.kernels.box.box_projection import project
+from softreach.kernels.box.sequential_projection import (
+    FIRST_PROXIMITY,
+    LONGEST_STEP,
+    NOWHERE,
+    Running,
+    judge,
+    next_trials,
+)
 from softreach.kernels.branches.spread import choose_apart
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows
 
-__all__ = ["least_changes"]
+__all__ = ["least_changes", "sqp"]
 
-
+_TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 _CANDIDATES = 300
 _STARTS = 7  # from seeds all over the box and from those on faces, as they are and moved
 _APART = 0.15
@@ -192,7 +202,7 @@ def _on_target(rod: TipMap, request: Request, owner: Index, ends: Minima) -> Rea
     gamma, residual = ends.gamma.copy(), ends.residual.copy()
     off = np.flatnonzero(residual > request.residual)
     more = descend(rod, request.targets[owner[off]], gamma[off], request.residual, most=20)
-    gamma[off], residual[off] = more.gamma, more.residual
+    gamma[off], residual[off] = more.gamma, more.distance
     return Reached(gamma, residual)
 
 
@@ -206,12 +216,12 @@ def _searched_again(
     search = partial(sqp, settled=_POLISHED, most=_MOST_AGAIN)
     plain = search(rod, request, owner, start)
     at = descend(rod, request.targets[owner], start, request.residual)
-    hit = np.flatnonzero(at.residual <= request.residual)
+    hit = np.flatnonzero(at.distance <= request.residual)
     kept = search(rod, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY)
     found = [
         ends,
         _on_target(rod, request, owner, plain),
-        Reached(at.gamma[hit], at.residual[hit]),
+        Reached(at.gamma[hit], at.distance[hit]),
         _on_target(rod, request, owner[hit], kept),
     ]
     owners = [np.arange(len(request.targets)), owner, owner[hit], owner[hit]]
@@ -257,3 +267,110 @@ def _cost(rod: TipMap, request: Request, gamma: Array) -> Array:
         error = rod.tip_directions(gamma) - request.direction
         cost += (request.direction_weight * np.linalg.norm(error, axis=1)) ** 2
     return cost
+
+
+class Minima(NamedTuple):
+    """Ends of searches for the least change."""
+
+    gamma: Array
+    """Activations [-], shape (n, m)."""
+    residual: Array
+    """|tip - target| [m], shape (n,)."""
+    merit: Array
+    """½|γ - near|² and the penalty of the miss, shape (n,)."""
+    proximity: Array
+    """σ of the last step, shape (n,)."""
+    penalty: Array
+    """Penalty of the miss, in 1/L: half as much again as its multiplier, shape (n,)."""
+
+
+def sqp(
+    rod: TipMap,
+    request: Request,
+    owner: Index,
+    start: Array,
+    *,
+    penalty: float = 0.0,
+    proximity: Array | float = FIRST_PROXIMITY,
+    settled: float = 1e-6,
+    most: int = 60,
+) -> Minima:
+    """Minimize ½|γ - near|² subject to tip = target and bounds, from each start.
+
+    Each step minimizes ½|x - near|² + ½σ|x - γ|² where the linearized map meets the target, inside
+    the bounds, exactly: sequential quadratic programming with a multiple of the identity for
+    the Hessian, of which σ is a secant estimate. It is taken if ½|x - near|² + penalty·|miss| falls
+    as it should; else σ grows.
+
+    Args:
+        rod: The tip map.
+        request: Targets, and what to stay near to.
+        owner: Number of the target of each start, shape (n,).
+        start: Activations to begin with, inside the bounds [-], shape (n, m).
+        penalty: Least penalty. A high one keeps a search near the target once it is there, as it
+            must where the target lies next to a fold or to the boundary of the reachable set.
+        proximity: σ of the first step, shape (n,) or one for all.
+        settled: Step at which a search ends, in ranges.
+        most: Steps.
+    """
+    # Copies: kernels are compiled once more for arrays that are read-only or not contiguous.
+    n, owner = len(start), owner.copy()
+    request = replace(request, targets=request.targets.copy(), near=request.near.copy())
+    begin = np.empty(n)
+    begin[:] = proximity
+    minima = Minima(start.copy(), np.empty(n), np.empty(n), begin, np.empty(n))
+    # Searches that end make room for others; only the last of a task run by a few.
+    share = max(_TOGETHER, -(-n // parallel.thread_count()))
+    rod.prepare()
+    search = partial(_searched, rod, request, penalty=penalty, limits=(settled, most))
+    parallel.run(
+        partial(search, owner[block], Minima(*(part[block] for part in minima)))
+        for block in parallel.blocks(n, share)
+    )
+    return minima._replace(residual=minima.residual * rod.length)
+
+
+def _searched(
+    rod: TipMap,
+    request: Request,
+    owner: Index,
+    ends: Minima,
+    penalty: float,
+    limits: tuple[float, int],
+) -> None:
+    """Run the searches that begin at `ends`, on the calling thread."""
+    box, total = rod.box, len(owner)
+    bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
+    running = _room(min(total, _TOGETHER), box.bundles)
+    tips, ahead = np.empty_like(running.miss), np.empty_like(running.slope)
+    begun = n = 0
+    while begun < total or n:
+        more = min(total - begun, len(tips) - n)
+        new, rows = slice(n, n + more), slice(begun, begun + more)
+        running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
+        running.trial[new], running.proximity[new] = ends.gamma[rows], ends.proximity[rows]
+        running.penalty[new], running.multiplier[new] = penalty, 0.0
+        running.reach[new] = LONGEST_STEP
+        n, begun = n + more, begun + more
+        rod.fill(running.trial[:n], tips[:n], ahead[:n])
+        if rod.supports_unstable:
+            lost = np.isnan(tips[:n, 0])
+            tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
+        asked = request.targets, request.near
+        n = judge(running, n, tips, ahead, owner, *asked, bounds, rod.length, limits, ends)
+        steps = (part[:n] for part in (running.center, running.slope, running.wanted))
+        limited = (part[:n] for part in (running.softness, running.low, running.high))
+        project(*steps, *limited, running.trial[:n], running.multiplier[:n])
+        next_trials(running, n, owner, request.near)
+
+
+def _room(n: int, m: int) -> Running:
+    return Running(
+        row=np.empty(n, np.int64),
+        steps=np.empty(n, np.int64),
+        slope=np.empty((n, 3, m)),
+        **{name: np.empty((n, 3)) for name in ("miss", "wanted", "multiplier")},
+        **{name: np.empty((n, m)) for name in ("gamma", "center", "low", "high", "trial")},
+        **{name: np.empty(n) for name in ("penalty", "proximity", "reach", "weight")},
+        **{name: np.empty(n) for name in ("gain", "softness")},
+    )

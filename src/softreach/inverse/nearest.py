@@ -6,49 +6,61 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.inverse.descent import Descent, Objective, descend, minimize
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, placed
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
-from softreach.workspace.search import CLOSELY, nearest_tips
+from softreach.workspace.search import CLOSELY, Nearest, nearest_tips
 
 _SEED = 1
+_BEYOND = 1e-3  # of the residual, to which a search goes on
+_MOST_STEPS = 60
 
 
 def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None) -> Nearest:
-    """The best local minimum found from seeds for each target: of distance, and of direction.
+    """The nearest tip found from seeds for each target.
 
     Args:
         prepared: The tip map.
-        request: Targets and, perhaps, directions to trade against distance.
+        request: Targets.
         known: Roots to begin from as well.
     """
     rod, targets = prepared.rod, request.targets
+    target, start = starts(prepared, targets, known)
+    ends = nearest_tips(rod, start, targets[target], request.residual, CLOSELY)
+    return nearest_at(rod, targets, ends.gamma[first_of_each(target, ends.distance, len(targets))])
+
+
+def starts(prepared: PreparedMap, targets: Array, known: Roots | None) -> tuple[Index, Array]:
+    """Seeds near each target, and known roots: numbers of targets, and activations."""
     if not len(targets):
-        return Nearest(request.near, targets, np.empty(0))
+        return np.empty(0, np.int64), np.empty((0, prepared.rod.box.bundles))
     target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
-    if known is not None:
-        target = np.concatenate([target, known.target])
-        start = np.concatenate([start, known.gamma])
-    if request.direction is None:
-        gamma, _, value = nearest_tips(rod, start, targets[target], request.residual, CLOSELY)
-    else:
-        objective = Objective(
-            rod=rod,
-            targets=targets[target],
-            direction=request.direction[target],
-            direction_weight=request.direction_weight,
-        )
-        gamma, value = minimize(objective, start, rod.box)
-    return _nearest_at(rod, targets, gamma[first_of_each(target, value, len(targets))])
+    if known is None:
+        return target, start
+    return np.concatenate([target, known.target]), np.concatenate([start, known.gamma])
 
 
 def nearest_from(rod: TipMap, request: Request, gamma: Array) -> Nearest:
     """The local minimum of distance from one activation for each target."""
     ends = nearest_tips(rod, gamma, request.targets, request.residual, CLOSELY)
-    return _nearest_at(rod, request.targets, ends.gamma)
+    return nearest_at(rod, request.targets, ends.gamma)
+
+
+def descend(
+    rod: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_STEPS
+) -> Nearest:
+    """The local minimum of distance from each start, to well within the residual.
+
+    Args:
+        rod: The tip map.
+        targets: One for each start [m], shape (n, 3).
+        start: Inside the bounds [-], shape (n, m).
+        residual: |tip - target| at which a target is reached [m].
+        most: Steps.
+    """
+    return nearest_tips(rod, start, targets, _BEYOND * residual, CLOSELY._replace(most=most))
 
 
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
@@ -66,7 +78,7 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
     """
     box, targets = prepared.rod.box, request.targets
     first = descend(prepared.rod, targets, box.clip(start), request.residual)
-    gamma, residual = first.gamma, first.residual
+    gamma, residual = first.gamma, first.distance
     rng = np.random.default_rng(_SEED)
     for effort in _EFFORTS:
         # One set for all targets, so that no answer depends on the other targets.
@@ -76,22 +88,11 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
             break
         for rows in np.array_split(left, 1 + len(left) * effort.neighbors // 100_000):
             owner, ends = _searched(prepared, request.of(rows), effort, anywhere)
-            best = first_of_each(owner, ends.residual, len(rows))
-            better = ends.residual[best] < residual[rows]
+            best = first_of_each(owner, ends.distance, len(rows))
+            better = ends.distance[best] < residual[rows]
             gamma[rows[better]] = ends.gamma[best[better]]
-            residual[rows[better]] = ends.residual[best[better]]
+            residual[rows[better]] = ends.distance[best[better]]
     return Reached(gamma, residual)
-
-
-class Nearest(NamedTuple):
-    """The nearest reachable points that were found."""
-
-    gamma: Array
-    """Activations [-], shape (t, m)."""
-    tip: Array
-    """The points [m], shape (t, 3)."""
-    gap: Array
-    """|tip - target| [m], shape (t,)."""
 
 
 class Reached(NamedTuple):
@@ -103,7 +104,8 @@ class Reached(NamedTuple):
     """|tip - target| [m], shape (t,)."""
 
 
-def _nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
+def nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
+    """Tips of the activations, to rounding, and how far they are from the targets."""
     tip = placed(rod, gamma)
     return Nearest(gamma, tip, np.linalg.norm(tip - targets, axis=1))
 
@@ -129,7 +131,7 @@ _EFFORTS = (
 
 def _searched(
     prepared: PreparedMap, request: Request, effort: _Effort, anywhere: Array
-) -> tuple[Index, Descent]:
+) -> tuple[Index, Nearest]:
     count = len(request.targets)
     owners, starts = [np.repeat(np.arange(count), len(anywhere))], [np.tile(anywhere, (count, 1))]
     for marks in (prepared.seeds, prepared.face_seeds):

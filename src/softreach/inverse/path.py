@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.descent import descend
+from softreach.inverse.nearest import descend
 from softreach.inverse.request import allowance, as_activations, as_residual, as_targets
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import free_bundles, measured_bundles, tip_map
@@ -204,9 +204,9 @@ class Continuation:
         """Nearest to the last of some places (k, 3), if all are as near as tips can tell."""
         start = np.tile(gamma, (len(targets), 1))
         ends = descend(rod, targets, start, self.residual)
-        if not (ends.residual <= self.allowance).all():
+        if not (ends.distance <= self.allowance).all():
             return None
-        return BranchPoint(ends.gamma[-1], ends.tip[-1], ends.slope[-1], rod)
+        return self.at(ends.gamma[-1], rod)
 
     def _corrected(
         self, rod: TipMap, gamma: Array, target: Array, moving: Mask

@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch
+from softreach.inverse.direction import compromises
 from softreach.inverse.least_change import least_changes
-from softreach.inverse.nearest import Nearest, nearest, nearest_from
+from softreach.inverse.nearest import nearest, nearest_from
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
 from softreach.inverse.request import (
@@ -32,6 +33,7 @@ from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_number
 from softreach.support.arrays import Array, as_directions, joined, rows
 from softreach.support.errors import Range
+from softreach.workspace.search import Nearest
 
 __all__ = ["solve_inverse"]
 
@@ -134,11 +136,11 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
-    bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
+    bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
     # A target not proved to be out of reach may have roots that are nearly singular.
-    left = (closest.gap > request.residual) & (bounds == 0.0)
+    left = (closest.distance > request.residual) & (bounds == 0.0)
     if not prepared.proves:
-        left &= closest.gap <= _NEARLY * prepared.whole.length
+        left &= closest.distance <= _NEARLY * prepared.whole.length
     if left.any():
         late = nearly_singular_roots(prepared, request, missing[left])
         late = distinct(prepared, request, late)
@@ -150,7 +152,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     """Nearest points, or compromises between distance and direction."""
     roots = every_branch(prepared, request) if prepared.dimension == 3 else None
-    closest = nearest(prepared, request, roots)
+    closest = (nearest if request.direction is None else compromises)(prepared, request, roots)
     return _solutions(prepared, request, no_roots(prepared.rod), closest)
 
 
@@ -186,8 +188,8 @@ def _solutions(
     rod, count = prepared.rod, len(request.targets)
     missing = roots.missing(count)
     if bounds is None:
-        bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
-    hit = closest.gap <= request.allowance
+        bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
+    hit = closest.distance <= request.allowance
     roots = roots.joined(roots_at(rod, request.targets, missing[hit], closest.gamma[hit]))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual
@@ -200,7 +202,7 @@ def _solutions(
     points = request.targets.copy()
     off = reached[gaps[reached] > request.residual]
     points[off] = placed(rod, gamma[off])
-    points[missing], gamma[missing], gaps[missing] = closest.tip, closest.gamma, closest.gap
+    points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
     return Solutions(
         arm=prepared.whole.arm,

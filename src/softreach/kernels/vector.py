@@ -1,7 +1,7 @@
 """Vectors in space as tuples of three numbers, which stay in registers once inlined.
 
-A matrix is a tuple of three such rows. `strict_vector` has the same functions for `strict` kernels,
-which is why none here calls another.
+A matrix is a tuple of three such rows, a rotation a unit quaternion (w, x, y, z). `strict_vector`
+has some of the functions for `strict` kernels: these call no other.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from softreach.kernels.compiler import inline
 
 __all__ = [
+    "back",
     "cofactors",
     "combination",
     "cross",
@@ -19,6 +20,7 @@ __all__ = [
     "plus",
     "row",
     "times",
+    "turned",
 ]
 
 
@@ -93,3 +95,17 @@ def cofactors(a):
         (y2 * z0 - z2 * y0, z2 * x0 - x2 * z0, x2 * y0 - y2 * x0),
         (y0 * z1 - z0 * y1, z0 * x1 - x0 * z1, x0 * y1 - y0 * x1),
     )
+
+
+@inline
+def turned(q, p):
+    """q p q*."""
+    v = q[1], q[2], q[3]
+    t = times(2.0, cross(v, p))
+    return plus(p, plus(times(q[0], t), cross(v, t)))
+
+
+@inline
+def back(q):
+    """The quaternion that turns back."""
+    return -q[0], q[1], q[2], q[3]

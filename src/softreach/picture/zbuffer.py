@@ -89,7 +89,7 @@ class ZBuffer:
             corners: Shape (n, 3 corners, 3).
             colors: RGB from 0 to 255, shape (n, 3 corners, 3).
         """
-        from softreach.kernels.points.triangle_pixels import fill_triangles  # lazily: Numba
+        from softreach.kernels.points.triangles import fill_triangles  # lazily: Numba
 
         values = np.concatenate([np.asarray(corners, float), np.asarray(colors, float)], axis=2)
         values = values[np.isfinite(values).all(axis=(1, 2))]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from softreach.export.formats import load_library
 from softreach.geometry.surface import enclosed_volume
-from softreach.kernels.points.point_distances import nearest_faces
+from softreach.kernels.points.triangles import nearest_faces
 from softreach.support import parallel
 from softreach.support.arguments import POSITIVE, as_integer, as_number, as_path
 from softreach.support.arrays import (

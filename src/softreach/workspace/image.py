@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.geometry.surface import Surface, compact_surface
-from softreach.kernels.image import contour, point_cover, raster
+from softreach.kernels.image import contour, raster
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
@@ -211,7 +211,7 @@ class Image:
         shape = self.lattice.shape[:2]
         parallel.run(
             partial(
-                point_cover.cover_at,
+                raster.cover_at,
                 *(self.vertices, self.triangles, self.unit, shape, *self._bins),
                 *(where[block], out[block]),
             )
@@ -222,7 +222,7 @@ class Image:
     @lazy
     def _bins(self) -> tuple[Index, Index]:
         shape = self.lattice.shape[:2]
-        return point_cover.bin_triangles(self.vertices, self.triangles, self.unit, shape)
+        return raster.bin_triangles(self.vertices, self.triangles, self.unit, shape)
 
     def boundary_crossings(self, axis: int) -> tuple[tuple[Index, Index, Index], Array]:
         """Places where the boundary of the image cuts the edges between cell centers along an axis.

@@ -15,7 +15,7 @@ from softreach.kernels.box.bounded_descent import (
     next_trials,
 )
 from softreach.kernels.box.box_projection import project
-from softreach.kernels.points.point_distances import claim_corners
+from softreach.kernels.image.raster import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
@@ -197,7 +197,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
         rod.fill(running.trial[:n], tips[:n], ahead[:n])
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, *bounds)
+        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
         slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
         low, high = running.low[:n], running.high[:n]
         multiplier[:n] = 0.0

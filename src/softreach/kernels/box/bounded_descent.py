@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.kernels.compiler import kernel
+from softreach.kernels.compiler import inline, kernel
 
 __all__ = ["FIRST_DAMPING", "NOWHERE", "Running", "judge", "next_trials"]
 
@@ -49,7 +49,7 @@ class Running(NamedTuple):
 
 
 @kernel
-def judge(running, n, tips, ahead, targets, ends, enough, stop, low, high, scales):  # noqa: C901
+def judge(running, n, tips, ahead, targets, ends, enough, stop, bounds):
     """Take in the trials of the first n, and set up the next steps of those that go on.
 
     Args:
@@ -62,9 +62,7 @@ def judge(running, n, tips, ahead, targets, ends, enough, stop, low, high, scale
         enough: Distance at which a search ends [m].
         stop: Gain still to be hoped for, of the distance, at which a search ends as well [-], and
             the most steps.
-        low: Lower bounds, shape (m,).
-        high: Upper bounds, shape (m,).
-        scales: Ranges of the bounds, shape (m,).
+        bounds: Lower and upper ones and their ranges, shape (m,) each.
 
     Returns:
         Number of those that go on.
@@ -102,23 +100,29 @@ def judge(running, n, tips, ahead, targets, ends, enough, stop, low, high, scale
                 best[row, a] = tips[i, a]
         if ended or distance[row] <= enough:
             continue
-        square = 0.0
-        for a in range(3):
-            running.wanted[kept, a] = targets[row, a] - best[row, a]
-            for j in range(gamma.shape[1]):
-                if better:
-                    running.slope[kept, a, j] = ahead[i, a, j] * scales[j]
-                else:
-                    running.slope[kept, a, j] = running.slope[i, a, j]
-                square += running.slope[kept, a, j] ** 2
-        for j in range(gamma.shape[1]):
-            running.low[kept, j] = (low[j] - gamma[row, j]) / scales[j]
-            running.high[kept, j] = (high[j] - gamma[row, j]) / scales[j]
+        square = _aim(running, i, kept, better, targets[row], best[row], ahead, gamma[row], bounds)
         running.row[kept], running.steps[kept] = row, running.steps[i] + 1
         running.damping[kept] = damping
         running.softness[kept] = damping * square / 3.0 + 1e-300
         kept += 1
     return kept
+
+
+@inline
+def _aim(running, i, kept, better, target, tip, ahead, gamma, bounds):
+    """Set up what the next step minimizes; the sum of the squares of its slopes."""
+    low, high, scales = bounds
+    square = 0.0
+    for a in range(3):
+        running.wanted[kept, a] = target[a] - tip[a]
+        for j in range(len(low)):
+            slope = ahead[i, a, j] * scales[j] if better else running.slope[i, a, j]
+            running.slope[kept, a, j] = slope
+            square += slope**2
+    for j in range(len(low)):
+        running.low[kept, j] = (low[j] - gamma[j]) / scales[j]
+        running.high[kept, j] = (high[j] - gamma[j]) / scales[j]
+    return square
 
 
 @kernel

@@ -74,7 +74,7 @@ class Running(NamedTuple):
 
 
 @kernel
-def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, ends):  # noqa: C901
+def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, ends):
     """Take in the trials of the first n, and set up the next steps of those that go on.
 
     Args:
@@ -93,99 +93,118 @@ def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, en
     Returns:
         Number of those that go on.
     """
-    low, high, scales = box
-    at_end, residual, merit, proximity, penalties = ends
-    settled, most = limits
-    m, kept = len(low), 0
+    kept = 0
     for i in range(n):
-        row = running.row[i]
+        row, steps = running.row[i], running.steps[i]
         target = owner[row]
-        sigma, penalty, steps = running.proximity[i], running.penalty[i], running.steps[i]
         x = (tips[i, 0] - targets[target, 0]) / length
         y = (tips[i, 1] - targets[target, 1]) / length
         z = (tips[i, 2] - targets[target, 2]) / length
         miss = math.sqrt(x * x + y * y + z * z)
-        reach = running.reach[i]
-        accepted, ended, ratio = steps == 0, steps >= most, 0.0
         if steps == 0:
-            ended = ended or miss * length >= NOWHERE
+            sigma, reach, ratio = running.proximity[i], running.reach[i], 0.0
+            accepted, ended = True, miss * length >= NOWHERE
         else:
-            weight = running.weight[i]
-            after, step, square, bend = weight * miss, 0.0, 0.0, 0.0
-            for j in range(m):
-                change = running.trial[i, j] - near[target, j]
-                after += 0.5 * change * change
-                moved = running.trial[i, j] - running.gamma[i, j]
-                step = max(step, abs(moved) / scales[j])
-                square += moved * moved
-                for a in range(3):
-                    turn = ahead[i, a, j] / length - running.slope[i, a, j]
-                    bend += running.multiplier[i, a] * turn * moved
-            gain, gained = running.gain[i], _merit(running, i, near[target], weight) - after
-            accepted = gained >= 0.1 * gain - 1e-14
-            ended = ended or step * (1.0 + sigma) < settled
-            if not accepted:
-                if weight < _RESTORING:
-                    sigma = 4.0 * max(sigma, 0.0) + 0.1
-                else:
-                    reach = 0.3 * step
-            else:
-                reach = min(LONGEST_STEP, 2.0 * reach)
-                # A minimum of the distance that is no root is approached ever more slowly.
-                stuck = gained < _PROGRESS * weight * miss and steps > _PATIENCE
-                ended = ended or (weight >= _RESTORING and stuck)
-                if weight < _RESTORING and step < _SHORT:
-                    bend = (1.0 + sigma) * bend / max(square, 1e-300)
-                    sigma = min(max(bend, _LEAST_PROXIMITY), 4.0 * max(sigma, 0.0) + 1.0)
-                    ratio = (1.0 + running.proximity[i]) / (1.0 + sigma)
-                elif gained >= 0.7 * gain:
-                    sigma = 0.4 * max(sigma, 0.0)
-                else:
-                    sigma = max(sigma, 0.0)
-            ended = ended or sigma >= _LARGEST_PROXIMITY or reach < settled
-        if accepted:
-            for j in range(m):
-                running.gamma[kept, j] = running.trial[i, j]
-                for a in range(3):
-                    running.slope[kept, a, j] = ahead[i, a, j] / length
-            running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2] = x, y, z
-        else:
-            for j in range(m):
-                running.gamma[kept, j] = running.gamma[i, j]
-                for a in range(3):
-                    running.slope[kept, a, j] = running.slope[i, a, j]
-            for a in range(3):
-                running.miss[kept, a] = running.miss[i, a]
-        if ended:
-            x, y, z = running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2]
-            for j in range(m):
-                at_end[row, j] = running.gamma[kept, j]
-            residual[row] = math.sqrt(x * x + y * y + z * z)
-            merit[row] = _merit(running, kept, near[target], _LEAST_PENALTY)
-            proximity[row], penalties[row] = sigma, penalty
+            judged = _judged(running, i, miss, ahead, near[target], box[2], length, limits[0])
+            accepted, ended, sigma, reach, ratio = judged
+        _move(running, i, kept, accepted, (x, y, z), ahead, length)
+        if ended or steps >= limits[1]:
+            _end(running, i, kept, row, near[target], sigma, ends)
             continue
         running.row[kept], running.steps[kept] = row, steps + 1
-        square = 0.0
-        running.penalty[kept], running.proximity[kept] = penalty, sigma
+        running.penalty[kept], running.proximity[kept] = running.penalty[i], sigma
         running.reach[kept] = reach
         for a in range(3):
-            running.wanted[kept, a] = -running.miss[kept, a]
-            for j in range(m):
-                slope = running.slope[kept, a, j]
-                square += slope * slope
-                running.wanted[kept, a] += slope * running.gamma[kept, j]
-        for a in range(3):
             running.multiplier[kept, a] = running.multiplier[i, a] * ratio
-        x, y, z = running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2]
-        nearby = x * x + y * y + z * z < _NEARBY * _NEARBY
-        running.softness[kept] = (_SOFTNESS_NEARBY if nearby else _SOFTNESS) * square + 1e-30
-        for j in range(m):
-            at, farthest = running.gamma[kept, j], reach * scales[j]
-            running.center[kept, j] = (near[target, j] + sigma * at) / (1.0 + sigma)
-            running.low[kept, j] = max(low[j], at - farthest)
-            running.high[kept, j] = min(high[j], at + farthest)
+        _aim(running, kept, near[target], sigma, reach, box)
         kept += 1
     return kept
+
+
+@inline
+def _judged(running, i, miss, ahead, near, scales, length, settled):
+    """Whether a trial is accepted, whether its search has ended; σ, reach and ratio of the next.
+
+    The ratio is that of the multipliers.
+    """
+    weight, sigma, reach, ratio = running.weight[i], running.proximity[i], running.reach[i], 0.0
+    after, step, square, bend = weight * miss, 0.0, 0.0, 0.0
+    for j in range(len(scales)):
+        change = running.trial[i, j] - near[j]
+        after += 0.5 * change * change
+        moved = running.trial[i, j] - running.gamma[i, j]
+        step = max(step, abs(moved) / scales[j])
+        square += moved * moved
+        for a in range(3):
+            turn = ahead[i, a, j] / length - running.slope[i, a, j]
+            bend += running.multiplier[i, a] * turn * moved
+    gain, gained = running.gain[i], _merit(running, i, near, weight) - after
+    accepted = gained >= 0.1 * gain - 1e-14
+    ended = step * (1.0 + sigma) < settled
+    if accepted:
+        reach = min(LONGEST_STEP, 2.0 * reach)
+        # A minimum of the distance that is no root is approached ever more slowly.
+        stuck = gained < _PROGRESS * weight * miss and running.steps[i] > _PATIENCE
+        ended = ended or (weight >= _RESTORING and stuck)
+        if weight < _RESTORING and step < _SHORT:
+            bend = (1.0 + sigma) * bend / max(square, 1e-300)
+            sigma = min(max(bend, _LEAST_PROXIMITY), 4.0 * max(sigma, 0.0) + 1.0)
+            ratio = (1.0 + running.proximity[i]) / (1.0 + sigma)
+        else:
+            sigma = (0.4 if gained >= 0.7 * gain else 1.0) * max(sigma, 0.0)
+    elif weight < _RESTORING:
+        sigma = 4.0 * max(sigma, 0.0) + 0.1
+    else:
+        reach = 0.3 * step
+    ended = ended or sigma >= _LARGEST_PROXIMITY or reach < settled
+    return accepted, ended, sigma, reach, ratio
+
+
+@inline
+def _move(running, i, kept, accepted, miss, ahead, length):
+    """Put search i, at its trial if that is accepted, into place `kept`."""
+    for j in range(running.gamma.shape[1]):
+        running.gamma[kept, j] = running.trial[i, j] if accepted else running.gamma[i, j]
+        for a in range(3):
+            slope = ahead[i, a, j] / length if accepted else running.slope[i, a, j]
+            running.slope[kept, a, j] = slope
+    x, y, z = running.miss[i, 0], running.miss[i, 1], running.miss[i, 2]
+    if accepted:
+        x, y, z = miss
+    running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2] = x, y, z
+
+
+@inline
+def _end(running, i, kept, row, near, sigma, ends):
+    """Write where a search ended."""
+    gamma, residual, merit, proximity, penalties = ends
+    x, y, z = running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2]
+    for j in range(gamma.shape[1]):
+        gamma[row, j] = running.gamma[kept, j]
+    residual[row] = math.sqrt(x * x + y * y + z * z)
+    merit[row] = _merit(running, kept, near, _LEAST_PENALTY)
+    proximity[row], penalties[row] = sigma, running.penalty[i]
+
+
+@inline
+def _aim(running, kept, near, sigma, reach, box):
+    """Set up what the next step minimizes, and the linearized target."""
+    low, high, scales = box
+    square = 0.0
+    for a in range(3):
+        running.wanted[kept, a] = -running.miss[kept, a]
+        for j in range(len(low)):
+            slope = running.slope[kept, a, j]
+            square += slope * slope
+            running.wanted[kept, a] += slope * running.gamma[kept, j]
+    x, y, z = running.miss[kept, 0], running.miss[kept, 1], running.miss[kept, 2]
+    nearby = x * x + y * y + z * z < _NEARBY * _NEARBY
+    running.softness[kept] = (_SOFTNESS_NEARBY if nearby else _SOFTNESS) * square + 1e-30
+    for j in range(len(low)):
+        at, farthest = running.gamma[kept, j], reach * scales[j]
+        running.center[kept, j] = (near[j] + sigma * at) / (1.0 + sigma)
+        running.low[kept, j] = max(low[j], at - farthest)
+        running.high[kept, j] = min(high[j], at + farthest)
 
 
 @inline

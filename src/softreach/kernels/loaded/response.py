@@ -32,8 +32,7 @@ from softreach.kernels.loaded.unloaded_frames import (
     rest_frames,
 )
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
-from softreach.kernels.quaternion import back, turned
-from softreach.kernels.vector import combination, cross, plus, times
+from softreach.kernels.vector import back, combination, cross, plus, times, turned
 
 __all__ = ["TRACE", "respond"]
 

@@ -51,8 +51,7 @@ from softreach.kernels.loaded.section import (
 from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, rest_frames
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
-from softreach.kernels.quaternion import back, turned
-from softreach.kernels.vector import combination, cross, dot, plus
+from softreach.kernels.vector import back, combination, cross, dot, plus, turned
 
 __all__ = ["FOUND", "base_directions", "node_world", "solve_directions", "solve_frames"]
 

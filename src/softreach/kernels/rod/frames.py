@@ -1,4 +1,7 @@
-"""Whole configurations: frames along the rod, walked from base to tip, theory (26)."""
+"""Whole configurations: frames along the rod, walked from base to tip, theory (26).
+
+And what turns them into the world, and the largest strains of many cells.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,8 @@ from softreach.kernels.rod.tips import BEND_ROWS
 from softreach.kernels.rod.twist import act, exp_coefficients
 from softreach.kernels.vector import combination, cross
 
-__all__ = ["frames"]
+__all__ = ["frames", "relative_strains"]
+
 
 _BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)
 # typed: a literal would compile the function of a node once more
@@ -130,3 +134,46 @@ def turn(vectors, rotation):
                 for axis in range(3):
                     turned = rotation[axis, 0] * x + rotation[axis, 1] * y
                     vectors[i, row + axis, j] = turned + rotation[axis, 2] * z
+
+
+_TOGETHER = 64  # cells, so that the loop over them is innermost and short
+
+
+@kernel
+def relative_strains(centers, offset, stretch, curvature, longest, bending):
+    """Write the largest relative extension and squared bending along the arm for each cell.
+
+    Args:
+        centers: Activations, shape (n, m).
+        offset: Extension of a cell around zero, at every station, shape (station,).
+        stretch: Its change with each activation, shape (station, m).
+        curvature: Of each activation, shape (station, 3, m).
+        longest: Result, largest offset + Σ stretch γ, shape (n,).
+        bending: Result, largest |Σ curvature γ|², shape (n,).
+    """
+    count, bundles = centers.shape
+    gamma = np.zeros((bundles, _TOGETHER))
+    extension, square, part = np.empty(_TOGETHER), np.empty(_TOGETHER), np.empty(_TOGETHER)
+    for first in range(0, count, _TOGETHER):
+        size = min(_TOGETHER, count - first)
+        for i in range(size):
+            gamma[:, i] = centers[first + i]
+            longest[first + i] = bending[first + i] = 0.0
+        for s in range(len(offset)):
+            extension[:] = offset[s]
+            _add_products(stretch[s], gamma, extension)
+            square[:] = 0.0
+            for k in range(3):
+                part[:] = 0.0
+                _add_products(curvature[s, k], gamma, part)
+                square += part * part
+            for i in range(size):
+                longest[first + i] = max(longest[first + i], extension[i])
+                bending[first + i] = max(bending[first + i], square[i])
+
+
+@inline
+def _add_products(factors, gamma, out):
+    for j in range(len(factors)):
+        for i in range(_TOGETHER):
+            out[i] += factors[j] * gamma[j, i]

@@ -1,4 +1,4 @@
-"""From starts to targets, or to compromises with a direction, for many starts at a time."""
+"""A wanted direction of the tip: compromises with position and change, by Newton in the box."""
 
 from __future__ import annotations
 
@@ -8,73 +8,96 @@ from typing import NamedTuple
 
 import numpy as np
 
+from softreach.inverse.nearest import descend, first_of_each, nearest_at, starts
+from softreach.inverse.prepared import PreparedMap
+from softreach.inverse.request import Request
+from softreach.inverse.roots import Roots
 from softreach.kernels.box.box_newton import box_steps
-from softreach.rod.activation_box import ActivationBox, damped_steps
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.support.arrays import Array, Index, Mask
-
-_FEW = BLOCK // 8
-_MOST_ITERATIONS = 60
-_FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-8, 1e8
-_STALLED = 1e-12  # step, in ranges, at which a search has found a minimum that is no root
+from softreach.workspace.search import Nearest
 
 Evaluate = Callable[[Index, Array], tuple[Array, Array]]
 """(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
 
+_FEW = BLOCK // 8
 _MOST_NEWTON_STEPS = 80
 _DIFFERENCE = 1e-6  # step of the differences of gradients, in ranges
 _STEP_TOL = 1e-10  # step at which a search has converged, in ranges
 _VALUE_TOL = 1e-14  # relative increase of a value that is rounding
-_LARGEST_NEWTON_DAMPING = 1e8  # at which a search stagnates
+_LARGEST_DAMPING = 1e8  # at which a search stagnates
+
+_PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
+"""Rising; with a lower first one a small miss would buy a large change of activation."""
 
 
-def descend(
-    rod: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_ITERATIONS
-) -> Descent:
-    """Levenberg's method: each step solves min |r + J d - p|² + μ |d|² inside the bounds exactly.
+def compromises(prepared: PreparedMap, request: Request, known: Roots | None = None) -> Nearest:
+    """The least |tip - target|²/L² + w² |d3 - direction|² found from seeds for each target.
 
-    μ falls with the residual, which keeps convergence quadratic at regular roots and linear at
-    singular ones.
+    Args:
+        prepared: The tip map.
+        request: Targets, and directions to trade against distance.
+        known: Roots to begin from as well.
+    """
+    rod, targets = prepared.rod, request.targets
+    assert request.direction is not None
+    target, start = starts(prepared, targets, known)
+    objective = Objective(
+        rod=rod,
+        targets=targets[target],
+        direction=request.direction[target],
+        direction_weight=request.direction_weight,
+    )
+    gamma, value = minimize(objective, start, rod.box)
+    return nearest_at(rod, targets, gamma[first_of_each(target, value, len(targets))])
+
+
+def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
+    """Minimize ½|γ - near|² + ½ w²|d3 - direction|² subject to tip = target, from each start.
+
+    Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], whose inner searches respect the
+    bounds, then descent to the target.
 
     Args:
         rod: The tip map.
-        targets: One for each start [m], shape (n, 3).
-        start: Inside the bounds [-], shape (n, m).
-        residual: At which a search ends [m].
-        most: Iterations.
+        request: A target for each start, and what is preferred.
+        start: Activations to begin with [-], shape (n, m).
+
+    Returns:
+        Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
     """
-    scales = rod.box.scales
-    tip, slope = linearized(rod, start)
-    away = np.linalg.norm(tip - targets, axis=1)
-    # A start without a tip leads nowhere, and a step to a place without one fails.
-    ends = Descent(start.copy(), tip, slope, np.where(np.isnan(away), np.inf, away))
-    damping, floor = np.full(len(start), _FIRST_DAMPING), 1e-3 * residual
-    active = np.flatnonzero((ends.residual > floor) & (ends.residual < np.inf))
-    stay = np.zeros(len(start), np.int64)
-    for _ in range(most):
-        if not len(active):
+    gamma, multiplier = start.copy(), _multipliers(rod, request, start)
+    residual = np.full(len(start), np.inf)
+    for penalty in _PENALTIES:
+        rows = np.flatnonzero(residual > 0.1 * request.residual)
+        if not len(rows):
             break
-        goal, gamma = targets[active], ends.gamma[active]
-        gap, slope = (ends.tip[active] - goal) / rod.length, ends.slope[active] / rod.length
-        softness = damping[active] * ends.residual[active] / rod.length
-        trial = damped_steps(rod.box, gamma, gap, slope, softness)[0]
-        tip, slope = linearized(rod, trial)
-        miss = np.linalg.norm(tip - goal, axis=1)
-        better = miss < ends.residual[active]
-        taken = active[better]
-        gain = 1.0 - miss[better] / ends.residual[taken]
-        ends.gamma[taken], ends.tip[taken] = trial[better], tip[better]
-        ends.slope[taken], ends.residual[taken] = slope[better], miss[better]
-        damping[active] *= np.where(better, 0.2, 8.0)
-        damping[taken] = np.maximum(damping[taken], _LEAST_DAMPING)
-        # A minimum of the distance that is no root is approached ever more slowly.
-        stay[taken] = np.where(gain < 1e-3, stay[taken] + 1, 0)
-        still = (np.abs(trial - gamma) / scales).max(axis=1) <= _STALLED
-        reached = ends.residual[active] <= residual
-        end = (ends.residual[active] <= floor) | (reached & ~better) | still
-        end |= (damping[active] > _LARGEST_DAMPING) | (stay[active] > 4)
-        active = active[~end]
-    return ends
+        part = request.of(rows)
+        assert part.direction is not None
+        lagrangian = Objective(
+            rod=rod,
+            targets=part.targets,
+            penalty=penalty,
+            multiplier=multiplier[rows],
+            near=part.near,
+            direction=part.direction,
+            direction_weight=part.direction_weight,
+        )
+        gamma[rows] = minimize(lagrangian, gamma[rows], rod.box)[0]
+        error = (linearized(rod, gamma[rows])[0] - part.targets) / rod.length
+        multiplier[rows] += penalty * error  # theory (40)
+        residual[rows] = np.linalg.norm(error, axis=1) * rod.length
+    ends = descend(rod, request.targets, gamma, request.residual)
+    return ends.gamma, ends.distance
+
+
+def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:
+    """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
+    slopes = linearized(rod, gamma)[1] / rod.length
+    slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
+    inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
+    return -np.einsum("nij,nj->ni", inverse, gamma - request.near)
 
 
 def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Array, Array]:
@@ -108,7 +131,7 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Arra
         value[taken], gradient[taken], hessian[taken] = (part[accepted] for part in ahead)
         eased = np.where(damped > 1e-6, 0.1 * damped, 0.0)
         damping[active] = np.where(accepted, eased, np.maximum(10 * damped, 1e-3))
-        active = active[~still & (damping[active] < _LARGEST_NEWTON_DAMPING)]
+        active = active[~still & (damping[active] < _LARGEST_DAMPING)]
     return gamma, value
 
 
@@ -166,19 +189,6 @@ def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
     tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, gamma.shape[1]))
     rod.fill(np.ascontiguousarray(gamma), tips, slopes)
     return tips, slopes
-
-
-class Descent(NamedTuple):
-    """Ends of searches."""
-
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    tip: Array
-    """Their tips [m], shape (n, 3)."""
-    slope: Array
-    """∂r/∂γ there [m], shape (n, 3, m)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
 
 
 class _Expansion(NamedTuple):
