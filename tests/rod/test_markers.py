@@ -71,9 +71,11 @@ def test_one_activation_and_bundles_that_are_held_have_markers_too():
 
 def test_pictures_have_markers_where_they_are():
     straight = marker_positions(ARM, np.zeros(3))[0]
-    np.testing.assert_allclose(marker_points(ARM, rest_configuration(ARM)), straight, atol=1e-12)
+    np.testing.assert_allclose(
+        marker_points(ARM.markers, rest_configuration(ARM)), straight, atol=1e-12
+    )
     shape = sr.configuration(ARM, GAMMA[0], 401)
-    np.testing.assert_allclose(marker_points(ARM, shape), shape.marker_position, atol=1e-6)
+    np.testing.assert_allclose(marker_points(ARM.markers, shape), shape.marker_position, atol=1e-6)
 
 
 def test_files_and_parameters_hold_markers():

@@ -25,7 +25,7 @@ def test_the_error_falls_with_the_sixth_power_of_the_steps(taper):
 
     def tips(steps):
         out = np.empty((len(gamma), 3))
-        rod.tips(rule.packed_nodes(steps), gamma, out)
+        rod.tips(rule.packed(rule.edges(steps)), gamma, out)
         return out
 
     exact, steps = tips(256), [16, 20, 24, 28, 32]
@@ -71,7 +71,8 @@ def test_the_size_of_an_arm_does_not_change_its_steps(arm, factor):
 def test_a_grid_with_given_stations_has_no_longer_steps(arm):
     rule = FreeRod(arm).rule
     stations = arm.length * np.array([0.0, 0.11, 0.11, 0.5, 0.93])
-    nodes, ends = rule.station_nodes(stations, 7)
+    edges = rule.edges(7, stations)
+    nodes, ends = rule.nodes(edges), rule.packed_stations(stations, 7)[1]
     reached = [nodes.measure[:end].sum(axis=0) @ [5 / 18, 8 / 18, 5 / 18] for end in ends]
     np.testing.assert_allclose(reached, stations, atol=1e-6 * arm.length)  # Gauss's rule
     assert len(nodes.measure) == ends[-1]
@@ -112,7 +113,7 @@ def families(bundles, seed):
 def tip_error(arm, tol):
     """(activations) -> distances [L] from the tips with four times as many steps."""
     found = FreeRod(arm, tol)
-    exact = found.rule.packed_nodes(4 * found.steps + 16)
+    exact = found.rule.packed(found.rule.edges(4 * found.steps + 16))
 
     def error(gamma):
         truth = np.empty((len(gamma), 3))

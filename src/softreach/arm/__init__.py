@@ -16,13 +16,13 @@ from softreach.arm.actuators import (
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
+from softreach.arm.body import RestShape
 from softreach.arm.drives import Drive
 from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material, material_names, named_material
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
-from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Layer, Measured, Ring, Section, Stiffness
 from softreach.arm.stations import Marker, RigidPiece
 

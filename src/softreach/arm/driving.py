@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon, Tendon
+from softreach.arm.body import STRAIGHT, RestStrains
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.rest_shape import STRAIGHT, RestStrains
 from softreach.arm.tables import ends_over, range_of_extension, strain_stations, tables
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.support.errors import Fault, InvalidDesign

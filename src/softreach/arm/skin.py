@@ -6,15 +6,16 @@ lumens tubes of their radius. They are cut where they begin and end to act.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.body import Body
+from softreach.arm.stations import Marker
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
@@ -24,9 +25,6 @@ from softreach.support.palette import BODY, bundle_color
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.arm.manipulator import Manipulator
-
-    Shape = xr.Dataset | "Centerline"
 
 __all__ = [
     "Centerline",
@@ -118,6 +116,9 @@ class Centerline:
         d1 = _unit(d1)
         d2 = _unit(_across(d2, d1))
         return middle, np.stack([d1, d2, np.cross(d1, d2)], axis=1)
+
+
+Shape: TypeAlias = "xr.Dataset | Centerline"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -244,11 +245,11 @@ def bundle_surfaces(arm: Body, shape: Shape, thickness: float = 0.04) -> list[Su
     return _skins(arm, _drawn_line(arm, shape), sector)
 
 
-def marker_points(arm: Manipulator, shape: Shape) -> Array:
-    """Places of the markers of an arm, between the stations of a configuration for pictures.
+def marker_points(markers: Sequence[Marker], shape: Shape) -> Array:
+    """Places of markers, between the stations of a configuration for pictures.
 
     Args:
-        arm: The design.
+        markers: Those of the arm.
         shape: As for `arm_surface`, from the base to the tip.
 
     Returns:
@@ -257,12 +258,13 @@ def marker_points(arm: Manipulator, shape: Shape) -> Array:
     Raises:
         InvalidInput: Several configurations.
     """
-    if not arm.markers:
+    if not markers:
         return np.empty((0, 3))
-    stations = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
-    line = Centerline.of(shape).with_stations(np.unique(stations))
+    line = Centerline.of(shape)
+    stations = np.array([marker.station_at("station", line.z[-1]) for marker in markers])
+    line = line.with_stations(np.unique(stations))
     section = np.abs(line.z - stations[:, None]).argmin(axis=1)
-    offsets = np.array([marker.offset for marker in arm.markers])
+    offsets = np.array([marker.offset for marker in markers])
     return line.position[section] + np.einsum("mk,mkx->mx", offsets, line.directors[section])
 
 

@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
-from softreach.arm.body import Body
+from softreach.arm.body import Body, RestStrains
 from softreach.arm.number import fields_of
-from softreach.arm.rest_shape import RestStrains
 from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [

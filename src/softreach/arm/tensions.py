@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon
-from softreach.arm.body import Body
-from softreach.arm.rest_shape import RestStrains
+from softreach.arm.body import Body, RestStrains
 from softreach.arm.tables import quadrature, tables
 from softreach.support.lazy import lazy
 

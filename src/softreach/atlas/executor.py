@@ -32,7 +32,7 @@ from softreach.rod.tip_map import no_equilibrium_message
 from softreach.support import parallel
 from softreach.support.arguments import as_given
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
+from softreach.support.errors import InvalidInput, NotPossible, SoftreachError, no_warnings
 from softreach.support.files.stores import StoreFailed
 from softreach.support.interruption import check_stopped
 
@@ -132,7 +132,7 @@ def _run_in_pool(
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 on_outcome(_outcome(future, store, pending.pop(future)))
     except BrokenExecutor as error:
-        raise SoftreachError(
+        raise NotPossible(
             "a worker died and broke its executor; what is done is safe, and the same call with "
             "a new executor continues"
         ) from error

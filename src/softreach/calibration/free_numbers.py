@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.base import Base, rotation_matrices
+from softreach.arm.body import RestShape
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import (
     Parameter,
@@ -21,7 +22,6 @@ from softreach.arm.parameters import (
     parts,
     with_values,
 )
-from softreach.arm.rest_shape import RestShape
 from softreach.support.arguments import as_mapping, as_names, plain
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, Range

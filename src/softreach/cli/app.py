@@ -14,7 +14,7 @@ from typing import Annotated, Any, cast
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from softreach.cli.console import HelpConsole, console
-from softreach.support.errors import NotWritten, SoftreachError, check_date
+from softreach.support.errors import NotPossible, NotWritten, SoftreachError, check_date
 from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
@@ -120,7 +120,7 @@ def _start(
     ] = None,
 ) -> int | None:
     if quiet and verbose:
-        raise SoftreachError("choose --quiet or --verbose")
+        raise NotPossible("choose --quiet or --verbose")
     console.set(quiet=quiet, verbose=verbose)
     with importing(imports or ()):
         return app(words, result_action="return_value")

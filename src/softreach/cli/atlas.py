@@ -22,7 +22,7 @@ from softreach.cli.options import (
     refuse,
 )
 from softreach.cli.values import Whole, as_read, pairs_in
-from softreach.support.errors import InvalidInput, MissingExtra, SoftreachError
+from softreach.support.errors import InvalidInput, MissingExtra, NotPossible
 from softreach.support.quantity import numbers_in
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ def _space_of(
     from softreach.support.files.text import read_text
 
     if (path is None) == (vary is None):
-        raise SoftreachError("give either --vary or --space")
+        raise NotPossible("give either --vary or --space")
     if path is not None:
         refuse(_NAMED_IN_FILE, design=design, **changes.given)
         return parse_space(read_text("space", path, LONGEST), design_from)

@@ -12,7 +12,7 @@ from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output, refuse
 from softreach.cli.values import to_degrees
-from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
+from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -53,7 +53,7 @@ def design(
         console.json(json_schema(), indent=2)
         return
     if design is None:
-        raise SoftreachError("give a design file or a built-in design, or use --schema")
+        raise NotPossible("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
         arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)

@@ -14,7 +14,7 @@ from softreach.cli.changes import Changes, design_from, say_limits
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, check_unit
 from softreach.cli.values import Whole
-from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in
 from softreach.support.units import TYPED, read_length
@@ -108,7 +108,7 @@ def refuse(where: str, **options: object) -> None:
     """Refuse options that would be ignored there, such as "without --out", if any is given."""
     for name, value in options.items():
         if value is not None and value is not False:
-            raise SoftreachError(f"--{name.replace('_', '-')} has no effect {where}")
+            raise NotPossible(f"--{name.replace('_', '-')} has no effect {where}")
 
 
 def is_stored(source: str) -> bool:

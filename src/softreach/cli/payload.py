@@ -7,7 +7,7 @@ from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_picture
 from softreach.cli.values import Number
-from softreach.support.errors import SoftreachError
+from softreach.support.errors import NotPossible
 
 
 def payload(
@@ -43,7 +43,7 @@ def payload(
     lengths = Lengths.of(arm, unit)
     check_picture(out, overwrite)
     if arm.loads is None:
-        raise SoftreachError("this design has no loads; add --gravity down")
+        raise NotPossible("this design has no loads; add --gravity down")
     masses = None if payloads is None else [read_mass("payloads", m) for m in payloads.split(",")]
     with progress.bar("computing volumes", None) as step:
         curve = payload_curve(arm, masses, accuracy=accuracy, progress=step)

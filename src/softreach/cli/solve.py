@@ -10,7 +10,7 @@ from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
 from softreach.cli.options import AsJson, Design, Unit, points_in, refuse
 from softreach.cli.values import Whole, activation_text
-from softreach.support.errors import SoftreachError
+from softreach.support.errors import NotPossible
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -48,7 +48,7 @@ def solve(
     from softreach.inverse.request import length_in, position_in
 
     if (target is None) == (targets is None):
-        raise SoftreachError("give either --target or --targets")
+        raise NotPossible("give either --target or --targets")
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:

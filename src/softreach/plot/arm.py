@@ -113,7 +113,7 @@ def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
         skins = bundle_skins(arm, shape)
         surfaces += [skin for k, skin in enumerate(skins) if out[:, k].any()]
     points = [surface.vertices for surface in surfaces]
-    return unit.of(np.concatenate([*points, marker_points(arm, shape)]))
+    return unit.of(np.concatenate([*points, marker_points(arm.markers, shape)]))
 
 
 def draw_arms(
@@ -132,7 +132,9 @@ def draw_arms(
 def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
     """Small dots where the markers of all shapes are."""
     if arm.markers and shapes:
-        panel.dot(np.concatenate([marker_points(arm, shape) for shape in shapes]), 1.0 - fade)
+        panel.dot(
+            np.concatenate([marker_points(arm.markers, shape) for shape in shapes]), 1.0 - fade
+        )
 
 
 def arm_images(

@@ -240,7 +240,7 @@ class Scene:
             tint = _faded(bundle_color(index), fade)
             self._add_skin(name, skin.vertices, skin.faces, tint)
         if arm.markers:
-            dots = Dots(self.unit.of(marker_points(arm, shape)))
+            dots = Dots(self.unit.of(marker_points(arm.markers, shape)))
             size = _MARKER * float(self.unit.of(arm.length))
             self.parts.append(PagePart(name, dots, size=size, through=True))
 

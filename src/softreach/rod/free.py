@@ -165,9 +165,8 @@ class FreeRod(ArmRod):
 
     @lazy
     def _table(self) -> Array:
-        if self.end == self.length:
-            return self.rule.packed_nodes(self._fineness)
-        return self.rule.packed_stations(np.array([self.end]), self._fineness)[0]
+        stations = None if self.end == self.length else np.array([self.end])
+        return self.rule.packed(self.rule.edges(self._fineness, stations))
 
     def _prepare(self) -> None:
         self._table  # noqa: B018

@@ -29,7 +29,7 @@ _OF_LENGTHS = 0.03
 class Inputs:
     """The map γ(x), γ = γ(offset + scale ∘ x)."""
 
-    whole: ActivationBox
+    own_box: ActivationBox
     """Bounds of all inputs, each in its own unit."""
     driving: Driving | None
     """The drives, lengths and shape at rest of an arm; None if inputs are activations."""
@@ -39,9 +39,9 @@ class Inputs:
     """The inputs that x has; the others are fixed at their lower bounds."""
 
     @classmethod
-    def of(cls, whole: ActivationBox, driving: Driving | None = None) -> Inputs:
+    def of(cls, own_box: ActivationBox, driving: Driving | None = None) -> Inputs:
         """All inputs in their own units."""
-        return cls(whole, driving, (1.0,) * whole.bundles, tuple(range(whole.bundles)))
+        return cls(own_box, driving, (1.0,) * own_box.bundles, tuple(range(own_box.bundles)))
 
     @classmethod
     def of_drives(cls, arm: Manipulator, tol: float) -> Inputs:
@@ -65,7 +65,7 @@ class Inputs:
         """Inputs that begin beyond the dead zones of drives."""
         assert self.driving is not None
         driving = replace(self.driving, is_effective=True)
-        return replace(self, whole=_bounds(driving), driving=driving)
+        return replace(self, own_box=_bounds(driving), driving=driving)
 
     def only(self, columns: Sequence[int]) -> Inputs:
         """Those of some columns of x; the others are fixed at their lower bounds."""
@@ -75,7 +75,7 @@ class Inputs:
         """The same in `activation_measures`."""
         measures, names = activation_measures(arm), arm.input_names
         return replace(
-            self, scale=tuple(float(measures[names.index(name)]) for name in self.whole.names)
+            self, scale=tuple(float(measures[names.index(name)]) for name in self.own_box.names)
         )
 
     def continued_from(self, activation: Array) -> Inputs:
@@ -89,9 +89,9 @@ class Inputs:
     def box(self) -> ActivationBox:
         """Bounds of x."""
         if self.is_plain:
-            return self.whole
-        ends = np.stack([self.whole.low, self.whole.high], axis=1)[self._columns]
-        names = [self.whole.names[j] for j in self.free]
+            return self.own_box
+        ends = np.stack([self.own_box.low, self.own_box.high], axis=1)[self._columns]
+        names = [self.own_box.names[j] for j in self.free]
         return ActivationBox.between(ends / self.measures[:, None], names)
 
     @lazy
@@ -124,7 +124,7 @@ class Inputs:
         """All inputs in their own units, at checked x (n, bundles)."""
         if self.is_plain:
             return x
-        inputs = np.tile(self.whole.low, (len(x), 1))
+        inputs = np.tile(self.own_box.low, (len(x), 1))
         inputs[:, self._columns] = x * self.measures
         return inputs
 

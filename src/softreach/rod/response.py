@@ -96,7 +96,7 @@ class Response:
     turns: Array
     """θ of the section [rad], likewise."""
     works: Array
-    """Work of the measures, shape (n, work, column)."""
+    """Work of the unit_loads, shape (n, work, column)."""
 
 
 def _places(arm: Manipulator, stations: Array, moving_ends: bool) -> Array:
@@ -255,7 +255,7 @@ def linear_response(
     table: NodeTables,
     state: RodState,
     changes: list[NodeTables],
-    measures: Array | None = None,
+    unit_loads: Array | None = None,
 ) -> Response:
     """Movements of equilibria per unit of each activation and of each change of the tables.
 
@@ -263,25 +263,25 @@ def linear_response(
         table: Tables of the inner arm at the nodes.
         state: Its equilibria.
         changes: Changes of the tables, one for each column after those of the activations.
-        measures: M and N at the nodes whose work is asked for, shape (step, 3, 4, work).
+        unit_loads: M and N at the nodes whose work is asked for, shape (step, 3, 4, work).
     """
     n, bundles = state.gamma.shape
-    if measures is None:
-        measures = np.zeros((*table.length.shape, 4, 0))
-    measures = np.ascontiguousarray(measures)
+    if unit_loads is None:
+        unit_loads = np.zeros((*table.length.shape, 4, 0))
+    unit_loads = np.ascontiguousarray(unit_loads)
     change = _at_rest_and_per_activation(table, changes)
     lever = np.einsum("c,nca->na", table.lever, state.tip_directors)
     tipping = _tipping(table, state, changes)
     marks = np.searchsorted(table.stations[:, 1], np.sort(table.asked))
     asked, columns = len(table.asked), bundles + len(changes)
     moves, turns = np.zeros((2, n, asked, 3, columns))
-    works = np.zeros((n, measures.shape[-1], columns))
+    works = np.zeros((n, unit_loads.shape[-1], columns))
 
     def fill(rows: slice) -> None:
         for k in range(rows.start, rows.stop):
             answers = moves[k], turns[k], works[k]
             per_arm = _per_arm(table, change, state.gamma[k], state.directors[k], state.moment[k])
-            given = measures, lever[k], table.weight, tipping[k], marks
+            given = unit_loads, lever[k], table.weight, tipping[k], marks
             respond(*per_arm, *given, *answers)
 
     parallel.run(partial(fill, block) for block in parallel.blocks(n, _TOGETHER))

@@ -345,7 +345,7 @@ def all_inputs(rod: TipMap) -> ArmMap:
     known = tip_map(rod)
     if known.inputs.is_plain:
         return known
-    return replace(known, inputs=Inputs.of(known.inputs.whole, known.inputs.driving))
+    return replace(known, inputs=Inputs.of(known.inputs.own_box, known.inputs.driving))
 
 
 def with_unstable(rod: TipMap) -> ArmMap:

@@ -69,15 +69,20 @@ class StepRule:
     arm: Manipulator
     box: ActivationBox
 
-    def edges(self, steps: int) -> Array:
-        """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones."""
-        return edges_between(self.arm.profile, self._marks(steps), steps)
+    def edges(self, steps: int, stations: Array | None = None) -> Array:
+        """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones.
 
-    def _marks(self, steps: int) -> Array:
-        """S at the base, at every breakpoint where a step ends and at the tip."""
+        Args:
+            steps: Uniform steps along the whole arm, if nothing breaks it.
+            stations: Z [m] where steps end too, ascending; the last one then stands for the tip.
+        """
         profile = self.arm.profile
         inside = profile.slender_coordinate(np.array(ends_of_steps(self.arm, steps)))
-        return np.array([0.0, *inside, profile.slender_length])
+        marks = np.array([0.0, *inside, profile.slender_length])
+        if stations is not None:
+            s = profile.slender_coordinate(stations)
+            marks = np.unique(np.concatenate([marks[marks < s[-1]], s]))
+        return edges_between(profile, marks, steps)
 
     def nodes(self, edges: ArrayLike) -> Nodes:
         """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
@@ -97,11 +102,8 @@ class StepRule:
             table.curvature.reshape(*s.shape, 3, self.arm.bundles),
         )
 
-    def packed_nodes(self, steps: int) -> Array:
-        """Packed tables of the steps from base to tip, read-only."""
-        return self._packed(self.edges(steps))
-
-    def _packed(self, edges: Array) -> Array:
+    def packed(self, edges: Array) -> Array:
+        """Packed tables of the steps between edges, read-only."""
         return read_only(rod.pack(*self.nodes(edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
@@ -109,24 +111,13 @@ class StepRule:
         edges = self.edges(steps)
         middles = 0.5 * (edges[:-1] + edges[1:])
         halved = np.append(np.column_stack([edges[:-1], middles]).ravel(), edges[-1])
-        return self._packed(edges), self._packed(halved)
-
-    def station_nodes(self, stations: Array, steps: int) -> tuple[Nodes, NDArray[np.int64]]:
-        """Nodes of a grid with a step boundary at every station, and the steps up to each.
-
-        No step is longer in S than those of `steps` uniform ones, so their tolerance holds.
-        """
-        s = self.arm.profile.slender_coordinate(stations)
-        inside = self._marks(steps)
-        marks = np.unique(np.concatenate([inside[inside < s[-1]], s]))
-        profile = self.arm.profile
-        ends = np.cumsum(np.append(0, step_counts(profile, np.diff(marks), steps)))
-        return self.nodes(edges_between(profile, marks, steps)), ends[np.searchsorted(marks, s)]
+        return self.packed(edges), self.packed(halved)
 
     def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
-        """`station_nodes` as a packed table, read-only."""
-        nodes, ends = self.station_nodes(stations, steps)
-        return read_only(rod.pack(*nodes)), ends
+        """Packed tables of steps that end at every station Z [m], and the steps up to each."""
+        edges = self.edges(steps, stations)
+        ends = np.searchsorted(edges, self.arm.profile.slender_coordinate(stations))
+        return self.packed(edges), ends
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
@@ -152,10 +143,10 @@ class StepRule:
         exact = self._fewest(tol, halving, MOST_TURN_OF_STEP, at_all)
         if not at_all:
             return exact
-        fine = self.packed_nodes(exact)
+        fine = self.packed(self.edges(exact))
 
         def from_fine(steps: int) -> Differences:
-            return _tips_apart(self.packed_nodes(steps), fine)
+            return _tips_apart(self.packed(self.edges(steps)), fine)
 
         return self._search(tol, from_fine, MOST_TURN_OF_STEP, 0, at_all - 1) or exact
 
@@ -276,14 +267,11 @@ def edges_between(profile: Profile, marks: Array, steps: int) -> Array:
         steps: Uniform steps along the whole arm.
     """
     gaps = np.diff(marks)
-    pieces = zip(marks[:-1], gaps, step_counts(profile, gaps, steps), strict=True)
+    # A gap that only rounding makes longer takes no more steps for it.
+    counts = np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(int)
+    pieces = zip(marks[:-1], gaps, counts, strict=True)
     edges = [start + gap * np.arange(n) / n for start, gap, n in pieces]
     return np.concatenate([*edges, marks[-1:]])
-
-
-def step_counts(profile: Profile, gaps: Array, steps: int) -> NDArray[np.int64]:
-    """Steps in each gap of S; a gap that only rounding makes longer takes no more for it."""
-    return np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(np.int64)
 
 
 def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:

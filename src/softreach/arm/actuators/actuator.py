@@ -182,7 +182,7 @@ class Actuator(Span, ABC):
         """Places of the bundles at stations Z [m]."""
 
     @property
-    def course(self) -> str:
+    def fiber_direction(self) -> str:
         """Direction of contraction within a bundle, for pictures.
 
         "along" it, "right-handed" or "left-handed" across it, or "radial".

@@ -25,12 +25,12 @@ from softreach.arm.actuators import (
     Tendon,
 )
 from softreach.arm.base import Base
+from softreach.arm.body import RestShape
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number, fields_of, unit_suffix
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
-from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Measured, Ring, Section
 from softreach.arm.stations import Marker, RigidPiece
 from softreach.support import plugins

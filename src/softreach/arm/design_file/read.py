@@ -16,7 +16,7 @@ from softreach.arm.actuators import Actuator
 from softreach.arm.actuators.actuator import MOST_BUNDLES
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
-from softreach.arm.body import named_actuators
+from softreach.arm.body import RestShape, named_actuators
 from softreach.arm.design_file.keys import (
     KINDS,
     Key,
@@ -37,7 +37,6 @@ from softreach.arm.material import LIBRARY_HINT, Material, material_names, named
 from softreach.arm.number import Number
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Measured, Ring, Section
 from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean

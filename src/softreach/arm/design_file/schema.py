@@ -9,12 +9,12 @@ from typing import Any
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
 from softreach.arm.base import POINTS, Base
+from softreach.arm.body import RestShape
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number
-from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Measured, Ring, Section
 from softreach.arm.stations import Marker, RigidPiece
 from softreach.support.errors import Range

@@ -182,14 +182,14 @@ def _step(rates, state):
 
 
 @inline
-def _add_work(weight, measures, d, turned, moved, work):
-    """Add the work of measures (4, work) on the rates of strains at a node."""
+def _add_work(weight, unit_loads, d, turned, moved, work):
+    """Add the work of unit_loads (4, work) on the rates of strains at a node."""
     for j in range(work.shape[0]):
         for a in range(3):
             bend = 0.0
             for e in range(3):
-                bend += measures[e, j] * d[e, a]
-            push = measures[3, j] * d[2, a]
+                bend += unit_loads[e, j] * d[e, a]
+            push = unit_loads[3, j] * d[2, a]
             for c in range(work.shape[1]):
                 work[j, c] += weight * (bend * turned[a, c] + push * moved[a, c])
 
@@ -232,7 +232,7 @@ def respond(
     turning,
     pushing,
     yielding,
-    measures,
+    unit_loads,
     lever,
     weight,
     tipping,
@@ -254,7 +254,7 @@ def respond(
         turning: δω| dZ in the directors, shape (step, 3, 3, column).
         pushing: δζ| dZ, shape (step, 3, column).
         yielding: ν [N], shape (step, 3, 3, column).
-        measures: M and N, whose work on δω and δζ is summed, shape (step, 3, 4, work).
+        unit_loads: M and N, whose work on δω and δζ is summed, shape (step, 3, 4, work).
         lever: Of the payload in the frame of the base [m], shape (3,).
         weight: Force of the payload [N], shape (3,).
         tipping: Change of its moment on the tip at the same directors [N m], shape (3, column).
@@ -270,7 +270,7 @@ def respond(
     for c in range(3):
         state[3 + c, c] = 1.0
     kept = np.zeros((len(marks), 6, every))
-    work = np.zeros((measures.shape[3], every))
+    work = np.zeros((unit_loads.shape[3], every))
     system, rates = np.zeros((18, 18)), np.zeros((18, every))  # θ' and μ' at the nodes
     local, hat, rise = np.zeros((3, 6, 6)), np.zeros((3, 3)), np.zeros((3, 3, 3))
     climb = np.zeros((3, 3, every))
@@ -300,7 +300,7 @@ def respond(
             _move(i, state, rates, rise[i], climb[i], angle, moved)
             _add(WEIGHTS[i], moved, place)
             turned = rates[6 * i : 6 * i + 3]
-            _add_work(WEIGHTS[i], measures[k, i], directors[k, i], turned, moved, work)
+            _add_work(WEIGHTS[i], unit_loads[k, i], directors[k, i], turned, moved, work)
         _step(rates, state)
         _keep(k + 1, marks, place, state, kept)
     unknown = np.zeros((3, columns))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.rest_shape import STRAIGHT
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
@@ -172,7 +172,7 @@ class Scene:
         self._spines[path] = centers / arm.length, radii / arm.length  # balls that fill the arm
         if path == "/arm":
             self.pointing = shape["directors"].values[-1, 2]
-        self.draw_dots(f"{path}/markers", marker_points(arm, shape) / length, _MARKER)
+        self.draw_dots(f"{path}/markers", marker_points(arm.markers, shape) / length, _MARKER)
         meshes = _arm_meshes(arm, shape, length)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:
