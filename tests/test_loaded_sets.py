@@ -93,6 +93,7 @@ def test_what_is_torn_is_one_surface_of_the_stated_volume_under_six_loads():
         *(("tendon_arm", 50, "down"), ("tendon_arm", 50, "x")),
     ):
         found = reachable_set(loaded(*each), accuracy=0.05)
+        assert isinstance(found, ReachableSolid)
         surface = found.surface()
         edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         unique, count = np.unique(edges, axis=0, return_counts=True)

@@ -115,7 +115,7 @@ class Cusp(Shifted):
                 )
                 for k, y, t in zip(state, arrived, way, strict=True):
                     if t == 1.0:
-                        there = np.arange(first[to[node[k]]], first[to[node[k]] + 1])
+                        there = np.arange(*first[[to[node[k]], to[node[k]] + 1]].tolist())
                         links.append((k, there[np.abs(x[there] - y).argmin()]))
                     else:
                         ends.append((k, to[node[k]]))

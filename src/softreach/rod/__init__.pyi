@@ -13,6 +13,7 @@ from .rods import tip_map as tip_map
 from .summary import DesignSummary as DesignSummary
 from .summary import describe as describe
 from .tip_map import Frames as Frames
+from .tip_map import Held as Held
 from .tip_map import Shapes as Shapes
 from .tip_map import Strains as Strains
 from .tip_map import TipMap as TipMap

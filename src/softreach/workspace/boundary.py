@@ -68,9 +68,9 @@ def wrapped_surface(image: Image, volume: float) -> Surface:
 def _distances(image: Image) -> Array:
     """From cell centers to an image, 0 inside, in cells up to three."""
     covered, surface = image.counts[0] > 0, image.critical_surface
-    near = covered & ~binary_erosion(covered)
+    near = covered & ~np.asarray(binary_erosion(covered), bool)
     near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
-    near = binary_dilation(near, np.ones((3, 3, 3)), iterations=2) & ~covered
+    near = np.asarray(binary_dilation(near, np.ones((3, 3, 3)), iterations=2), bool) & ~covered
     centers = image.lattice.origin + image.lattice.cell * np.argwhere(near)
     distances = np.where(covered, 0.0, _FAR)
     distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)

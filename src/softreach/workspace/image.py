@@ -327,11 +327,12 @@ def _lifted_triangles(vertices: Array, cells: Index) -> Index:
             turn = np.sign(np.einsum("ni,ni->n", np.cross(a, b), c)).astype(int) * box
             parts.append(np.column_stack([faces, side, side * turn]))
     rows = np.concatenate(parts)
-    faces, number = np.unique(rows[:, :3], axis=0, return_inverse=True)
-    sums = [np.bincount(number.ravel(), column) for column in rows[:, 3:].T]
+    key = rows[:, :3] @ len(vertices) ** np.arange(2, -1, -1)
+    _, first, number = np.unique(key, return_index=True, return_inverse=True)
+    sums = [np.bincount(number, column) for column in rows[:, 3:].T]
     balance = np.stack(sums, axis=1).astype(np.int64)
     kept = balance.any(axis=1)
-    return np.concatenate([faces[kept], balance[kept]], axis=1)
+    return np.concatenate([rows[first[kept], :3], balance[kept]], axis=1)
 
 
 def _critical_triangles(

@@ -92,7 +92,8 @@ def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
     vertex = np.where(rank == 0, held.node, len(count) - 1 + np.cumsum(rank > 0))
     tips = np.full((len(count) + np.count_nonzero(rank), 3), np.nan)
     tips[vertex] = held.tips
-    is_lifted = binary_dilation(~_is_plain(held, count == 1, n, m), np.ones((3,) * m))
+    torn = ~_is_plain(held, count == 1, n, m)
+    is_lifted = np.asarray(binary_dilation(torn, np.ones((3,) * m)), bool)
     corners = _corners(n, m)[is_lifted.ravel()]
     cell, states = _sheets(held, at_node[corners])
     beyond, end_tips = _edges(held, states, corners[cell])
@@ -118,7 +119,7 @@ def _edges_of_cell(m: int) -> list[tuple[int, int]]:
 def _is_plain(held: Held, is_single: Mask, n: int, m: int) -> Mask:
     """Cells with one posture at each corner, linked along all edges."""
     corners, steps = _corners(n, m), corner_steps((n,) * m)
-    plain = is_single[corners].all(axis=1)
+    plain: Mask = np.asarray(is_single[corners].all(axis=1))
     low, high = np.sort(held.node[held.links], axis=1).T
     linked = {step: np.zeros(len(is_single), bool) for step in steps[1 << np.arange(m)]}
     for step, mask in linked.items():

@@ -75,7 +75,7 @@ class _Grid:
     def __init__(self, solver: Solver, gamma: Array, sizes: tuple[int, ...]) -> None:
         self.solver, self.gamma, self.sizes = solver, gamma, sizes
         self.length = solver.tables.arm.length
-        self.has_arm = np.isfinite(gamma).all(axis=1)
+        self.has_arm: Mask = np.asarray(np.isfinite(gamma).all(axis=1))
         self.states = np.full((len(gamma), _MOST), _NONE)
         """Numbers of the postures of each node."""
         self.node = np.empty(0, np.intp)
@@ -178,7 +178,7 @@ class _Grid:
             place = np.stack(np.unravel_index(self.node[state], self.sizes), axis=1)
             place[np.arange(len(state)), column // 2] += 2 * up - 1
             inside = ((place >= 0) & (place < self.sizes)).all(axis=1)
-            to = np.ravel_multi_index(tuple(place[inside].T), self.sizes)
+            to = np.atleast_1d(np.ravel_multi_index(tuple(place[inside].T), self.sizes))
             if len(to):
                 self._grow(twin, state[inside], to, column[inside])
         return np.arange(known, len(self.node))
