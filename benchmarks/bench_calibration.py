@@ -32,7 +32,7 @@ from softreach.arm import (
     Section,
     Tendon,
 )
-from softreach.calibration import Measurements, Misses, read_measurements
+from softreach.calibration import Measurements, PlacementErrors, read_measurements
 from softreach.calibration.baselines import constant_curvature, quadratic
 from softreach.calibration.errors import misses
 from softreach.rod.kinematics import marker_positions
@@ -248,8 +248,8 @@ class Row(NamedTuple):
 
     law: str
     numbers: str
-    held_out: Misses
-    last: Misses
+    held_out: PlacementErrors
+    last: PlacementErrors
     """Of the last marker."""
     seconds: float
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import math
 import os
@@ -16,7 +15,7 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.cli.app import app, run
-from softreach.cli.changes import Changes
+from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.rod.summary import describe
 
@@ -139,6 +138,13 @@ class TestDesign:
         text = capsys.readouterr().out
         assert "mass  " not in text
         assert "give the density [kg/m³] of rings[0].material to know the mass" in text
+
+    def test_equal_neighbors_share_a_line(self, capsys):
+        assert run(["design", "helical_tendon_robot"]) == 0
+        lines = [line for line in capsys.readouterr().out.splitlines() if "  activation" in line]
+        assert [line.partition("  0 to 15 N:")[0] for line in lines] == [
+            "  activation tendon 1 to tendon 4"
+        ]
 
     def test_where_linear_laws_end_is_said_on_demand(self, capsys):
         assert run(["design", "minimal_trunk"]) == 0
@@ -305,32 +311,6 @@ def test_the_demo_writes_every_file_it_names(output, folder, capsys):
     assert sr.open_cloud("results/cloud.zarr").sizes["sample"] == 4000
 
 
-BAD_DESIGN = """
-version = 2
-profile = { length_m = 1.0, outer_radius_m = "thick", taper_degrees = 2.0 }
-rings = [{ inner_ratio = 0.6 }]
-
-[[actuators]]
-kind = "fiber"
-extent_deg = 400.0
-helical_angle_deg = 0.0
-"""
-
-
-def test_every_fault_of_a_design_file_has_its_line(folder, capsys):
-    (folder / "bad.toml").write_text(BAD_DESIGN)
-    assert run(["design", "bad.toml"]) == 2
-    first, *faults = capsys.readouterr().err.splitlines()
-    assert first == "error: bad.toml: 3 problems"
-    assert all(fault.startswith("  ") for fault in faults)
-    for text in (
-        "outer_radius_m = 'thick'",
-        "taper_degrees = 2: unknown key",
-        "extent_deg = 400",
-    ):
-        assert sum(text in fault for fault in faults) == 1
-
-
 def test_text_that_is_no_toml_is_refused_with_its_line(folder, capsys):
     (folder / "bad.toml").write_text("length_m = = 1\n")
     assert run(["design", "bad.toml"]) == 2
@@ -407,76 +387,30 @@ def test_a_verbose_command_says_where_an_error_comes_from(capsys):
     assert text.endswith("error: design = nowhere.toml: must be a file that exists\n")
 
 
-def test_every_command_calls_its_output_by_one_name():
-    written = [name for name in COMMANDS if "out" in inspect.signature(_function(name)).parameters]
-    assert set(written) >= {"cloud", "volume", "reach", "design", "track", "show", "demo"}
-    for name in set(written) - {"export", "import"}:
-        words = ["--out", "a.xyz"], ["-o", "a.xyz"]
-        least = {
-            "track": ["x", "y"],
-            "check": ["x", "y"],
-            "calibrate": ["x", "y", "--free", "pose"],
-        }
-        least |= {"demo": [], "paper": [], "plan-poses": ["x", "--free", "pose"]}
-        long, short = (
-            app.parse_args([name, *least.get(name, ["x"]), *one])[1].arguments["out"]
-            for one in words
-        )
-        assert long == short
-
-
-def _function(name):
-    return app[name].default_command or (lambda: None)
-
-
 # Options that change a design, the same on every command that takes one
 
 
-OPTIONS = (
-    "--base",
-    "--payload",
-    "--gravity",
-    "--tip-force",
-    "--set",
-    "--taper-deg",
-    "--revolution-deg",
-)
-TAKE_ONE_DESIGN = ("design", "cloud", "volume", "reach", "solve", "track", "show", "export")
 NUMBERS = ("rings[0].material.young_modulus=1MPa", "rings[0].material.density=1000kg/m3")
 
 
-def saved(folder, *arguments):
-    """The design that `softreach design ... --out` writes."""
-    assert run(["design", *arguments, "--out", "a.toml", "--overwrite"]) == 0
-    return sr.Manipulator.load("a.toml")
-
-
-@pytest.mark.parametrize("command", TAKE_ONE_DESIGN)
-def test_every_command_that_takes_a_design_offers_to_change_it(command, capsys):
-    assert run([command, "--help"]) == 0
-    text = capsys.readouterr().out
-    assert all(f"{option} " in text for option in OPTIONS)
-    assert "in the world, whose +z points up" in " ".join(text.replace("│", "").split())
+def asked_for(*arguments):
+    """The design that a command with these options works on."""
+    _, bound, *_ = app.parse_args(["design", *arguments], exit_on_error=False, print_error=False)
+    return design_from(*bound.args, **bound.kwargs)
 
 
 @pytest.mark.parametrize(
     ("options", "loads"),
     [
         (["--payload", "2g"], {"payload": 0.002}),
-        (["--payload", "2e-3 kg", "--gravity", "down"], {"payload": 0.002}),
-        (["--gravity", "upright"], {}),
-        (["--gravity", "up"], {"gravity": (0, 0, 9.81)}),
         (["--gravity", "hanging"], {"gravity": (0, 0, 9.81)}),
         (["--gravity", "sideways"], {"gravity": (9.81, 0, 0)}),
-        (["--gravity", "-1.62,0,0.5"], {"gravity": (-1.62, 0, 0.5)}),
         (["--gravity", "0, 0, -1.62 m/s2"], {"gravity": (0, 0, -1.62)}),
         (
             ["--gravity", "none", "--tip-force", "-5,0,2.5mN"],
             {"gravity": (0, 0, 0), "tip_force": (-0.005, 0, 0.0025)},
         ),
-        (["--tip-force=0,0,-0.01"], {"tip_force": (0, 0, -0.01)}),
         (["--set", "loads.payload=2g"], {"payload": 0.002}),
-        (["--set", "loads.payload_kg=0.002"], {"payload": 0.002}),
         (
             ["--set", "loads.tip_moment[1]=3N mm", "--payload", "1g"],
             {"tip_moment": (0, 0.003, 0), "payload": 0.001},
@@ -485,15 +419,15 @@ def test_every_command_that_takes_a_design_offers_to_change_it(command, capsys):
 )
 def test_loads_are_those_of_the_library(options, loads, folder):
     expected = sr.designs.lce_arm().replace(loads=sr.Loads(**loads))
-    assert saved(folder, "lce_arm", *options) == expected
+    assert asked_for("lce_arm", *options) == expected
 
 
 def test_options_change_the_loads_that_a_design_has(folder):
     loads = sr.Loads(gravity=(0, 0, 9.81), payload=0.001)
     sr.designs.lce_arm().replace(loads=loads).save("loaded.toml")
-    made = saved(folder, "loaded.toml", "--payload", "3g")
+    made = asked_for("loaded.toml", "--payload", "3g")
     assert made.loads == loads.replace(payload=0.003)
-    bare = saved(folder, "loaded.toml", "--payload", "0g", "--gravity", "none")
+    bare = asked_for("loaded.toml", "--payload", "0g", "--gravity", "none")
     assert bare == sr.designs.lce_arm()
 
 
@@ -501,7 +435,6 @@ def test_options_change_the_loads_that_a_design_has(folder):
     ("options", "values"),
     [
         (["--set", "taper=1deg"], {"taper": math.radians(1)}),
-        (["--set", "taper=0.01rad"], {"taper": 0.01}),
         (["--set", "taper_deg=1"], {"taper": math.radians(1)}),
         (
             ["--set", "length=80cm", "--set", "left.offset_deg=30"],
@@ -511,16 +444,15 @@ def test_options_change_the_loads_that_a_design_has(folder):
             ["--set", "left.lower=-2", "--taper-deg", "1"],
             {"left.lower": -2, "taper": math.radians(1)},
         ),
-        (["--set", "radius_ratio = 0.5"], {"radius_ratio": 0.5}),
     ],
 )
 def test_settings_are_parameters_of_the_library(options, values, folder):
-    assert saved(folder, "minimal_trunk", *options) == changed(sr.designs.minimal_trunk(), values)
+    assert asked_for("minimal_trunk", *options) == changed(sr.designs.minimal_trunk(), values)
 
 
 def test_moduli_and_densities_may_come_with_the_loads_that_need_them(folder):
     settings = [word for text in NUMBERS for word in ("--set", text)]
-    made = saved(folder, "minimal_trunk", "--payload", "200g", *settings)
+    made = asked_for("minimal_trunk", "--payload", "200g", *settings)
     material = made.section.rings[0].material
     assert (material.young_modulus, material.density) == (1e6, 1000.0)
     assert made.loads == sr.Loads(payload=0.2)
@@ -531,18 +463,18 @@ def test_moduli_and_densities_may_come_with_the_loads_that_need_them(folder):
     [("hanging", "down"), ("upright", "up"), ("down", "down"), ("x", "x"), ("-y", "-y")],
 )
 def test_the_base_points_the_way_that_is_said(folder, word, points):
-    assert saved(folder, "minimal_trunk", "--base", word).base == sr.Base(points=points)
+    assert asked_for("minimal_trunk", "--base", word).base == sr.Base(points=points)
 
 
 def test_the_place_and_the_turn_of_a_file_stay(folder):
     base = sr.Base(position=(0, 0, 2), points="x", turn=0.3)
     sr.designs.minimal_trunk().replace(base=base).save("posed.toml")
-    made = saved(folder, "posed.toml", "--base", "hanging", "--set", "base.turn=0.4rad")
+    made = asked_for("posed.toml", "--base", "hanging", "--set", "base.turn=0.4rad")
     assert made.base == base.replace(points="down", turn=0.4)
 
 
 def test_gravity_down_beside_a_hanging_base_pulls_along_the_arm(folder, capsys):
-    made = saved(folder, "lce_arm", "--base", "hanging", "--gravity", "down")
+    made = asked_for("lce_arm", "--base", "hanging", "--gravity", "down")
     assert (made.base.points, made.loads) == ("down", sr.Loads())
     assert run(["design", "lce_arm", "--base", "hanging", "--gravity", "down", "--json"]) == 0
     *_, last = capsys.readouterr().out.splitlines()
@@ -594,14 +526,11 @@ class TestRestInTheSummary:
         assert facts["sag_at_rest_sideways_L"] == sr.rest.rest(held).sag_over_length
         assert facts["at_rest_upright"] == "stable"
 
-    def test_nothing_is_said_where_moduli_are_not_known(self, capsys):
-        assert not any("rest" in name for name in self.facts(capsys, "minimal_trunk"))
-
     def test_loads_beyond_the_verified_ones_are_warned_of_once(self, capsys, tmp_path):
-        assert run(["design", "lce_arm", "--payload", "100g"]) == 0
+        arm = ["lce_arm", "--payload", "71g", "--gravity", "hanging"]
+        assert run(["design", *arm]) == 0
         assert capsys.readouterr().err.count("load number is") == 1
-        out = ["--out", str(tmp_path / "a.zarr")]
-        assert run(["cloud", "lce_arm", "--payload", "100g", "--n", "8", *out]) == 0
+        assert run(["cloud", *arm, "--n", "8", "--out", str(tmp_path / "a.zarr")]) == 0
         assert capsys.readouterr().err.count("load number is above 12") == 1
 
 
@@ -609,8 +538,6 @@ class TestRestInTheSummary:
     ("options", "lacking"),
     [
         (["--payload", "200g"], ("young_modulus", "density")),
-        (["--tip-force", "0,0,1N", "--gravity", "none"], ("young_modulus",)),
-        (["--gravity", "up", "--set", NUMBERS[0]], ("density",)),
         (["--set", "loads.payload=1g"], ("young_modulus", "density")),
     ],
 )
@@ -624,21 +551,4 @@ def test_loads_ask_in_one_line_for_what_the_arm_lacks(options, lacking, capsys):
 
 
 def test_no_gravity_on_an_arm_without_loads_changes_nothing(folder):
-    assert saved(folder, "minimal_trunk", "--gravity", "none") == sr.designs.minimal_trunk()
-
-
-def test_every_change_has_an_option(capsys):
-    """No field of the changes is forgotten in what a stored cloud refuses."""
-    every = Changes(
-        base="up",
-        revolution_deg=1.0,
-        taper_deg=1.0,
-        payload="1g",
-        gravity="up",
-        tip_force="0",
-        point="tool",
-        settings=["a=1"],
-    )
-    assert len(every.given) == len(vars(every))
-    _, bound, *_ = app.parse_args(["design", "x", "--set", "a=1", "--set", "b=2"])
-    assert bound.arguments["changes"].settings == ["a=1", "b=2"]
+    assert asked_for("minimal_trunk", "--gravity", "none") == sr.designs.minimal_trunk()

@@ -90,10 +90,9 @@ class TestCloud:
         assert data["metadata"]["design"] == cloud.attrs["design"]
         assert data["metadata"]["seed"] == 5
 
-    @pytest.mark.parametrize("suffix", ["vtu", "vtk"])
-    def test_vtk_reads_back_equal(self, suffix, cloud, expected, tmp_path):
-        export_cloud(cloud, tmp_path / f"cloud.{suffix}")
-        mesh = meshio.read(tmp_path / f"cloud.{suffix}")
+    def test_vtu_reads_back_equal(self, cloud, expected, tmp_path):
+        export_cloud(cloud, tmp_path / "cloud.vtu")
+        mesh = meshio.read(tmp_path / "cloud.vtu")
         np.testing.assert_array_equal(mesh.points, cloud.tip)
         for name in COLUMNS[3:]:
             np.testing.assert_array_equal(np.ravel(mesh.point_data[name]), expected[name])
@@ -167,10 +166,9 @@ class TestMesh:
         assert mesh.is_watertight
         assert mesh.volume == pytest.approx(hull.volume, rel=1e-3)
 
-    @pytest.mark.parametrize("suffix", ["vtu", "vtk"])
-    def test_vtk_keeps_vertices_and_faces(self, suffix, ball, tmp_path):
-        export_mesh((ball.vertices, ball.faces), tmp_path / f"hull.{suffix}")
-        mesh = meshio.read(tmp_path / f"hull.{suffix}")
+    def test_vtu_keeps_vertices_and_faces(self, ball, tmp_path):
+        export_mesh((ball.vertices, ball.faces), tmp_path / "hull.vtu")
+        mesh = meshio.read(tmp_path / "hull.vtu")
         np.testing.assert_array_equal(mesh.points, ball.vertices)
         np.testing.assert_array_equal(mesh.cells_dict["triangle"], ball.faces)
 
@@ -211,9 +209,9 @@ class TestArm:
 
     @pytest.mark.parametrize("suffix", ["ply", "stl", "obj", "glb"])
     def test_all_formats_hold_the_same_solid(self, suffix, trunk, bent, tmp_path):
-        export_arm(trunk, bent, tmp_path / "arm.vtk")
+        export_arm(trunk, bent, tmp_path / "arm.vtu")
         export_arm(trunk, bent, tmp_path / f"arm.{suffix}")
-        plain = meshio.read(tmp_path / "arm.vtk")
+        plain = meshio.read(tmp_path / "arm.vtu")
         reference = trimesh.Trimesh(plain.points, plain.cells_dict["triangle"], process=False)
         mesh = trimesh.load(tmp_path / f"arm.{suffix}", force="mesh", process=False)
         assert mesh.volume == pytest.approx(reference.volume, rel=1e-5)

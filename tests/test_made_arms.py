@@ -19,7 +19,7 @@ from tests.made_arms import FIRM, MADE_ARMS, SOFT, STIFF, Ring, mixed_arm, one_r
 plt = pytest.importorskip("matplotlib.pyplot")
 trimesh = pytest.importorskip("trimesh")
 
-SUFFIXES = ("ply", "stl", "obj", "glb", "vtu", "vtk")
+SUFFIXES = ("ply", "stl", "obj", "glb", "vtu")
 
 
 @pytest.fixture(params=MADE_ARMS)

@@ -255,11 +255,6 @@ def test_sectors_stand_where_the_bundles_are_at_that_station(share):
         assert wedge.get_facecolor()[:3] == bundle_color(k)
 
 
-def test_some_bundles_keep_their_colors(trunk):
-    (wedge,) = sectors(plot_cross_section(trunk, bundles=[2]))
-    assert wedge.get_facecolor()[:3] == bundle_color(2)
-
-
 def test_designs_and_their_sections_share_one_scale():
     panels = [
         DesignPanel(name, getattr(designs, f"{name}_trunk")()) for name in ("minimal", "redundant")

@@ -5,9 +5,6 @@ from __future__ import annotations
 import grimp
 
 CIRCLES = [
-    "calibration.calibration calibration.report",
-    "optimization.folder optimization.report optimization.result",
-    "requirements.requirements requirements.requirements_file",
     "studio.fields studio.jobs.calibration studio.jobs.plots studio.jobs.reach studio.plots "
     "studio.plots.plot studio.plots.section studio.plots.sweep studio.session",
 ]

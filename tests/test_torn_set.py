@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from softreach.arm import Loads, Manipulator, designs
-from softreach.cloud.clouds import compute_cloud
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import Held, TipMap, TipStatus
 from softreach.support.errors import InvalidInput
 from softreach.workspace import (
     ReachableCurve,
@@ -21,7 +20,6 @@ from softreach.workspace import (
     ReachableSurface,
     reachable_set,
 )
-from softreach.workspace.discontinuities import left_out_cells
 from softreach.workspace.reach import rasterized_set
 from softreach.workspace.search import nearest_tips
 from tests.bodies import rubber
@@ -30,7 +28,6 @@ Moved = Callable[[np.ndarray], np.ndarray]
 Stable = Callable[[np.ndarray], np.ndarray]
 
 ARM = designs.minimal_trunk()
-JUMP = 0.7
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -68,11 +65,6 @@ class Shifted(TipMap):
         raise NotImplementedError
 
 
-def snapping(gamma: np.ndarray) -> np.ndarray:
-    """A jump across a slanted plane that meets no grid."""
-    return JUMP * (gamma[:, 0] + 0.37 * gamma[:, 1:].sum(axis=1) > 0.61)
-
-
 def outside_ball(gamma: np.ndarray) -> np.ndarray:
     return np.linalg.norm(gamma - [0.53, 0.48, 0.51], axis=1) > 0.3
 
@@ -89,85 +81,141 @@ def solid(rod: TipMap | Manipulator, **options) -> ReachableSolid:
 pytestmark = pytest.mark.filterwarnings("ignore:volume .* may be off")
 
 
-@pytest.mark.parametrize("n", [10, 20, 40])
-def test_a_jump_is_not_bridged(n):
-    found = rasterized_set(Shifted(shift=snapping), n, 0.03, 3e-3)
-    assert found.volume == pytest.approx(1.0, abs=found.volume_error)
-    assert 0.5 / n < found.lost_share < 4.0 / n  # the cells that a plane cuts
-    assert found.volume_error < 8.0 / n
-    # the gap that the jump leaves
-    x = 0.61 - 0.37 * (0.2 + 0.3)
-    gap = np.array([[x + part * JUMP, 0.2, 0.3] for part in (0.2, 0.5, 0.8)])
-    assert not found.contains(gap).any()
-    assert (found.distance(gap) > 0.05).all()
-    assert found.contains(gap + [[-0.4 * JUMP, 0, 0], [0.75 * JUMP, 0, 0], [0.4, 0, 0]]).all()
+FOLD = 2 / (3 * np.sqrt(3))
 
 
-@pytest.mark.parametrize("n", [10, 20, 40])
-def test_what_is_not_stable_is_not_reached(n):
-    found = rasterized_set(Shifted(stable=outside_ball), n, 0.03, 3e-3)
-    assert found.volume == pytest.approx(1.0 - BALL, abs=found.volume_error)
-    assert found.volume_error < 2.0 / n
-    assert BALL < found.lost_share < BALL + 3.5 / n
-    assert not found.contains(np.array([[0.53, 0.48, 0.51], [0.6, 0.55, 0.4]])).any()
-    assert found.contains(np.array([[0.1, 0.1, 0.1], [0.9, 0.5, 0.5]])).all()
-    assert found.convex_volume == pytest.approx(1.0, abs=found.convex_volume_error + 1e-4)
+@dataclass(frozen=True, repr=False, eq=False)
+class Cusp(Shifted):
+    """r = (x, a, c) with x³ - a x = b at γ = (b, a, c), held where 3 x² > a: sheets over a cusp.
+
+    Of two bundles it is (x, a, a²).
+    """
+
+    bounds: tuple = ((-1.0, 1.1), (-1.0, 1.05), (0.0, 1.0))
+
+    def fill(self, gamma, tips, slopes=None, **more):
+        super().fill(gamma, tips, slopes, **more)
+        if gamma.shape[1] == 2:
+            tips[:, 2] = gamma[:, 1] ** 2
+
+    def held(self, gamma, sizes):
+        at_node = [stable_roots(b, a) for b, a, *_ in gamma]
+        node = np.repeat(np.arange(len(gamma)), [len(roots) for roots in at_node])
+        first = np.searchsorted(node, np.arange(len(gamma) + 1))
+        x, number = np.concatenate(at_node), np.arange(len(gamma)).reshape(sizes)
+        links, ends, at_end = [], [], []
+        for axis in range(len(sizes)):
+            for low, high in ((-1, 0), (0, -1)):
+                to = dict(
+                    zip(*(np.delete(number, k, axis).ravel() for k in (low, high)), strict=True)
+                )
+                state = np.array([k for k in range(len(x)) if node[k] in to])
+                arrived, way = followed(
+                    x[state], gamma[node[state]], gamma[[to[node[k]] for k in state]]
+                )
+                for k, y, t in zip(state, arrived, way, strict=True):
+                    if t == 1.0:
+                        there = np.arange(first[to[node[k]]], first[to[node[k]] + 1])
+                        links.append((k, there[np.abs(x[there] - y).argmin()]))
+                    else:
+                        ends.append((k, to[node[k]]))
+                        at_end.append(gamma[node[k]] + t * (gamma[to[node[k]]] - gamma[node[k]]))
+        at_end = np.array(at_end).reshape(-1, gamma.shape[1])
+        sides = np.sign(x[[k for k, _ in ends]])
+        end_x = sides * np.sqrt(at_end[:, 1].clip(0.0) / 3)
+        tips, end_tips = (
+            np.column_stack([value, at[:, 1], at[:, 2] if len(sizes) == 3 else at[:, 1] ** 2])
+            for value, at in ((x, gamma[node]), (end_x, at_end))
+        )
+        pairs = [np.array(p, np.intp).reshape(-1, 2) for p in (links, ends)]
+        doubled = np.bincount(node, minlength=len(gamma)) > 1
+        return Held(node, tips, pairs[0], pairs[1], end_tips, doubled)
 
 
-def test_multiplicity_counts_the_parts_that_overlap():
-    # What lies beyond x = 1/2 moves back by 1/4: a quarter of the box is covered twice.
-    rod = Shifted(shift=lambda gamma: -0.25 * (gamma[:, 0] > 0.5001))
-    found = rasterized_set(rod, 40, 0.02, 3e-3)
-    assert found.multiplicity[2] == pytest.approx(0.25, abs=found.multiplicity_error + 0.03)
-    assert found.volume == pytest.approx(0.75, abs=found.volume_error)
-    assert found.fold_volume == pytest.approx(0.0, abs=1e-3)
+def stable_roots(b: float, a: float) -> np.ndarray:
+    roots = np.roots([1.0, 0.0, -a, -b])
+    real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+    return real[3 * real**2 > a]
 
 
-def steep(gamma: np.ndarray) -> np.ndarray:
-    return JUMP * np.arctan((gamma[:, 0] - 0.503) * 1000)
+def followed(x, begin, end, parts: int = 50):
+    """Where branches are after straight ways, or where they end on them."""
+    x, way = x.copy(), np.zeros(len(x))
+    going = np.ones(len(x), bool)
+    for k in range(1, parts + 1):
+        b, a = (begin + k / parts * (end - begin))[:, :2].T
+        y = x.copy()
+        with np.errstate(all="ignore"):
+            for _ in range(12):
+                y -= (y**3 - a * y - b) / (3 * y**2 - a)
+            going &= (np.abs(y - x) < 0.3) & (3 * y**2 > a) & (np.abs(y**3 - a * y - b) < 1e-9)
+        x[going], way[going] = y[going], k / parts
+    return x, way
 
 
-def root(gamma: np.ndarray) -> np.ndarray:
-    return np.cbrt(gamma[:, 0] - 0.503)
+def cusp_area(bend: float = 0.0) -> float:
+    """Of all (x, a, bend a²) that are held with b and a within their bounds."""
+    a, x = np.meshgrid(np.linspace(-1, 1.05, 2001), np.linspace(-1.5, 1.5, 3001), indexing="ij")
+    held = (x**3 - a * x >= -1) & (x**3 - a * x <= 1.1) & (3 * x**2 > a)
+    return float((held * np.sqrt(1 + (2 * bend * a) ** 2)).mean() * 2.05 * 3.0)
 
 
-@pytest.mark.parametrize("shift", [steep, root], ids=["steep", "root"])
-@pytest.mark.parametrize("n", [10, 40])
-def test_a_steep_but_continuous_map_is_not_torn(shift, n):
-    rod = Shifted(shift=shift)
-    ticks = np.linspace(0, 1, n + 1)
-    gamma = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-    assert not left_out_cells(rod, rod.tips(gamma), n).any()
+@pytest.fixture(scope="module")
+def cusp() -> ReachableSolid:
+    return rasterized_set(Cusp(), 12, 0.04, 3e-3)
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-def test_tears_are_found_at_every_scale(scale):
-    def jump(gamma):
-        return scale * JUMP * (gamma[:, 0] > scale * 0.53)
+def test_every_sheet_is_reached_up_to_its_edge(cusp):
+    assert cusp.is_torn
+    assert cusp.volume == pytest.approx(cusp_area(), abs=cusp.volume_error + 0.01)
+    assert cusp.volume_error < 0.05 * cusp.volume
+    # between the sheets, where x is an unstable root, nothing is held
+    a = np.array([0.5, 0.8, 0.95])
+    gap = np.stack([0.3 * np.sqrt(a / 3), a, np.full(3, 0.5)], axis=1)
+    assert not cusp.contains(gap).any()
+    near = np.stack([1.25 * np.sqrt(a / 3), a, np.full(3, 0.5)], axis=1)
+    assert cusp.contains(near).all()
+    assert cusp.contains(near * [-1, 1, 1]).all()
 
-    rod = Shifted(bounds=((0.0, scale),) * 3, shift=jump)
-    ticks = np.linspace(0, scale, 11)
-    gamma = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-    lost = left_out_cells(rod, rod.tips(gamma), 10)
-    assert lost[5].all()
-    assert lost.sum() == 100
+
+def test_the_share_of_hysteresis_is_that_between_the_folds(cusp):
+    between = 2 * FOLD * 1.05**2.5 / 2.5  # of b and a: |b| < FOLD a^1.5
+    assert cusp.hysteresis_share == pytest.approx(between / (2.1 * 2.05), abs=0.01)
+    assert cusp.lost_share == 0.0
+    assert "hysteresis" in repr(cusp)
+    assert cusp.to_dataset().hysteresis_share == cusp.hysteresis_share
 
 
-def test_a_thin_set_is_measured_without_what_is_lost():
-    torn = Shifted(bounds=((0.0, 1.0),) * 2, shift=snapping)
-    surface = reachable_set(torn)
+def test_places_of_sheets_that_do_not_meet_count_once(cusp):
+    assert sum(cusp.multiplicity.values()) == pytest.approx(cusp.volume)
+    assert cusp.multiplicity[1] > 0.95 * cusp.volume
+
+
+def test_sheets_of_two_bundles_have_the_area_of_all(cusp):
+    surface = reachable_set(Cusp(bounds=Cusp().bounds[:2]))
     assert isinstance(surface, ReachableSurface)
-    assert surface.area == pytest.approx(1.0, abs=surface.area_error)
-    assert 0 < surface.area_error < 0.02
-    assert surface.distance(np.array([[0.61 + 0.5 * JUMP, 0.0, 0.0]])) > 0.1
+    assert surface.area == pytest.approx(cusp_area(1.0), abs=surface.area_error + 0.01)
+    assert surface.area_error < 0.05 * surface.area
 
-    gap = Shifted(bounds=((0.0, 1.0),), stable=lambda gamma: abs(gamma[:, 0] - 0.5) > 0.1)
-    curve = reachable_set(gap)
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Switch(Cusp):
+    """The same of one bundle, at a = 1: x jumps at b = ±FOLD."""
+
+    bounds: tuple = ((-1.0, 1.0),)
+
+    def held(self, gamma, sizes):
+        return super().held(np.concatenate([gamma, np.ones_like(gamma)], axis=1), sizes)
+
+
+def test_a_curve_of_two_branches_ends_where_these_end():
+    curve = reachable_set(Switch())
     assert isinstance(curve, ReachableCurve)
-    assert curve.curve_length == pytest.approx(0.8, abs=curve.curve_length_error)
-    assert curve.lost_share == pytest.approx(0.2, abs=0.003)
-    assert curve.distance(np.array([[0.5, 0.0, 0.0]])) == pytest.approx(0.1, abs=0.003)
-    assert curve.to_dataset().lost_share == curve.lost_share
+    fold = np.sqrt(1 / 3)
+    longest = stable_roots(1.0, 1.0)[-1] - fold
+    assert curve.curve_length == pytest.approx(2 * longest, abs=curve.curve_length_error)
+    assert curve.curve_length_error < 0.1
+    assert curve.hysteresis_share == pytest.approx(FOLD, abs=0.01)
 
 
 def test_more_bundles_are_searched_for_among_stable_ones():
@@ -199,24 +247,11 @@ def test_arms_that_are_nowhere_stable_are_refused_in_one_line(bundles):
     assert "\n" not in str(caught.value)
 
 
-def test_an_arm_whose_payload_makes_it_snap_reaches_what_its_stable_cloud_does():
-    arm = designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81), payload=0.02))
-    found = solid(arm, accuracy=0.05)
-    assert 0 < found.lost_share < 0.1
-    assert "left out" in repr(found)
-    cloud = compute_cloud(arm, n=4000)
-    tips = cloud.tip.values[cloud.status.values == TipStatus.STABLE]
-    assert (cloud.status.values != TipStatus.STABLE).mean() < found.lost_share
-    assert found.contains(tips).mean() > 0.9
-    finer = rasterized_set(tip_map(arm), 2 * found.cells, None, 3e-3)
-    assert abs(finer.volume - found.volume) < found.volume_error + finer.volume_error
-    assert finer.lost_share < found.lost_share
-
-
 def test_an_arm_that_is_stable_everywhere_loses_nothing():
     arm = rubber(ARM, Loads(gravity=(9.81, 0.0, 0.0)))
     found = solid(arm, accuracy=0.05)
-    assert found.lost_share == 0.0
-    assert "left out" not in repr(found)
+    assert not found.is_torn
+    assert found.lost_share == found.hysteresis_share == 0.0
+    assert "posture" not in repr(found)
     assert "lost_share" not in reachable_set(ARM, accuracy=0.05).to_dataset()
     assert tip_map(arm).supports_unstable

@@ -55,6 +55,7 @@ from .rod import tip_positions as tip_positions
 from .support import errors as errors
 from .support.errors import InvalidDesign as InvalidDesign
 from .support.errors import InvalidInput as InvalidInput
+from .support.errors import NotPossible as NotPossible
 from .workspace import payload as payload
 from .workspace import reachable_set as reachable_set
 from .workspace import volume_gradient as volume_gradient

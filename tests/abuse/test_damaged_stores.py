@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -21,7 +20,6 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach import schema
 from softreach.atlas import DamagedStore, atlas_cloud, build_atlas, open_atlas, verify_atlas
-from softreach.atlas.command import Command
 from softreach.atlas.layout import PER_DESIGN
 from softreach.cli.app import run
 from softreach.support.errors import SoftreachError, SoftreachWarning
@@ -50,7 +48,7 @@ WAYS: dict[str, Callable[[bytes], bytes | None]] = {
     "missing": lambda _: None,
 }
 MENDED = "one bit flipped", "missing"
-"""Ways after which the atlas is built again; the other ways are found out the same way."""
+"""Ways after which the atlas is built again, for every fifth file; all are found the same way."""
 
 
 @pytest.fixture(scope="module")
@@ -123,10 +121,10 @@ def test_damage_of_any_file_is_named_and_mended_by_the_command_that_built_the_at
             if (array, way) == ("status", "missing"):
                 assert (found.todo, found.damaged) == (1, 0)
             else:
-                number = int(np.ravel_multi_index(chunk.place[:2], (2, 2)))
+                design = int(np.ravel_multi_index(chunk.place[:2], (2, 2)))
                 assert found.damaged == 1
-                assert_named(found.messages[number], name, place)
-        if way in MENDED:
+                assert_named(found.messages[design], name, place)
+        if way in MENDED and number % 5 == MENDED.index(way):
             built(place)
             assert only_files(place) == atlas_files
 
@@ -328,21 +326,12 @@ def test_an_atlas_gives_way_to_a_cloud_only_if_one_says_so(cloud, atlas_files, t
 
 CHANGES: dict[str, Callable[[xr.Dataset], object]] = {
     "no coordinate axis": lambda cloud: cloud.drop_vars("axis"),
-    "bundles of other names": lambda cloud: cloud.assign_coords(bundle=["a", "b", "c"]),
     "fewer bundles": lambda cloud: cloud.isel(bundle=[0, 1]),
     "another status": lambda cloud: schema.with_status(cloud, np.full(64, 9, np.int8)),
-    "complex numbers beside": lambda cloud: cloud.assign(more=("sample", np.ones(64, complex))),
     "no dataset": lambda cloud: cloud.to_dict(),
     "another length": lambda cloud: cloud.assign(tip=cloud.tip.assign_attrs(length=2.0)),
-    "complex tips": lambda cloud: cloud.assign(tip=cloud.tip.astype(complex)),
-    "activations of texts": lambda cloud: cloud.assign(activation=cloud.activation.astype("U4")),
-    "a status of floats": lambda cloud: cloud.assign(status=cloud.status.astype(np.float32)),
-    "no design": lambda cloud: cloud.assign_attrs(design=None),
     "another design": lambda cloud: cloud.assign_attrs(design=sr.designs.lce_arm().to_toml()),
-    "another schema": lambda cloud: cloud.assign_attrs(schema_version=1),
     "no version": lambda cloud: cloud.assign_attrs(softreach_version=None),
-    "a sampler that is none": lambda cloud: cloud.assign_attrs(sampler=True),
-    "a seed of a half": lambda cloud: cloud.assign_attrs(seed=0.5),
     "a tolerance of NaN": lambda cloud: cloud.assign_attrs(tol=float("nan")),
 }
 
@@ -351,13 +340,3 @@ CHANGES: dict[str, Callable[[xr.Dataset], object]] = {
 def test_no_cloud_that_cannot_be_opened_is_saved(cloud, tmp_path, change):
     raised_by(lambda: sr.save_cloud(change(cloud), tmp_path / "cloud.zarr"))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_command_with_other_settings_is_refused(atlas_files):
-    settings = json.loads(json.loads(atlas_files["zarr.json"])["attributes"]["command"])
-    other = {"n": 2.5, "seed": "zero", "sampler": "none", "tol": "small", "keep_clouds": "yes"}
-    other |= {"metrics": [{}], "space": {"design": 7}, "stations": 7, "quantiles": 7}
-    changed = [settings | {name: value} for name, value in (other | {"atlas_version": 1}).items()]
-    lacking = [{key: settings[key] for key in settings if key != name} for name in other]
-    for text in ("{", "[]", "{}", "7", *map(json.dumps, changed + lacking)):
-        raised_by(lambda text=text: Command.from_json(text))

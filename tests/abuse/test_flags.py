@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import typing
 
 import pytest
@@ -10,7 +9,7 @@ import pytest
 from softreach.cli.app import app
 from softreach.cli.changes import Changes
 from softreach.cli.options import Sampling
-from softreach.cli.values import NUMBER, WHOLE
+from softreach.cli.values import Number, Whole
 from softreach.support.quantity import read_number, read_whole_number
 from tests.abuse.refusals import refusal_of
 
@@ -18,8 +17,8 @@ TRUNK = "minimal_trunk"
 VARY = "atlas build a.zarr --vary taper_deg=0,1"
 POSITION = "three comma-separated numbers x,y,z in m"
 SHAPE = "must be such that the arm has a shape, as from -1.6"
-STORED = "must be left out for a stored cloud"
-NOT_WRITTEN = "overwrite = True: must be left out where no file is written"
+STORED = "has no effect on a stored cloud: give the design instead"
+NOT_WRITTEN = "error: --overwrite has no effect without --out"
 
 REFUSED = {
     # one bad value for each reader
@@ -30,7 +29,6 @@ REFUSED = {
     f"cloud {TRUNK} --tol=0": "tol = 0",
     f"design {TRUNK} --set taper=２deg": "taper = ２deg: must be a finite number",
     f"volume {TRUNK} --alpha=-1L": "must be a radius > 0",
-    f"solve {TRUNK} --target 0,1": POSITION,
     f"solve {TRUNK} --target 0,0,nan": POSITION,
     f"equilibria {TRUNK} --activation=1,2": "3 comma-separated numbers",
     f"atlas build a.zarr --vary taper_deg=0:3:{10**9}": "a count up to 100000",
@@ -39,15 +37,9 @@ REFUSED = {
     f"{VARY} --shard 2/2": "shard = 2/2: must be i/k",
     # one for each command that has numbers or words of its own
     f"volume {TRUNK} --n=1e15": "GB of memory, of which",
-    f"show {TRUNK} --n=1e18": "GB of memory, of which",
-    "demo --n=1e18": "GB of memory, of which",
-    f"{VARY} --n 1e15": "GB of memory, of which",
     f"reach {TRUNK} --accuracy nan": "accuracy = nan: must be a finite number",
-    f"design {TRUNK} --taper-deg 1e400": "taper_deg = 1e400: must be a finite number",
-    "payload lce_arm --gravity up --share inf": "share = inf: must be a finite number",
     "solve redundant_trunk --target 0,0,1 --family 0": "family = 0: must be a whole number",
     f"equilibria {TRUNK} --activation=-7,-7,-7": SHAPE,
-    f"export {TRUNK} a.stl --activation=9,9,9": SHAPE,
     f"equilibria {TRUNK} --view diagonal --out a.png": "view = diagonal: must be front, side",
     "atlas build a.zarr --vary taper_deg=0:3:1001 --vary revolution_deg=0:9:1000": "1,000,000 at",
     "atlas figures a.zarr --panels 0": "panels = 0: must be a whole number, 1 or more",
@@ -55,86 +47,66 @@ REFUSED = {
     f"studio {TRUNK} --no-open --host=": "host = '': must be an address to listen on",
     f"studio {TRUNK} --static a": "parameters = none: must be at least one of",
     "desgin": 'Did you mean "design"',
-    "design": "must be a design file or a built-in design, or use --schema",
+    "design": "give a design file or a built-in design, or use --schema",
     "design nowhere.toml": "nowhere.toml: must be a file that exists",
     "design elephant": "elephant: must be a .toml file, or one of elephant_trunk, filament",
     "design minimal_trank": 'did you mean "minimal_trunk"?',
     "design arm.json": "softreach import arm.json arm.toml",
     f"design {TRUNK} --set left.tension=3": "commands; their bounds are left.lower and left.upper",
     f"design {TRUNK} --tapr-deg 3": "Did you mean --taper-deg",
-    f"design {TRUNK} --taper-deg steep": "taper_deg = steep: must be a finite number",
     f"design {TRUNK} --taper-deg 10": "3.57633 deg",
     f"cloud {TRUNK} --sampler unifrom": 'did you mean "uniform"?',
-    f"cloud {TRUNK} --sampler halton": "one of uniform, boundary, sobol, grid",
     f"cloud {TRUNK} --sampler sobol --n 1000": "512 or 1024",
     f"cloud {TRUNK} --sampler grid --n 999": "9^3 = 729 or 10^3 = 1000",
     "volume nowhere.zarr": "must be a Zarr store written by softreach; it does not exist",
     "atlas status nowhere.zarr": "must be an atlas written by build_atlas; it does not exist",
-    "studio nowhere.zarr --no-open": "it does not exist",
-    f"volume {TRUNK} --n 9 --alpha wide": "alpha = wide",
     f"show {TRUNK} --n 9 --color pink": "left, right, longitudinal",
-    f"show {TRUNK} --n 9 --activation 1": "3 comma-separated numbers",
     f"export {TRUNK}": "requires an argument",
-    f"solve {TRUNK}": "--targets",
+    f"solve {TRUNK}": "give either --target or --targets",
     f"solve {TRUNK} --targets nowhere.csv": "must be a file that exists",
-    "solve lce_arm --target 80mm,50mm,-240": "80mm,50mm,-240: must be three comma-separated",
     "solve lce_arm --target 0,0,5inch": "or each with its unit (m, cm, mm, um, µm, L)",
-    f"track {TRUNK} nowhere.csv": "must be a file that exists",
     f"reach {TRUNK} --accuracy 2": "accuracy = 2.0: must be",
     **{
         f"{one} --unit ft": "unit = 'ft': must be one of m, cm, mm, L"
-        for command in ("design", "reach", "cloud", "volume", "payload", "equilibria", "show")
-        for one in (f"{command} lce_arm", "demo")
+        for one in ("design lce_arm", "show lce_arm", "demo")
     },
     **{
         f"{VARY} --alpha={alpha}": "must be a radius > 0 over the length of each design"
-        for alpha in ("L", "-1L", "nanL", "infL", "5cm")
+        for alpha in ("-1L", "5cm")
     },
     # changes of a design
     "design lce_arm --payload 200": "payload = 200: must be a mass >= 0 with its unit (kg, g, mg)",
     "design lce_arm --payload -2g": "payload = -2g: must be a mass >= 0",
-    "design lce_arm --payload 2g,3g": "payload = 2g,3g",
     "design lce_arm --gravity Down": "gravity = Down: must be down, up, sideways, none, or",
-    "design lce_arm --gravity 9.81": "gravity = 9.81",
-    "design lce_arm --gravity 0,0,nan": "gravity = 0,0,nan",
     "design lce_arm --gravity 0,0,-9.81N": "three finite numbers x,y,z in m/s²",
     "design lce_arm --base hanging --gravity hanging": "its base, which points down",
     "design lce_arm --base=z": "must be one of upright, hanging, up, down, x, -x, y, -y",
     "design lce_arm --tip-force 1,2": "tip_force = 1,2: must be three finite numbers x,y,z in N",
-    "design lce_arm --tip-force 1,2,3kg": "tip_force = 1,2,3kg",
     "design lce_arm --set taper": "set = taper: must be PATH=VALUE",
-    "design lce_arm --set =3": "set = =3: must be PATH=VALUE",
-    "design lce_arm --set taper=": "must be PATH=VALUE",
     "design lce_arm --set taper=3": "(deg, °, rad), or a number under taper_deg",
     "design lce_arm --set taper_deg=3deg": "without a unit, which the name holds",
     "design lce_arm --set bore_ratio=0.1m": "= 0.1m: must be a finite number without a unit",
     "design lce_arm --set taper=1deg --set taper_deg=2": "set = taper_deg: must be given once",
     "design lce_arm --set taper=1deg --taper-deg 2": "set = taper: must be given once",
     "design lce_arm --set tapr=1deg": 'did you mean "taper"?',
-    "design lce_arm --set loads.paylod=1g": 'did you mean "loads.payload"?',
     "design lce_arm --set rings[0].material.density_kg_m3=-1": "density_kg_m3 = -1: must be",
-    "design lce_arm --set left.offset=1e999deg": "left.offset = 1e999deg",
     # options that would be ignored
-    "volume a.zarr --n 5": f"n = 5: {STORED}",
-    "show a.zarr --taper-deg 1": f"taper_deg = 1.0: {STORED}",
-    "export a.zarr b.csv --payload 2g": f"payload = 2g: {STORED}",
-    f"reach {TRUNK} --at 0,0,0.1": "left out without a picture",
-    f"cloud {TRUNK} --n 1000 --sampler grid --seed 1": "seed = 1: must be left out for the",
-    f"design {TRUNK} --schema": f"design = {TRUNK}: must be left out with --schema",
+    "volume a.zarr --n 5": f"--n {STORED}",
+    "show a.zarr --taper-deg 1": f"--taper-deg {STORED}",
+    "export a.zarr b.csv --payload 2g": f"--payload {STORED}",
+    f"reach {TRUNK} --at 0,0,0.1": "--at has no effect without a picture: add --out slices.png",
+    f"cloud {TRUNK} --n 1000 --sampler grid --seed 1": "--seed has no effect on the sampler grid",
+    f"design {TRUNK} --schema --unit mm": "--unit has no effect with --schema",
     f"design {TRUNK} --overwrite": NOT_WRITTEN,
-    f"volume {TRUNK} --overwrite": NOT_WRITTEN,
-    f"reach {TRUNK} --overwrite": NOT_WRITTEN,
-    f"equilibria {TRUNK} --overwrite": NOT_WRITTEN,
-    "payload lce_arm --gravity up --overwrite": NOT_WRITTEN,
-    f"equilibria {TRUNK} --view top": "view = top: must be left out without a picture",
-    f"solve {TRUNK} --target 0,0,1 --family 2": "family = 2: must be left out for a design",
-    "export a.zarr a.csv --activation=0,0,0": "activation = 0,0,0: must be left out for a cl",
-    f"studio {TRUNK} --vary taper_deg=0:3:4": "left out without --static and its folder",
-    f"studio {TRUNK} --static a --vary taper_deg=0,1 --port 8080": "which serves nothing",
-    "atlas build a.zarr --space a.toml --design lce_arm": "design = lce_arm: must be left out",
-    "atlas build a.zarr --space a.toml --payload 1g": "payload = 1g: must be left out with",
-    f"{VARY} --metrics exact --alpha 0.1L": "alpha = 0.1L: must be left out without the metrics",
-    f"design {TRUNK} -q -v": "quiet = True: must be left out with --verbose",
+    f"equilibria {TRUNK} --view top": "--view has no effect without --out",
+    f"solve {TRUNK} --target 0,0,1 --family 2": "--family has no effect on up to three",
+    "export a.zarr a.csv --activation=0,0,0": "--activation has no effect on a cloud",
+    f"studio {TRUNK} --vary taper_deg=0:3:4": "--vary has no effect without --static",
+    f"studio {TRUNK} --static a --vary taper_deg=0,1 --port 8080": "--port has no effect",
+    "atlas build a.zarr --space a.toml --design lce_arm": "--design has no effect with --space",
+    "atlas build a.zarr --space a.toml --payload 1g": "--payload has no effect with --space",
+    f"{VARY} --metrics exact --alpha 0.1L": "--alpha has no effect without the metrics",
+    f"design {TRUNK} -q -v": "choose --quiet or --verbose",
 }
 
 
@@ -182,23 +154,25 @@ def test_a_file_of_targets_that_is_no_table_of_places_is_refused(expected, tmp_p
     assert expected in refusal_of(["solve", TRUNK, "--targets", str(path)], capsys, tmp_path)
 
 
-def _options():
+def _commands():
     commands = [app[name] for name in app if not name.startswith("-")]
     commands += [one[part] for one in commands for part in one if not part.startswith("-")]
-    functions = [one.default_command for one in commands if one.default_command]
-    for function in (*functions, Changes, Sampling):
-        hints = typing.get_type_hints(function, include_extras=True)
-        hints.pop("return", None)
-        for name, hint in hints.items():
-            yield pytest.param(hint, id=f"{getattr(function, '__name__', function)} {name}")
+    return [one.default_command for one in commands if one.default_command]
 
 
-@pytest.mark.parametrize("hint", list(_options()))
-def test_every_number_on_the_command_line_has_the_one_reader(hint):
-    kind, *meanings = typing.get_args(hint) or (hint,)
-    plain = {kind, *typing.get_args(kind)}
-    if int in plain and bool not in plain:
-        assert WHOLE in meanings
-    if float in plain:
-        assert NUMBER in meanings
-    assert not inspect.isclass(hint) or hint not in (int, float)
+def _readers(hint, meanings=()):
+    """Each plain number in a hint, and what is said of it."""
+    if hint in (int, float):
+        yield hint, meanings
+    annotated = typing.get_origin(hint) is typing.Annotated
+    parts = typing.get_args(hint)
+    for part in parts[:1] if annotated else parts:
+        yield from _readers(part, parts[1:] if annotated else ())
+
+
+def test_every_number_on_the_command_line_has_the_one_reader():
+    readers = {int: typing.get_args(Whole)[1], float: typing.get_args(Number)[1]}
+    for function in (*_commands(), Changes, Sampling):
+        for name, hint in typing.get_type_hints(function, include_extras=True).items():
+            for kind, meanings in _readers(hint):
+                assert name == "return" or readers[kind] in meanings, (function, name)

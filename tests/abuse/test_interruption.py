@@ -27,6 +27,8 @@ COMMANDS = {
     "compiles": "warmup --no-loads",
     "serves": "studio minimal_trunk --no-open",
 }
+OFTEN = "writes", "compiles", "serves"
+"""Those of every run; a sweep loses its terminal below."""
 
 
 def started(command: list[str], folder: Path, stderr: int) -> subprocess.Popen[bytes]:
@@ -64,7 +66,10 @@ def processes_of(session: int) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "name",
+    [name if name in OFTEN else pytest.param(name, marks=pytest.mark.large) for name in COMMANDS],
+)
 def test_a_signal_at_any_moment_ends_a_command_in_one_line_with_nothing_left(name, tmp_path):
     draw = random.Random(name)
     number = draw.choice([signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -31,7 +31,6 @@ BEYOND = [
     ("", "\n[rest]\ncurvature_y_per_m = 1e155", "<= 1e+06 1/m"),
     ("", "\n[rest]\ncurvature_y_per_m = 1e5", "at most 100 turns"),
     ("", f"\nx = {'[' * 90_000}", "nested too deep"),
-    ("", "\n" + "a." * 50_000 + "a = 1", "more than 64 parts"),
 ]
 
 

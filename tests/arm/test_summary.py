@@ -160,6 +160,13 @@ def test_a_summary_is_that_of_the_parts(arm):
     assert facts.warnings == design_warnings(arm)
 
 
+def test_a_summary_prints_equal_neighbors_once():
+    summary = describe(designs.three_tendon_robot())
+    lines = str(summary).splitlines()
+    assert "bundle strain     3 × -0.07866 to 0" in lines
+    assert lines[-len(summary.validity) :] == list(summary.validity)
+
+
 def test_a_design_beyond_the_theory_has_no_summary(trunk):
     with pytest.raises(sr.InvalidDesign, match="must keep ζ > 0"):
         describe(trunk.with_bounds((-9.0, 0.0)))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
 import pytest
 import xarray as xr
 
@@ -19,3 +23,10 @@ def paper(tmp_path_factory) -> xr.Dataset:
 def whole(tmp_path_factory) -> xr.Dataset:
     """The atlas of the subprocesses, without interruption."""
     return build16(tmp_path_factory.mktemp("atlas") / "whole.zarr").load()
+
+
+@pytest.fixture(scope="module")
+def process() -> Iterator[ProcessPoolExecutor]:
+    """A worker process that has imported nothing of this one."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        yield pool

@@ -8,11 +8,12 @@ import signal
 import textwrap
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
+from pathlib import Path
 
 import pytest
 
-from softreach.atlas import StoreFailed, atlas_status, build_atlas, open_atlas
-from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.atlas import Metric, Need, StoreFailed, atlas_status, build_atlas, open_atlas
+from softreach.support.errors import InvalidInput, SoftreachError, SoftreachWarning
 from tests.atlas.families import SMALL, assert_same, small_space
 from tests.atlas.scripts import build16, ended, run_script
 
@@ -40,46 +41,37 @@ def test_an_executor_of_threads_gives_the_same_numbers(whole, tmp_path):
         assert_same(build16(tmp_path / "a.zarr", executor=pool).load(), whole)
 
 
-DEADLY = """
-    right = design_task.Intermediates
-
-    def deadly(arm, *rest):
-        guilty = arm.profile.taper > 0.05 and abs(describe(arm).revolutions[0]) < 1e-9
-        mark = Path(sys.argv[0]).with_suffix(".died")
-        if guilty and not mark.exists():
-            mark.touch()
-            die()
-        return right(arm, *rest)
-
-    design_task.Intermediates = deadly
-"""
+DIED = "SOFTREACH_TEST_DIED"
 
 
-def deadly(body: str) -> str:
-    """A script in which a worker dies over design number 3, once."""
-    return textwrap.dedent(DEADLY) + textwrap.dedent(body)
+def deadly_length(arm):
+    """A metric over which a worker dies, once."""
+    if arm.profile.taper > 0.01 and not (mark := Path(os.environ[DIED])).exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return arm.length
 
 
-def test_a_pool_that_loses_a_worker_ends_with_one_line_and_another_one_continues(whole, tmp_path):
+DEADLY_LENGTH = Metric(
+    name="deadly", unit="m", meaning="length", needs=(Need.ARM,), compute=deadly_length
+)
+
+
+def test_a_pool_that_loses_a_worker_ends_with_one_line_and_another_one_continues(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv(DIED, str(tmp_path / "died"))
+    asked = SMALL | {"metrics": ["extent", DEADLY_LENGTH]}
     store = tmp_path / "a.zarr"
-    body = """
-        from concurrent.futures import ProcessPoolExecutor
-        from multiprocessing import get_context
-        from softreach.support.errors import SoftreachError
-        if __name__ == "__main__":
-            try:
-                with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-                    build(sys.argv[1], executor=pool)
-            except SoftreachError as error:
-                sys.exit(str(error))
-    """
-    said = ended(run_script(tmp_path, deadly(body), str(store)))[1]
-    (line,) = [line for line in said.splitlines() if line.startswith("a worker died and broke")]
-    assert line.endswith("what is done is safe, and the same call with a new executor continues")
-    assert "Traceback" not in said
-    assert atlas_status(store).done < 16
+    with (
+        ProcessPoolExecutor(1, get_context("spawn")) as pool,
+        pytest.raises(SoftreachError, match=r"a worker died and broke its executor; .* continues"),
+    ):
+        build_atlas(small_space(), store, executor=pool, **asked)
+    assert atlas_status(store).done == 1
     with ThreadPoolExecutor(1) as pool:
-        assert_same(build16(store, executor=pool).load(), whole)
+        found = build_atlas(small_space(), store, executor=pool, **asked).load()
+    assert_same(found, build_atlas(small_space(), tmp_path / "b.zarr", **asked).load())
 
 
 class KilledWorker(Exception):
@@ -101,6 +93,26 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
         build_atlas(small_space(), tmp_path / "a.zarr", executor=pool, **SMALL)
     status = atlas_status(tmp_path / "a.zarr")
     assert (status.done, status.messages) == (3, {3: "its worker died repeatedly"})
+
+
+DEADLY = """
+    right = executor.Intermediates
+
+    def deadly(arm, *rest):
+        guilty = arm.profile.taper > 0.05 and abs(describe(arm).revolutions[0]) < 1e-9
+        mark = Path(sys.argv[0]).with_suffix(".died")
+        if guilty and not mark.exists():
+            mark.touch()
+            die()
+        return right(arm, *rest)
+
+    executor.Intermediates = deadly
+"""
+
+
+def deadly(body: str) -> str:
+    """A script in which a worker dies over design number 3, once."""
+    return textwrap.dedent(DEADLY) + textwrap.dedent(body)
 
 
 ON_DASK = """
@@ -164,14 +176,11 @@ def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
     assert_same(open_atlas(tmp_path / "a.zarr").load(), whole)
 
 
-def test_workers_refuse_a_store_in_the_memory_of_another_process():
+def test_workers_refuse_a_store_in_the_memory_of_another_process(process):
     from zarr.storage import MemoryStore
 
-    with (
-        ProcessPoolExecutor(1, get_context("spawn")) as pool,
-        pytest.raises(StoreFailed, match="in the memory of another process"),
-    ):
-        build_atlas(small_space(), MemoryStore(), executor=pool, **SMALL)
+    with pytest.raises(StoreFailed, match="in the memory of another process"):
+        build_atlas(small_space(), MemoryStore(), executor=process, **SMALL)
 
 
 def test_what_is_no_executor_is_refused(tmp_path):

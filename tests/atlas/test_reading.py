@@ -11,11 +11,7 @@ import pytest
 import xarray as xr
 
 import softreach as sr
-from softreach.arm.actuators import Tendon
-from softreach.arm.material import Material
 from softreach.arm.parameters import changed
-from softreach.arm.profile import PiecewiseTaper
-from softreach.arm.section import Ring, Section
 from softreach.atlas import (
     DesignSpace,
     atlas_cloud,
@@ -26,7 +22,7 @@ from softreach.atlas import (
     open_atlas,
     over_length,
 )
-from softreach.atlas.design_task import begin_design
+from softreach.atlas.executor import begin_design
 from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command
@@ -270,20 +266,6 @@ def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
     assert "no luck" in said
 
 
-def test_an_atlas_has_all_groups_of_metrics_unless_some_are_chosen(tmp_path, monkeypatch, capsys):
-    from softreach import atlas as library
-    from softreach.atlas.metrics import METRIC_GROUPS
-
-    chosen = {}
-    monkeypatch.setattr(library, "build_atlas", lambda *_, **options: chosen.update(options))
-    monkeypatch.setattr(atlas_command, "status", lambda *_, **__: None)
-    assert run(["atlas", "build", str(tmp_path / "a.zarr"), "--vary", "taper_deg=0,2"]) == 0
-    assert chosen["metrics"] == tuple(METRIC_GROUPS)
-    assert run(["atlas", "build", "--help"]) == 0
-    text = capsys.readouterr().out
-    assert all(group in text for group in METRIC_GROUPS)
-
-
 # Atlases over numbers of parts, called by their paths in Python, files and commands alike
 
 
@@ -312,26 +294,6 @@ def test_the_dimensions_of_an_atlas_are_the_paths(tmp_path):
     np.testing.assert_allclose(atlas_cloud(atlas, **at).tip, cloud.tip, atol=1e-5)
     height = atlas.reach_height.sel(at)
     np.testing.assert_allclose(height, cloud.tip[:, 2].max(), rtol=1e-12)
-
-
-@pytest.mark.parametrize("url", [False, True])
-def test_an_atlas_over_paths_is_resumed_where_it_stopped(tmp_path, url):
-    store = f"memory://{tmp_path.name}/a.zarr" if url else tmp_path / "a.zarr"
-    sr.build_atlas(space(), store, **TINY, shard=(1, 2))
-    assert open_atlas(store)["status"].values.tolist() == [[0, 1], [0, 1]]
-    assert_same(varied(store).load().drop_attrs(), varied({}).load().drop_attrs())
-
-
-def test_another_value_of_a_path_is_another_command(tmp_path):
-    begun = AtlasStore.begin(tmp_path / "a.zarr", command(space(), **TINY))
-    other = DesignSpace.grid(space().base, **VALUES | {END: [0.5, 0.9]})
-    with pytest.raises(InvalidInput, match=rf"it differs in {END}: \(0.5, 1.0\) there"):
-        AtlasStore.begin(begun.location, command(other, **TINY))
-
-
-def test_the_best_design_is_found_under_a_constraint_on_a_path(tmp_path):
-    best = best_designs(varied(tmp_path / "a.zarr"), "reach_radius", where={END: (None, 0.6)})
-    assert best[END].item() == 0.5
 
 
 def test_the_command_line_writes_the_unit_behind_the_path(tmp_path, capsys):
@@ -387,27 +349,3 @@ def test_one_number_is_not_varied_under_two_names():
     names = {"rings[skin].inner_ratio": [0.5], "rings[0].inner_ratio": [0.6]}
     with pytest.raises(InvalidInput, match="given once"):
         DesignSpace.grid(arm, **names)
-
-
-def tendon_arm() -> sr.Manipulator:
-    """Two materials, and two tendons that are driven together."""
-    soft, skin = (Material(young_modulus=modulus) for modulus in (1e6, 2e6))
-    rings = (
-        Ring(inner_ratio=0.4, outer_ratio=0.9, material=soft),
-        Ring(inner_ratio=0.9, material=skin, name="skin"),
-    )
-    profile = PiecewiseTaper(length=0.3, stations_over_length=(0.0, 0.5, 1.0), radii=(0.02,) * 3)
-    pull = Tendon(name="pull", distance=0.01, bundles=2, activation_bounds=(0.0, 20.0))
-    return sr.Manipulator(profile=profile, section=Section(rings=rings), actuators=(pull,))
-
-
-def test_an_arm_of_other_parts_has_an_atlas_too(tmp_path):
-    names = {"rings[skin].material.young_modulus": [1e6, 4e6], "profile.radii[1]": [0.01, 0.02]}
-    grid = DesignSpace.grid(tendon_arm(), **names)
-    atlas = sr.build_atlas(grid, tmp_path / "a.zarr", **TINY)
-    assert open_atlas(tmp_path / "a.zarr")["status"].dims == tuple(names)
-    at = {"rings[skin].material.young_modulus": 4e6, "profile.radii[1]": 0.01}
-    assert atlas_design(atlas, **at) == changed(tendon_arm(), at)
-    reach = best_designs(atlas, "reach_radius", smallest=True)
-    stiffest = (reach[name].item() for name in names)
-    assert tuple(stiffest) == (4e6, 0.02)

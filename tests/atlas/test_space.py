@@ -89,6 +89,15 @@ def test_written_spaces_speak_in_degrees_and_ranges():
     assert space.shape == (4, 2, 1)
     np.testing.assert_allclose(np.degrees(space.values(3)["revolution"]), 36)
     np.testing.assert_allclose(np.degrees(space.values(3)["taper"]), 1.5)
+    units = """
+        [parameters]
+        revolution = "0deg:108deg:4"
+        taper = [0, "1.5°"]
+        outer_radius = "62.5mm"
+    """
+    same = parse_space(units, builtin)
+    for number in range(space.size):
+        assert same.values(number) == pytest.approx(space.values(number), rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -113,8 +122,8 @@ def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
             "layout = circle: must be one of grid",
         ),
         (
-            "[parameters]\ntaper = [0]",
-            "parameter = taper: must be one of revolution_deg, taper_deg",
+            "[parameters]\ntaper = [1]",
+            r"taper = \[1\]: must be a finite number with its unit \(deg, °, rad\)",
         ),
         ('[parameters]\ntaper_deg = "0:3"', "taper_deg = 0:3: must be numbers"),
         ('layout = "sobol"\n[parameters]\ntaper_deg = [0]', "taper = .*: must be two ends"),
@@ -135,3 +144,12 @@ def test_sampled_spaces_can_be_written_too():
     text = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
     space = parse_space(text, builtin)
     assert (space.dims, space.shape) == (("design",), (5,))
+
+
+def test_a_space_prints_its_parameters_with_their_ends():
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), taper=[0.0, 0.02], length=[1.0, 0.5])
+    assert str(space).splitlines() == [
+        "list of 2 designs",
+        "  taper: 2 values from 0 to 0.02 rad",
+        "  length: 2 values from 0.5 to 1 m",
+    ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import asyncio
+import re
 import shutil
 import signal
 from concurrent.futures import ThreadPoolExecutor
@@ -29,7 +29,6 @@ from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.store import AtlasStore, Result
 from softreach.rod import TipMap
 from softreach.support.errors import InvalidInput, SoftreachError, SoftreachWarning
-from softreach.support.interruption import INTERRUPTED
 from tests.atlas.families import SMALL, TINY, assert_same, command, gapped_space, small_space
 from tests.atlas.scripts import build16, ended, run_script, stored_files
 from tests.laws import of_length
@@ -83,7 +82,7 @@ def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(beg
     def dies():
         raise Interrupted
 
-    for write in range(0, begun.writes, 2):
+    for write in range(0, begun.writes, 5):
         place = tmp_path / f"{write}.zarr"
         store = interrupting_store(place, write, dies)
         with pytest.raises(StoreFailed) as caught:
@@ -107,7 +106,7 @@ def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun,
         other.write(1, result)
         other.write_status(3, "no luck")
 
-    for write in range(0, begun.writes, 2):
+    for write in range(0, begun.writes, 5):
         place = tmp_path / f"{write}.zarr"
         slow = interrupting_store(place, write, overtakes)
         AtlasStore.begin(slow, command(gapped_space(), **TINY))
@@ -126,7 +125,7 @@ def test_of_two_different_commands_at_one_moment_one_is_refused(begun, tmp_path)
         accepted.append(n)
         return ""
 
-    for write in range(0, begun.writes, 2):
+    for write in range(0, begun.writes, 5):
         accepted, place = [], tmp_path / f"{write}.zarr"
         said = begin(interrupting_store(place, write, lambda at=place: begin(at, 11)), 10)
         assert ("n: 11 there, 10 here" in said) == (write == 0)
@@ -174,14 +173,6 @@ def test_an_atlas_elsewhere_is_built_resumed_and_asked_as_one_on_disk(elsewhere,
         build_atlas(small_space(), elsewhere, **SMALL | {"n": 3_000})
 
 
-def test_a_url_that_holds_other_things_is_left_alone():
-    memory = pytest.importorskip("fsspec").filesystem("memory")
-    memory.pipe("/other/thesis.tex", b"precious")
-    with pytest.raises(InvalidInput, match="a new folder, or an atlas"):
-        build_atlas(small_space(), "memory://other", **SMALL)
-    assert memory.find("/other") == ["/other/thesis.tex"]
-
-
 def test_what_cannot_be_reached_is_said_in_one_line(tmp_path):
     pytest.importorskip("fsspec")
     (tmp_path / "file").touch()
@@ -221,24 +212,11 @@ def test_designs_of_the_same_atlas_built_in_two_folders_may_be_copied_together(t
 
 def test_only_public_names_of_zarr_are_used():
     """Private ones would tie softreach to one release of Zarr."""
-    root = Path(sr.__file__).parent
-    private = [
-        f"{file.relative_to(root)}: {name}"
-        for file in root.rglob("*.py")
-        for name in imported_from_zarr(ast.parse(file.read_text()))
-        if name.startswith("zarr.core") or any(part.startswith("_") for part in name.split("."))
-    ]
-    assert private == []
-
-
-def imported_from_zarr(tree: ast.AST) -> list[str]:
-    found = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
-    names = [
-        f"{node.module}.{alias.name}" if isinstance(node, ast.ImportFrom) else alias.name
-        for node in found
-        for alias in node.names
-    ]
-    return [name for name in names if name.split(".")[0] == "zarr"]
+    private = re.compile(
+        r"^ *(from|import) zarr([\w.]*\._|\.core|[\w.]* import \(?\s*_)", re.MULTILINE
+    )
+    files = Path(sr.__file__).parent.rglob("*.py")
+    assert [file.name for file in files if private.search(file.read_text())] == []
 
 
 def test_a_store_of_another_version_is_refused():
@@ -267,7 +245,7 @@ def test_lengths_that_cannot_share_a_step_are_refused(tmp_path):
 # Interrupted or refused, failed or retried, an atlas ends with the same numbers
 
 
-@pytest.mark.parametrize("kills", [2, pytest.param(30, marks=pytest.mark.large)])
+@pytest.mark.parametrize("kills", [1, pytest.param(30, marks=pytest.mark.large)])
 def test_kills_leave_the_same_bits_as_no_kill(kills, whole, tmp_path):
     """Before a file is opened to be written, or is renamed; a build has about 100 such moments."""
     body = """
@@ -284,27 +262,23 @@ def test_kills_leave_the_same_bits_as_no_kill(kills, whole, tmp_path):
         sys.addaudithook(count_down)
         build(STORE)
     """
-    build16(tmp_path / "whole.zarr")
     store, drawn = tmp_path / "killed.zarr", np.random.default_rng(kills)
     for operation in drawn.integers(1, 7 if kills > 2 else 45, kills):
         process = run_script(tmp_path, body, str(store), str(operation))
         ended(process)
         assert process.returncode == -signal.SIGKILL
     assert_same(build16(store).load(), whole)
-    found, right = (stored_files(tmp_path / f"{name}.zarr") for name in ("killed", "whole"))
-    assert found == right
+    assert stored_files(store) == stored_files(Path(whole.encoding["source"]))
 
 
-def test_ctrl_c_ends_a_process_with_a_line_and_the_same_call_continues(whole, tmp_path):
-    body = """
-        from softreach.support.interruption import run_stoppable
-        run_stoppable(
-            lambda: build(sys.argv[1], progress=lambda _: os.kill(os.getpid(), signal.SIGINT))
-        )
-    """
-    process = run_script(tmp_path, body, str(tmp_path / "a.zarr"))
-    said = ended(process)[1]
-    assert (process.returncode, said) == (130, f"{INTERRUPTED}\n")
+def test_an_interrupted_build_is_continued_by_the_same_call(whole, tmp_path):
+    """In Python, where Ctrl-C raises; `tests/abuse/test_interruption.py` has it of commands."""
+
+    def interrupts(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        build16(tmp_path / "a.zarr", progress=interrupts)
     assert 0 < atlas_status(tmp_path / "a.zarr").done < 16
     assert_same(build16(tmp_path / "a.zarr").load(), whole)
 
@@ -377,7 +351,7 @@ def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatc
         return Intermediates(arm, *rest)
 
     with monkeypatch.context() as patch:
-        patch.setattr("softreach.atlas.design_task.Intermediates", fails_for_taper)
+        patch.setattr("softreach.atlas.executor.Intermediates", fails_for_taper)
         with pytest.warns(SoftreachWarning, match="1 design failed, .*no hull today"):
             atlas = build_atlas(small_space(), store, **SMALL)
     assert np.isfinite(atlas.volume.values).tolist() == [[True, True], [True, False]]

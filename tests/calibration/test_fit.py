@@ -41,7 +41,7 @@ def test_poses_without_noise_lead_back_to_the_arm():
         actuators=(truth.actuators[0].replace(distance=0.007),),
     )
     free = ["pose", "t.distance", "rest.curvature_x", "markers.half.offset[0]"]
-    data = measured(truth, 8)
+    data = measured(truth, 5)
     # Gravity is known in the world, so that the data says which way is up.
     result = sr.calibrate(start, data, free=free, rivals=False, robust=False)
     assert result.train.rms < 1e-6

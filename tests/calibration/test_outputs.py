@@ -162,7 +162,7 @@ def test_the_command_takes_columns_priors_and_tied_numbers(folder, capsys):
         (["--free", "pose", "--input", "t 1"], "NAME=COLUMN"),
         (["--free", "pose", "--marker", "tool=a", "--marker", "tool=b"], "given once for tool"),
         (["--free", "pose", "--noise", "loud"], "a length > 0 such as 0.2mm"),
-        (["--free", "pose", "--overwrite"], "left out where no file is written"),
+        (["--free", "pose", "--overwrite"], "--overwrite has no effect without --out"),
         (["--free", "pose", "-o", "x.html"], "a file name ending in .toml"),
         (["--free", "pose", "--report", "x.toml"], "a file name ending in .html"),
         (["--free", "pose", "--table", "poses.csv"], "overwrite"),

@@ -37,7 +37,7 @@ def test_planned_poses_tell_more_than_any_of_many_random_choices():
 
 
 def test_the_errors_promised_are_those_of_fits():
-    plan = plan_poses(ARM, FREE, 60, candidates=256)
+    plan = plan_poses(ARM, FREE, 40, candidates=128)
     promised, noise = plan.sigma(3e-4), 3e-4
     values = []
     for seed in range(12):

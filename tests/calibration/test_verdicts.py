@@ -7,7 +7,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed
-from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.errors import NotPossible, no_warnings
 from tests.calibration.arms import MODULUS, hanging_tentacle, table
 
 ARM = hanging_tentacle()
@@ -81,7 +81,7 @@ def limit(cause, seed, count=None):
         with no_warnings():
             out = 0.2 * (seed % 3)
             result = sr.calibrate(SINGLE, data, free=free, hold_out=out, rivals=False)
-    except InvalidInput as error:
+    except NotPossible as error:
         return "columns" if "exchange" in str(error) else str(error)
     return result.verdict.limit
 

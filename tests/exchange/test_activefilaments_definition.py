@@ -15,12 +15,10 @@ from softreach.arm import (
     Chamber,
     LinearTaper,
     Material,
-    ObliqueMuscle,
     Pieces,
     PiecewiseTaper,
     Samples,
     Section,
-    Tendon,
     designs,
 )
 from softreach.arm.parameters import changed
@@ -33,7 +31,7 @@ from softreach.exchange.activefilaments import (
     write_cloud,
     write_design,
 )
-from softreach.exchange.activefilaments.filament import arm_of, filament_of
+from softreach.exchange.activefilaments.filament import filament_of
 from softreach.support.errors import SoftreachWarning
 from tests.exchange.julia import json_of
 from tests.laws import arm_of as tube_of
@@ -159,48 +157,26 @@ def test_a_helical_angle_in_pieces_survives(tmp_path):
     assert again.fibers[0].helical_angle == angle
 
 
-def test_a_filament_and_its_arm_say_the_same():
-    filament = filament_of(layered())
-    assert filament_of(arm_of(filament)).rings[0].inner_radius == filament.rings[0].inner_radius
-    assert [one.outer_radius for one in filament_of(arm_of(filament)).rings] == pytest.approx(
-        [ring.outer_radius for ring in filament.rings]
-    )
-
-
 FIBER = sr.FiberArchitecture(name="fiber", helical_angle=0.1, extent=0.5)
 LINEAR = Samples(stations_over_length=(0, 1), values=(0.1, 0.2))
 STIFF = sr.Ring(inner_ratio=0.5, material=Material(young_modulus=1e6))
 
 
+AIR = Chamber(distance=0.01, radius=0.002, activation_bounds=(0, 1), name="air")
+ROUND = PiecewiseTaper(length=1, stations_over_length=(0, 1), radii=(0.1, 0.1))
+INSIDE = STIFF.replace(inner_ratio=0.7, outer_ratio=0.8)
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"actuators": (FIBER, Tendon(distance=0.01, activation_bounds=(0, 1)))}, "Tendon"),
-        (
-            {
-                "actuators": (
-                    Chamber(distance=0.01, radius=0.002, activation_bounds=(0, 1), name="air"),
-                )
-            },
-            "air = Chamber",
-        ),
-        ({"actuators": (ObliqueMuscle(helical_angle=0.3, extent=1),)}, "ObliqueMuscle"),
-        (
-            {"profile": PiecewiseTaper(length=1, stations_over_length=(0, 1), radii=(0.1, 0.1))},
-            "a LinearTaper",
-        ),
+        ({"actuators": (FIBER, AIR)}, "air = Chamber"),
+        ({"profile": ROUND}, "a LinearTaper"),
         ({"profile": LinearTaper(length=1, outer_radius=0.1, taper=5e-5)}, "taper"),
         ({"actuators": (FIBER.replace(end_over_length=0.5),)}, "all of the arm"),
         ({"actuators": (FIBER.replace(helical_angle=LINEAR),)}, "Pieces"),
         ({"section": Section(rings=(STIFF,), bore_ratio=0.2)}, "bore_ratio"),
-        (
-            {
-                "section": Section(
-                    rings=(STIFF, STIFF.replace(inner_ratio=0.7, outer_ratio=0.8)),
-                )
-            },
-            "innermost",
-        ),
+        ({"section": Section(rings=(STIFF, INSIDE))}, "innermost"),
     ],
 )
 def test_what_no_filament_has_is_refused_in_one_line(changes, reason):
@@ -223,9 +199,6 @@ NO_PIECES = {"expressions": [0.1, 0.2], "piecewiseRanges": [[0, 0.4], [0.5, 1]]}
     ("place", "value", "told"),
     [
         ("L", -1.0, r"definition\.L = -1\.0: must be a finite number > 0"),
-        ("L", 10**400, r"definition\.L"),
-        ("L", True, r"definition\.L = True"),
-        ("phi2", float("nan"), r"definition\.phi2 = nan"),
         ("rings", [], r"definition\.rings = \[\]: must be a list"),
         ("rings 0", {}, r"definition\.rings\[0\] = {}: must be an object with"),
         ("rings 0 geometry R1", "a", r"rings\[0\]\.geometry\.R1 = 'a': must be a finite number"),
@@ -233,8 +206,6 @@ NO_PIECES = {"expressions": [0.1, 0.2], "piecewiseRanges": [[0, 0.4], [0.5, 1]]}
         ("rings 0 fiberArchitecture α2", NO_PIECES, "follow one another from 0 to L"),
         ("rings 0 mechanicalProperties ν", 0.7, "poisson_ratio"),
         ("innerTube geometry R2", 0.01, "from 0 to the innermost ring, 0.0375"),
-        ("activation", [], r"definition\.activation = \[\]: must be a list of 1"),
-        ("activation 0 N", 2, r"activation\[0\]\.γ = .*: must be a list of 2"),
         ("γBounds 0 1", [0.0, 0.0], r"γBounds\[0\]\[1\] = .*: must be a list of 3"),
     ],
 )
@@ -335,15 +306,11 @@ def test_numbers_of_julia_are_read(tmp_path, filament):
 
 
 HOSTILE = {
-    "header": (b"x,y,z\n1,2,3\n", "x"),
     "ragged": (b"1,2,3\n1,2\n", "columns changed"),
     "words": (b"1,2,3\n1,2,three\n", "'three' in row 2, column 3"),
     "empty": (b"", "no rows"),
     "binary": (b"\xff\xfe\x00\x01\n", "no text"),
-    "zeros": (b"\0" * 3000, "x00"),
     "not finite": (b"1,2,3\n1,nan,3\n", "row 2"),
-    "infinite": (b"1,2,1e999\n", "row 1"),
-    "semicolons": (b"1;2;3\n", "rows of comma-separated numbers"),
     "too few columns": (b"1,2\n", "2 columns: must be 3: x, y, z"),
     "long": (b"9" * 100_000 + b"x", "row 1, column 1"),
 }
@@ -414,20 +381,14 @@ def test_the_command_line_goes_there_and_back(folder, filament, capsys):
     ("arguments", "told"),
     [
         (["import", "nothing.json", "a.toml"], "a file that exists"),
-        (["import", "cloud.zarr", "a.toml"], ".json or .csv"),
-        (["import", "filament.json", "a.zarr"], "ending in .toml"),
         (["import", "filament.json.csv", "a.zarr"], "--design"),
-        (["import", "binary.json", "a.toml"], "text in UTF-8"),
         (["import", "binary.csv", "a.zarr", "--design", "filament.json"], "no text"),
         (["export", "cloud.zarr", "a.csv", "--format", "julia"], "activefilaments"),
-        (["export", "cloud.zarr", "a.txt", "--format", "activefilaments"], "ending in .csv"),
-        (["export", "filament", "a.csv", "--format", "activefilaments"], "ending in .jl"),
         (["export", "three_chamber_arm", "a.jl"], "FiberArchitecture"),
     ],
 )
 def test_wrong_input_costs_one_line(arguments, told, folder, capsys):
-    for name in ("binary.json", "binary.csv"):
-        (folder / name).write_bytes(bytes(range(256)) * 100)
+    (folder / "binary.csv").write_bytes(bytes(range(256)) * 100)
     assert run(arguments) == 2
     message = capsys.readouterr().err
     assert message.count("\n") == 1

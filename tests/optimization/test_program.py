@@ -93,8 +93,8 @@ def test_tips_at_the_places_are_differentiated_to_a_millionth(start):
 
 
 def test_rooms_are_differentiated(start):
-    wanted = differences(start, lambda each: stacked(each.rooms))
-    slopes, near = stacked_slopes(start.rooms), stacked(start.rooms) < 0.1
+    wanted = differences(start, lambda each: stacked(each.inequalities))
+    slopes, near = stacked_slopes(start.inequalities), stacked(start.inequalities) < 0.1
     assert near.sum() > 6
     np.testing.assert_allclose(slopes[near], wanted[near], atol=2e-4 * np.abs(wanted).max())
 

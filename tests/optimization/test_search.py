@@ -6,6 +6,7 @@ import sqlite3
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import numpy as np
@@ -20,7 +21,7 @@ from softreach.support.errors import InvalidInput
 ARM = sr.designs.minimal_trunk(material=sr.Material(young_modulus=1e6, density=1000.0))
 FREE = {"taper": (0.0, 0.05), "outer_radius": (0.06, 0.08), "revolution": (0.0, 1.8)}
 NEEDS = Requirements(limits=Limits(mass=8.0, shortening=0.9))
-FAST = dict(designs=20, accuracy=0.1)
+FAST = dict(designs=16, accuracy=0.2, seed=1)
 
 
 def heavy(**options):
@@ -30,8 +31,10 @@ def heavy(**options):
 
 @pytest.fixture(scope="module")
 def alone():
-    """That search without interruption or company."""
-    return heavy()
+    """That search on one thread, without interruption or company."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOFTREACH_NUM_THREADS", "1")
+        return heavy()
 
 
 def rows(search):
@@ -41,7 +44,7 @@ def rows(search):
 def test_the_best_is_the_first_that_no_other_beats_and_meets_all(alone):
     assert alone.met
     assert alone.arm == alone.problem.parameters.arm(alone.best.values)
-    assert sr.check(alone.arm, NEEDS, accuracy=0.1).met
+    assert sr.check(alone.arm, NEEDS, accuracy=0.2).met
     best = alone.best.objectives[0].value
     assert best == pytest.approx(8.0, rel=1e-3)
     assert best == pytest.approx(sr.describe(alone.arm).mass)
@@ -54,16 +57,13 @@ def test_the_best_is_the_first_that_no_other_beats_and_meets_all(alone):
     assert f"how sure: {len(near)} of {len(ends)} restart" in repr(alone)
 
 
-@pytest.mark.parametrize("threads", ["1", "3"])
-def test_the_same_seed_gives_the_same_designs_whatever_the_number_of_threads(
-    threads, alone, monkeypatch
-):
-    monkeypatch.setenv("SOFTREACH_NUM_THREADS", threads)
+def test_the_same_seed_gives_the_same_designs_whatever_the_number_of_threads(alone, monkeypatch):
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", "3")
     assert rows(heavy()) == rows(alone)
 
 
 def test_another_seed_gives_other_designs(alone):
-    assert rows(heavy(seed=1, polish=False)) != rows(alone)
+    assert rows(heavy(seed=2, designs=4))[:4] != rows(alone)[:4]
 
 
 KILLED = """
@@ -75,22 +75,22 @@ KILLED = """
         count -= 1
         if not count:
             os.kill(os.getpid(), signal.SIGKILL)
-    heavy(storage=sys.argv[1], follow=follow, seed=int(sys.argv[3]))
+    heavy(storage=sys.argv[1], follow=follow)
 """
 
 
-def started(storage, count, seed=0):
+def started(storage, count):
     """A process with that search, killed after some new designs, if there are so many."""
-    arguments = [str(storage), str(count), str(seed)]
+    arguments = [str(storage), str(count)]
     return subprocess.Popen([sys.executable, "-c", textwrap.dedent(KILLED), *arguments])
 
 
 @pytest.mark.parametrize(
     ("name", "each"),
     [
-        ("search.journal", 6),
+        ("search.journal", 8),
         pytest.param("search.journal", 1, marks=pytest.mark.large),
-        pytest.param("search.db", 6, marks=pytest.mark.large),
+        pytest.param("search.db", 8, marks=pytest.mark.large),
     ],
 )
 def test_a_search_that_was_killed_ends_as_if_it_had_not_been(name, each, tmp_path, alone):
@@ -105,25 +105,23 @@ def test_a_search_that_was_killed_ends_as_if_it_had_not_been(name, each, tmp_pat
     assert (search.finalists, search.designs) == (alone.finalists, alone.designs)
 
 
-def test_searches_of_other_seeds_share_a_storage_and_each_ends_with_the_best_of_all(
-    tmp_path, alone
-):
-    storage = tmp_path / "search.journal"
-    with started(storage, -1, seed=1) as process:
-        first = heavy(storage=storage)
-    assert process.returncode == 0
+def test_searches_of_other_seeds_share_a_storage_and_each_ends_with_the_best_of_all(tmp_path):
+    few = dict(designs=6, polish=False, storage=tmp_path / "search.journal")
+    alone = heavy(designs=6, polish=False)
+    with ThreadPoolExecutor(2) as pool:
+        *_, first = pool.map(lambda seed: heavy(**few, seed=seed), (2, 1))
     assert rows(first)[: len(rows(alone))] == rows(alone)
-    both = heavy(storage=storage)
+    both = heavy(**few)
     assert both.designs > alone.designs
     assert both.best.objectives[0].value >= alone.best.objectives[0].value
-    again = heavy(storage=storage, seed=1)
+    again = heavy(**few, seed=2)
     assert sorted(map(str, rows(again))) == sorted(map(str, rows(both)))
 
 
 def test_the_storage_of_another_search_is_refused(tmp_path):
     storage = tmp_path / "search.journal"
     heavy(storage=storage, designs=1, polish=False)
-    with pytest.raises(InvalidInput, match=r"storage = .*another search: remove it, or choose"):
+    with pytest.raises(InvalidInput, match=r"storage = .*belongs to another search: remove it"):
         sr.search(ARM, FREE, NEEDS, minimize="mass", storage=storage, **FAST)
 
 
@@ -154,12 +152,12 @@ def test_a_storage_that_softreach_did_not_write_stays_as_it_is(name, tmp_path):
 
 def test_a_journal_whose_last_line_was_cut_off_goes_on(tmp_path):
     storage = tmp_path / "search.journal"
-    whole = heavy(storage=storage, polish=False)
+    whole = heavy(storage=storage, designs=2, polish=False)
     text = storage.read_bytes()
-    for kept in range(text.rindex(b"\n", 0, -1) + 2, len(text), 40):
+    start = text.rindex(b"\n", 0, -1) + 1
+    for kept in (start + 1, (start + len(text)) // 2, len(text) - 1):
         storage.write_bytes(text[:kept])
-        again = heavy(storage=storage, polish=False)
-        assert rows(again) == rows(whole)
+        assert rows(heavy(storage=storage, designs=2, polish=False)) == rows(whole)
 
 
 @pytest.mark.parametrize("place", ["missing/search.journal", ".", "text.db"])
@@ -179,11 +177,11 @@ def test_without_an_objective_it_ends_with_the_first_design_that_meets_all():
 
 def test_what_no_design_reaches_is_proved_by_bounds_and_judged_in_full():
     far = Requirements(targets=(Target([[0, 0, 2.0]], name="moon"),), limits=Limits(mass=100.0))
-    search = sr.search(ARM, FREE, far, minimize="mass", polish=False, **FAST)
+    search = sr.search(ARM, FREE, far, minimize="mass", polish=False, designs=4, accuracy=0.2)
     assert not search.met
     assert search.judged["bounds"] == len(search.candidates)
     assert search.best.fidelity == "full"  # what bounds prove is less than what is missed
-    assert search.best.excess == sr.check(search.arm, far, accuracy=0.1).excess
+    assert search.best.excess == sr.check(search.arm, far, accuracy=0.2).excess
     assert "MISSED  moon: 0 of 1 place reached" in repr(search)
 
 
@@ -246,7 +244,7 @@ def test_an_objective_that_no_design_has_is_said_in_one_line():
         (dict(free={**FREE, "left.offset": "offset"}), "another free parameter"),
         (dict(free={}), "one parameter or more"),
         (dict(free=FREE, maximize="mas"), 'did you mean "mass"'),
-        (dict(free=FREE, maximize="coverage"), "regions among the requirements"),
+        (dict(free=FREE, maximize="coverage"), "the requirements have no regions"),
         (dict(free=FREE, maximize="mass", minimize="mass"), "given once"),
         (dict(free=FREE, designs=0), "whole number"),
         (dict(free=FREE, sampler="luck"), "one of auto, cma"),

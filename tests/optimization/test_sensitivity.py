@@ -18,7 +18,7 @@ from softreach.optimization.objectives import DesignCase, Goal, Objective, Value
 from softreach.optimization.problem import Candidate, Problem
 from softreach.requirements import Limits, Requirements, Target
 from softreach.rod.kinematics import tip_positions
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, NotPossible
 from softreach.workspace import reachable_set, volume_gradient
 
 ARM = designs.minimal_trunk(material=Material(young_modulus=1e6, density=1000.0)).with_bounds(
@@ -140,7 +140,7 @@ def test_no_shares_are_said_of_ranges_in_which_a_design_cannot_exist():
 
 def test_a_problem_needs_a_design_and_rows_a_power_of_two():
     asked = problem({"taper": (0.0, 0.02)}, maximize="mass")
-    with pytest.raises(InvalidInput, match="candidate"):
+    with pytest.raises(NotPossible, match="candidate"):
         sensitivity(asked)
     with pytest.raises(InvalidInput, match="power of two"):
         sensitivity(asked, Candidate(values={"taper": 0.01}), n=12)

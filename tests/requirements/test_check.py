@@ -353,7 +353,7 @@ def test_a_measure_of_a_cloud_has_an_error_that_holds_the_exact_value():
 
 def test_requirements_that_ask_for_nothing_are_refused():
     for needs in (Requirements(), Requirements(payloads=[0.1])):
-        with pytest.raises(sr.InvalidInput, match="requirements = nothing that an arm could miss"):
+        with pytest.raises(sr.NotPossible, match="the requirements are empty"):
             sr.check(ARM, needs)
 
 

@@ -51,6 +51,19 @@ def test_json_holds_every_finding_and_a_picture_is_written(needs, capsys):
     assert Path("check.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_the_report_holds_every_finding(tmp_path):
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("jinja2")
+    needs = Requirements(targets=[Target([[2.0, 0, 0]], name="<shelf>"), Target([[0, 0, 1.0]])])
+    check = sr.check(sr.designs.minimal_trunk(), needs)
+    check.report().save(tmp_path / "check.html")
+    page = (tmp_path / "check.html").read_text()
+    assert '<td class="missed">MISSED</td><td>&lt;shelf&gt;</td>' in page
+    assert all(finding.name in str(check) for finding in check.findings)
+    assert page.count("<td>") == 2 * len(check.findings) + 1
+    assert page.count("data:image/png") == 1
+
+
 def test_lengths_of_a_file_may_be_in_L_of_the_design(needs, capsys):
     Path("straight.toml").write_text('[[reach]]\nplaces = [["0L", "0L", "1L"]]\n')
     assert run(["check", "lce_arm", "straight.toml"]) == 0

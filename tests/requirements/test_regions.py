@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softreach.requirements import Box, HalfSpace, Mesh, Sphere
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, NotPossible
 
 RNG = np.random.default_rng(3)
 BOX = Box((-0.3, 0.1, -0.2), (0.5, 0.4, 0.9))
@@ -130,7 +130,7 @@ def test_places_of_a_half_space_and_of_next_to_nothing_are_refused():
     with pytest.raises(InvalidInput, match="no end"):
         PLANE.places(3)
     sliver = Mesh([[0, 0, 0], [1, 1, 1], [1, 1, 1.000001], [1, 1.000001, 1]], box_free_faces())
-    with pytest.raises(InvalidInput, match="thick enough"):
+    with pytest.raises(NotPossible, match="too thin"):
         sliver.places(3)
 
 

@@ -8,18 +8,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.atlas.arguments import a_store, shard_of
 from softreach.atlas.command import Command, check_names
 from softreach.atlas.executor import ExecutorLike, an_executor, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
-from softreach.atlas.reading import contents, open_atlas, over_length
+from softreach.atlas.reading import a_store, contents, open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
 from softreach.rod.tip_map import check_tol
 from softreach.sampling import check_sampler
-from softreach.support.arguments import POSITIVE, as_flag, as_function, as_instance, as_number
-from softreach.support.errors import counted, warn
+from softreach.support.arguments import (
+    POSITIVE,
+    as_flag,
+    as_function,
+    as_given,
+    as_instance,
+    as_number,
+    plain,
+)
+from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, bar
 from softreach.workspace.reach import ACCURACIES
@@ -105,7 +112,7 @@ def build_atlas(
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, chosen, tol = a_store("store", store), chosen_metrics(metrics), check_tol(tol)
     alpha_over_length = as_number("alpha_over_length", alpha_over_length, POSITIVE)
-    accuracy, shard = as_number("accuracy", accuracy, ACCURACIES), shard_of("shard", shard)
+    accuracy, shard = as_number("accuracy", accuracy, ACCURACIES), _shard_of("shard", shard)
     keep_clouds, durable = as_flag("keep_clouds", keep_clouds), as_flag("durable", durable)
     executor = an_executor("executor", executor)
     progress = None if progress is None else as_function("progress", progress)
@@ -127,11 +134,8 @@ def build_atlas(
         keep_clouds=keep_clouds,
     )
     indices = np.array(numbers)
-    if space.gaps and len(space.gaps) < space.size:
-        index, reason = next(iter(space.gaps.items()))
-        stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
-        lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
-        warn(f"{lost}, first {space.values(index)}: {reason}")
+    if space.gaps:
+        _warn_of_gaps(space)
     atlas = AtlasStore.begin(store, command, durable=durable)
     content = contents(atlas, tips_of=indices.tolist())
     if content.damage:
@@ -141,6 +145,22 @@ def build_atlas(
     built = open_atlas(store)
     _warn_of_metrics(built)
     return built
+
+
+def _shard_of(name: str, value: object) -> tuple[int, int]:
+    if isinstance(value, tuple | list) and len(value) == 2:
+        first, count = map(plain, value)
+        if {type(first), type(count)} == {int} and 0 <= first < count:
+            return first, count
+        raise InvalidInput(name, "/".join(map(str, (first, count))), "i/k with 0 <= i < k")
+    raise InvalidInput(name, as_given(value), "(i, k) with 0 <= i < k")
+
+
+def _warn_of_gaps(space: DesignSpace) -> None:
+    index, reason = next(iter(space.gaps.items()))
+    stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
+    lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
+    warn(f"{lost}, first {space.values(index)}: {reason}")
 
 
 def _warn_of_metrics(built: xr.Dataset) -> None:

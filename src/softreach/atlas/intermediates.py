@@ -96,7 +96,7 @@ class Intermediates(Mapping[Need, Any]):
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
         """Mask of the samples that have a stable equilibrium, shape (n,)."""
-        if not self.rod.supports_unstable:  # nobody may ask for the tips
+        if not self.rod.supports_unstable:  # the tips may not be needed
             return np.ones(len(self.cube), bool)
         return self._samples[1] == TipStatus.STABLE
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ MISSING = int(np.iinfo(np.int32).min)
 """Number in place of a tip that is NaN, or not stored."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """An array to create."""
 
@@ -37,7 +37,7 @@ class Plan:
     dtype: Any
     chunks: tuple[int, ...]
     fill: Any
-    attrs: dict[str, Any] = field(default_factory=dict)
+    attrs: dict[str, Any]
     data: Any = None
     """Values to write at once; None for those that designs bring, and for activations."""
 
@@ -58,21 +58,19 @@ def array_plans(command: Command) -> Iterator[Plan]:
     shape = (command.n, command.space.bundles)
     plan = _shared(CUBE, np.broadcast_to(0.0, shape), ("sample", "bundle"), _CUBE)
     yield replace(plan, data=None)
-    yield _per_design(command, "status", np.uint8, 0, attrs=_STATUS)
-    yield _per_design(
-        command, "message", str, "", attrs={"long_name": "why a design has no numbers"}
-    )
+    yield _per_design(command, "status", np.uint8, 0, _STATUS)
+    yield _per_design(command, "message", str, "", {"long_name": "why a design has no numbers"})
     if command.profiles:
         yield from _profiles(command)
     if command.keep_clouds:
         yield _tips(command)
-    sizes = {"metric": len(command.numbers)}
-    described = {
+    attrs = {
         "long_name": "metrics of the designs",
         "metrics": _meanings(command.numbers),
         "alpha_over_length": command.alpha_over_length,
     }
-    yield _per_design(command, "metrics", np.float64, np.nan, sizes, described)
+    count = len(command.numbers)
+    yield _per_design(command, "metrics", np.float64, np.nan, attrs, metric=count)
 
 
 _CUBE = {
@@ -106,11 +104,11 @@ def _profiles(command: Command) -> Iterator[Plan]:
     yield _shared("station", np.array(command.stations), ("station",), place)
     yield _shared("quantile", np.array(command.quantiles), ("quantile",), {"units": "1"})
     sizes = {"quantity": len(command.profiles), **command.profile_sizes}
-    attrs = {
+    attrs: dict[str, Any] = {
         "long_name": "metrics over stations and quantiles",
         "metrics": _meanings(command.profiles),
     }
-    yield _per_design(command, "curvature", np.float64, np.nan, sizes, attrs)
+    yield _per_design(command, "curvature", np.float64, np.nan, attrs, **sizes)
 
 
 def _tips(command: Command) -> Plan:
@@ -122,7 +120,7 @@ def _tips(command: Command) -> Plan:
         "_FillValue": MISSING,
     }
     sizes = {"axis": len(AXES), "sample": command.n}
-    return _per_design(command, "tip", np.int32, MISSING, sizes, attrs)
+    return _per_design(command, "tip", np.int32, MISSING, attrs, **sizes)
 
 
 def _meanings(metrics: Sequence[Metric]) -> str:
@@ -130,49 +128,20 @@ def _meanings(metrics: Sequence[Metric]) -> str:
 
 
 def _per_design(
-    command: Command,
-    name: str,
-    dtype: Any,
-    fill: Any,
-    sizes: dict[str, int] | None = None,
-    attrs: dict[str, Any] | None = None,
+    command: Command, name: str, dtype: Any, fill: Any, attrs: dict[str, Any], **sizes: int
 ) -> Plan:
-    space, inner = command.space, sizes or {}
-    return Plan(
-        name=name,
-        shape=(*space.shape, *inner.values()),
-        dims=(*space.dims, *inner),
-        dtype=dtype,
-        chunks=(*(1 for _ in space.shape), *(max(size, 1) for size in inner.values())),
-        fill=fill,
-        attrs=attrs or {},
-    )
+    space = command.space
+    shape, dims = (*space.shape, *sizes.values()), (*space.dims, *sizes)
+    chunks = (*(1 for _ in space.shape), *(max(size, 1) for size in sizes.values()))
+    return Plan(name, shape, dims, dtype, chunks, fill, attrs)
 
 
 def _shared(name: str, data: np.ndarray, dims: tuple[str, ...], attrs: dict[str, Any]) -> Plan:
     chunks = (min(data.shape[0], 1 << 20), *data.shape[1:])
     fill = 0 if data.dtype.kind in "iu" else np.nan
-    return Plan(
-        name=name,
-        shape=data.shape,
-        dims=dims,
-        dtype=data.dtype,
-        chunks=chunks,
-        fill=fill,
-        attrs=attrs,
-        data=data,
-    )
+    return Plan(name, data.shape, dims, data.dtype, chunks, fill, attrs, data)
 
 
 def _labels(name: str, labels: list[str]) -> Plan:
-    data = np.array(labels, dtype=np.dtypes.StringDType())
-    count = len(labels)
-    return Plan(
-        name=name,
-        shape=(count,),
-        dims=(name,),
-        dtype=str,
-        chunks=(max(count, 1),),
-        fill="",
-        data=data,
-    )
+    data, count = np.array(labels, dtype=np.dtypes.StringDType()), len(labels)
+    return Plan(name, (count,), (name,), str, (max(count, 1),), "", {}, data)

@@ -207,7 +207,7 @@ _ROWS: dict[str, list[tuple[Any, ...]]] = {
         ("exact_unreachability", "1", "UNR = 1 - exact_volume / exact_convex_volume",
          attrgetter("unreachability"), _SET, "the reachable set is a sheet or a curve"),
         ("exact_lost_share", "1",
-         "share of the activation box left out of the reachable set: not stable, or torn",
+         "share of the activation box without a posture, told by the reachable set",
          attrgetter("lost_share"), _SET),
         ("multiplicity", "1", "mean number of activations that reach a place, if finite",
          _mean_multiplicity, _SET, _FINITE),

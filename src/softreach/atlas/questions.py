@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -10,22 +11,24 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
-from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN
-from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
+from softreach.atlas.reading import EXPLAINED, a_store, an_atlas, command_of, contents, opened_atlas
 from softreach.atlas.store import DAMAGED, DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE, AtlasStore
 from softreach.rod.rods import tip_map, with_unstable
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
     as_flag,
+    as_given,
     as_integer,
     as_mapping,
     as_names,
     as_number,
     as_text,
+    plain,
 )
 from softreach.support.errors import InvalidInput, did_you_mean
+from softreach.support.quantity import columns, numbers_in
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
 
 
 _QUICK = 3e8  # bytes of tips
+_MOST_MESSAGES = 10
 Interval = tuple[float | None, float | None]
 
 
@@ -56,6 +60,14 @@ class AtlasStatus:
     messages: dict[int, str]
     """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
 
+    def __str__(self) -> str:
+        counts = ("designs", "done", "todo", "failed", "gaps", "unstable", "damaged")
+        rows = [(name, f"{getattr(self, name):,}") for name in counts]
+        verified = "yes" if self.tips_verified else "no: softreach atlas verify"
+        rows.append(("tips verified", verified))
+        rows += [(f"number {k}", text) for k, text in self.messages.items()][:_MOST_MESSAGES]
+        return "\n".join(columns(rows))
+
 
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """Number of designs of an atlas that are done, and faults of the others.
@@ -75,9 +87,9 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     if isinstance(atlas, xr.Dataset):
         opened = opened_atlas(atlas)
         status = opened["status"].values.ravel()
-        told = np.isin(status, (*TOLD, DAMAGED))
-        numbers = opened["number"].values.ravel()[told].tolist()
-        texts = opened["message"].values.ravel()[told].tolist() if told.any() else []
+        explained = np.isin(status, (*EXPLAINED, DAMAGED))
+        numbers = opened["number"].values.ravel()[explained].tolist()
+        texts = opened["message"].values.ravel()[explained].tolist() if explained.any() else []
         return _counted(status, dict(zip(numbers, map(str, texts), strict=True)), False)
     store = AtlasStore.open(an_atlas("atlas", atlas), "r")
     command = store.command
@@ -197,9 +209,9 @@ def _limits(
     if where is None:
         return []
     if isinstance(where, Mapping):
-        pairs = list(as_mapping("where", where, an_interval).items())
+        pairs = list(as_mapping("where", where, _interval).items())
     else:
-        pairs = [constraint(text) for text in as_names("where", where)]
+        pairs = [_constraint(text) for text in as_names("where", where)]
     written = {
         written_name(str(name), unit): (str(name), unit)
         for name, values in atlas.variables.items()
@@ -210,6 +222,29 @@ def _limits(
         name, unit = written.get(text, (text, "1"))
         limits.append((name, (from_written(low, unit), from_written(high, unit))))
     return limits
+
+
+def _interval(name: str, value: object) -> tuple[float, float]:
+    if isinstance(value, tuple | list) and len(value) == 2:
+        ends = [
+            open_end if end is None or plain(end) == open_end else as_number(name, end)
+            for end, open_end in zip(value, (-math.inf, math.inf), strict=True)
+        ]
+        return ends[0], ends[1]
+    raise InvalidInput(name, as_given(value), "(lowest, highest), of which one may be None")
+
+
+def _constraint(text: str) -> tuple[str, tuple[float, float]]:
+    """`taper_deg<=1` -> its name, and the numbers between which it is."""
+    for sign in ("<=", ">=", "<", ">"):
+        name, separator, number = text.partition(sign)
+        if separator:
+            break
+    values = numbers_in(number, 1)
+    if values is None:
+        allowed = "a name, <= or >=, and a finite number"
+        raise InvalidInput("where", text or "''", allowed)
+    return name.strip(), (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.atlas.arguments import a_store, an_atlas
 from softreach.atlas.command import Command
 from softreach.atlas.layout import PER_DESIGN, array_plans
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
-from softreach.support.arguments import as_dataset, as_text
+from softreach.support.arguments import as_dataset, as_given, as_path, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.stores import ARRAYS, DIGEST, READING, Chunk, storage_errors
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     AtlasLike = StoreLike | xr.Dataset
 
 
-TOLD = (FAILED, GAP, UNSTABLE)
+EXPLAINED = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
 
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
@@ -79,11 +80,46 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
             reader.read("tip", store.command.space.place(index))
     texts = {
         index: str(reader.read("message", store.command.space.place(index)).item())
-        for index in np.flatnonzero(np.isin(status, TOLD)).tolist()
+        for index in np.flatnonzero(np.isin(status, EXPLAINED)).tolist()
     }
     status[[*reader.damaged]] = DAMAGED
     messages = dict(sorted((texts | reader.damaged).items()))
     return Contents(status=status, messages=messages, tables=tables)
+
+
+def a_store(name: str, value: object) -> Any:
+    """A place where an atlas may be.
+
+    Raises:
+        InvalidInput: Neither text nor a path nor a Zarr store.
+    """
+    if isinstance(value, str | os.PathLike):
+        return as_path(name, value)
+    for module, kind in (("zarr.abc.store", "Store"), ("zarr.storage", "StorePath")):
+        # who has a store has imported it
+        if module in sys.modules and isinstance(value, getattr(sys.modules[module], kind)):
+            return value
+    if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):
+        return value  # a store in memory
+    raise InvalidInput(name, as_given(value), "a path, a URL or a Zarr store")
+
+
+def an_atlas(name: str, value: Any) -> Any:
+    """A store, or a dataset from `open_atlas` or a part of one.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    allowed = "a store, or a dataset from open_atlas"
+    xarray = sys.modules.get("xarray")
+    if xarray is not None and isinstance(value, xarray.Dataset):
+        if "command" in value.attrs and "status" in value:
+            return value
+        raise InvalidInput(name, "another Dataset", allowed)
+    try:
+        return a_store(name, value)
+    except InvalidInput:
+        raise InvalidInput(name, as_given(value), allowed) from None
 
 
 def open_atlas(store: StoreLike) -> xr.Dataset:
@@ -174,12 +210,12 @@ class _Reader:
 
 
 def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
+    known, explained = np.isin(status, KNOWN), np.isin(status, EXPLAINED)
 
     def required(chunk: Chunk) -> bool:
         if chunk.array not in PER_DESIGN:
             return True
-        of_designs = told if chunk.array == "message" else known
+        of_designs = explained if chunk.array == "message" else known
         return chunk.array != "status" and bool(of_designs[store.number(chunk)])
 
     return required
@@ -242,9 +278,8 @@ def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
 def _coordinates(store: AtlasStore, raw: xr.Dataset) -> dict[str, Any]:
     space = store.command.space
     numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
-    coordinates: dict[str, Any] = {
+    return {
         "length": ((), space.base.length, {"units": "m"}),
         **{name: raw[name] for name in space.names},
         "number": (space.dims, numbers, {"long_name": "number of the design"}),
     }
-    return coordinates

@@ -14,17 +14,29 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, changed, find_parameter, find_parameters, parameters
 from softreach.arm.tables import check_extension
-from softreach.atlas.arguments import column
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput, counted
 from softreach.support.progress import Progress, silent
 
-__all__ = ["DesignSpace"]
+__all__ = ["DesignSpace", "column"]
 
 Layout = Literal["grid", "list"]
 
 _MOST = 1_000_000  # designs, each of which is looked at and has files of its own
+
+
+def column(name: str, values: ArrayLike) -> tuple[float, ...]:
+    """Values of a parameter; whole numbers stay whole.
+
+    Raises:
+        InvalidInput: No numbers.
+    """
+    floats = as_floats(name, values, "one finite value or more")
+    if floats.ndim > 1:
+        raise InvalidInput(f"{name}.shape", floats.shape, "of one dimension")
+    array = np.asarray(values)
+    return tuple(np.atleast_1d(array if array.dtype.kind in "iu" else floats).tolist())
 
 
 class _Extent(NamedTuple):
@@ -109,6 +121,13 @@ class DesignSpace:
             points[:, counts] = np.rint(points[:, counts])
         columns = zip(ranges, points.T.tolist(), strict=True)
         return cls(base=base, parameters=_plain(dict(columns)), layout="list")
+
+    def __str__(self) -> str:
+        lines = [f"{self.layout} of {counted(self.size, 'design')}"]
+        for (name, values), parameter in zip(self.parameters, self.varied().values(), strict=True):
+            ends = f"{min(values):.6g} to {max(values):.6g} {parameter.unit}".removesuffix(" 1")
+            lines.append(f"  {name}: {counted(len(values), 'value')} from {ends}")
+        return "\n".join(lines)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,7 @@ from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import unknown_parameter
 from softreach.arm.written import Written, from_written
-from softreach.atlas.arguments import column
-from softreach.atlas.space import DesignSpace
+from softreach.atlas.space import DesignSpace, column
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.quantity import read_number, read_whole_number
 
@@ -78,16 +78,25 @@ def flat_keys(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 
 
 def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[float]]:
-    """Name and values [SI units] of a parameter as written: `taper_deg` and `0:3:16` or a list.
+    """Name and values [SI units] of a parameter as written.
+
+    `taper_deg` with `0:3:16` or a list, or `taper` with `0deg:3deg:16` or a list of such texts.
 
     Raises:
         InvalidInput: An unknown key, or values that are no numbers.
     """
-    known = Written.of(base).written
-    if key not in known:
-        raise unknown_parameter(key, known)
-    numbers, parameter = _numbers(key, value), known[key]
-    return parameter.name, [from_written(x, parameter.unit) for x in numbers]
+    names = Written.of(base)
+    if key not in names.by_key:
+        raise unknown_parameter(key, names.written)
+    parameter = names.by_key[key]
+    try:
+        if key in names.written:
+            return parameter.name, [from_written(x, parameter.unit) for x in _numbers(key, value)]
+        return parameter.name, _read(value, partial(names.number, key))
+    except (InvalidInput, ValueError):
+        kind = "numbers" if key in names.written else names.allowed(key)
+        allowed = f"{kind}: a list, or start:stop:count with both ends and a count up to {_MOST}"
+        raise InvalidInput(key, value, allowed) from None
 
 
 def _space(
@@ -107,13 +116,14 @@ def _space(
 
 
 def _numbers(key: str, value: Any) -> list[float]:
-    allowed = f"numbers: a list, or start:stop:count with both ends and a count up to {_MOST}"
-    try:
-        if isinstance(value, str):
-            return _range(value) if ":" in value else [_number(part) for part in value.split(",")]
-        return list(column(key, value))
-    except (InvalidInput, ValueError):
-        raise InvalidInput(key, value, allowed) from None
+    return _read(value, _number) if isinstance(value, str) else [*column(key, value)]
+
+
+def _read(value: Any, read: Callable[[Any], float]) -> list[float]:
+    if isinstance(value, str) and ":" in value:
+        return _range(value, read)
+    each = value.split(",") if isinstance(value, str) else value
+    return [read(one) for one in (each if isinstance(each, list) else [each])]
 
 
 def _number(text: str) -> float:
@@ -121,11 +131,11 @@ def _number(text: str) -> float:
     return read_whole_number(text) if _INTEGER.fullmatch(text.strip()) else number
 
 
-def _range(text: str) -> list[float]:
+def _range(text: str, read: Callable[[Any], float]) -> list[float]:
     start, stop, count = text.split(":")
     number = read_whole_number(count)
     if not 0 < number <= _MOST:
         raise ValueError(text)
-    values = np.linspace(read_number(start), read_number(stop), number)
+    values = np.linspace(read(start), read(stop), number)
     # 1.8 and not 1.8000000000000003
     return [float(f"{value:.15g}") for value in values]

@@ -2,12 +2,12 @@
 
 No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
 and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
-is computed again, whatever else of it exists.
+is computed again, even if some of its chunks exist.
 
 The tasks of a job array may all create a store at once and be killed anywhere: its root, which
 holds the command and lists what describes the arrays, appears whole, and of several the first
-stays; then come the arrays, whose bytes are the same whoever writes them. Nobody reads a store or
-adds designs before all of them are there. Each array carries the digest of the command, so that
+stays; then come the arrays, whose bytes do not depend on the writer. Stores are read and
+designs added only when all of them are there. Each array carries the digest of the command, so that
 the same command, and no other, writes a lost root again.
 """
 

@@ -6,21 +6,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import marker_stations
+from softreach.support.arrays import Array, Mask
 from softreach.support.progress import Progress, silent
 
-__all__ = ["constant_curvature", "quadratic", "ridge"]
-
-Array = NDArray[np.float64]
-
-_SHARES = (1.0, 0.2)
-"""Of the bends of the design, at which the fit of arcs begins."""
+_SHARES = (1.0, 0.2)  # of the bends of the design, at which the fit of arcs begins
 _PENALTIES = np.logspace(-8, 2, 21)
 
 
@@ -105,7 +100,7 @@ def constant_curvature(
 
 class _Arcs(NamedTuple):
     ends: Array
-    acts: NDArray[np.bool_]
+    acts: Mask
     scale: Array
     markers: Array
     offsets: Array

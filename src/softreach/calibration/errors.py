@@ -6,34 +6,27 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.calibration.measurements import Measurements
+from softreach.support.arrays import Array, Mask
 
-__all__ = ["Misses", "Repeatability", "Verdict", "judged", "misses", "repeatability"]
+__all__ = ["PlacementErrors", "Repeatability", "Verdict", "judged", "misses", "repeatability"]
 
-Array = NDArray[np.float64]
-
-_NEAR = (0.05, 0.1)
-"""Distances of inputs, over their ranges, within which two samples are near."""
+_NEAR = (0.05, 0.1)  # distances of inputs, over their ranges, within which two samples are near
 _FEW = 8
-_NOISE = 1.5
-"""Held-out error over what the data repeats, up to which noise is all."""
+_NOISE = 1.5  # held-out error over what the data repeats, up to which noise is all
 _MEMORY = 0.05
 """Share of the squared residuals that the last command must explain, beyond all laws of inputs."""
 _LAW = 0.2
 """Share of the squared residuals that a law of the inputs explains where noise is not all."""
-_SURE = 2.5
-"""Gain in a tenth of the samples, over its standard error, that is not chance."""
-_WIDTHS = (0.5, 0.25)
-"""Of the bells in laws of the inputs, over their ranges."""
+_SURE = 2.5  # gain in a tenth of the samples, over its standard error, that is not chance
+_WIDTHS = (0.5, 0.25)  # of the bells in laws of the inputs, over their ranges
 _BELLS = 80
 _PENALTIES = np.logspace(-7, 1, 9)
-_SLIPS = 0.03
-"""Share of samples far off that may be slips."""
+_SLIPS = 0.03  # share of samples far off that may be slips
 
 
-class Misses(NamedTuple):
+class PlacementErrors(NamedTuple):
     """Distances between predicted and measured places [m]."""
 
     median: float
@@ -51,13 +44,13 @@ class Misses(NamedTuple):
         return f"rms {rms} mm ({share:.2g} % of L), median {median}, mean {mean}, 95 % below {most}"
 
 
-def misses(residuals: Array) -> Misses:
+def misses(residuals: Array) -> PlacementErrors:
     """Of residuals of places (..., 3); those without a number do not count."""
     distance = np.linalg.norm(residuals, axis=-1).ravel()
     distance = distance[np.isfinite(distance)]
     if not len(distance):
-        return Misses(np.nan, np.nan, np.nan, np.nan, 0)
-    return Misses(
+        return PlacementErrors(np.nan, np.nan, np.nan, np.nan, 0)
+    return PlacementErrors(
         float(np.median(distance)),
         float(distance.mean()),
         float(np.sqrt((distance**2).mean())),
@@ -118,8 +111,8 @@ def judged(
     data: Measurements,
     residuals: Array,
     repeated: Repeatability,
-    held: NDArray[np.bool_],
-    far: NDArray[np.bool_],
+    held: Mask,
+    far: Mask,
 ) -> Verdict:
     """Limitation of a fit, from its residuals in the order in which samples were taken.
 
@@ -165,7 +158,7 @@ def judged(
     return Verdict(limit, f"{said} ({text}){finding and '; '}{finding}")
 
 
-def _finding(data: Measurements, far: NDArray[np.bool_]) -> str:
+def _finding(data: Measurements, far: Mask) -> str:
     """What samples far off have in common, or that they are too many for slips; else ""."""
     size = np.maximum(np.abs(data.inputs).max(axis=0), 1e-300)
     moved = np.abs(data.inputs) > 0.02 * size

@@ -13,32 +13,18 @@ from numpy.typing import NDArray
 from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, FreeNumbers
 from softreach.calibration.model import MarkerModel, Prediction
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.arrays import Array, Mask
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from softreach.support.progress import Progress
-
-__all__ = [
-    "SAME",
-    "Fit",
-    "exchanged_columns",
-    "fitted",
-    "identifiable",
-    "robust_width",
-    "started",
-]
-
-Array = NDArray[np.float64]
 
 SAME = 1e-7
 """Smallest singular value over the largest, in scales of the numbers, that data can tell."""
-_IDLE = 1e-9
-"""Motion of markers in L, or over that of the other numbers, that is rounding."""
-_ROBUST = 3.0
-"""Residuals beyond so many widths count less than their squares."""
+_IDLE = 1e-9  # motion of markers in L, or over that of the other numbers, that is rounding
+_ROBUST = 3.0  # residuals beyond so many widths count less than their squares
 _FINE, _COARSE = 1e-7, 1e-3
 """Least share by which a step must improve: of the last round, of those before."""
 _MOST = 60
-_SAMPLES = 100
-"""Samples by which exchanges are compared."""
+_SAMPLES = 100  # samples by which exchanges are compared
 _PROMISING, _BETTER = 0.8, 0.5
 """Error over that of the columns as they are: before a fit, and after it."""
 _ALIKE, _FAR_BETTER = 1.2, 0.35
@@ -57,7 +43,7 @@ class Fit:
     """Predicted minus measured places [m], NaN where none was seen, (n, marker, 3)."""
     weights: Array
     """Of each marker of each sample in the fit: 1, less for outliers; (n, marker)."""
-    at_bound: NDArray[np.bool_]
+    at_bound: Mask
     """Numbers that end at a bound, shape (number,)."""
     evaluations: int
     converged: bool
@@ -178,7 +164,6 @@ def _ordered(places: Array, order: NDArray[np.intp]) -> Array:
 
 
 def _said(found: list[_Order]) -> str:
-    """Exchanges that nothing tells apart from the first."""
     alike = [order.text for order in found if order.miss <= _ALIKE * found[0].miss]
     return f"{' or '.join(alike[:4])} seem to be exchanged, or counted the other way round"
 
@@ -189,10 +174,9 @@ def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> No
     if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):
         found = _orders(model, model.free.start, predicted, places)
         if found[0].miss < _FAR_BETTER * own:
-            given = f"a miss of {1e3 * own:.3g} mm in the middle"
-            allowed = f"those of right-handed axes in their order: {_said(found)}, which leaves "
-            raise InvalidInput(
-                "columns of the data", given, f"{allowed}{1e3 * found[0].miss:.3g} mm"
+            raise NotPossible(
+                f"the columns of the data fit no arm with right-handed axes: {_said(found)}; "
+                f"the middle then misses by {1e3 * found[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
             )
 
 
@@ -243,13 +227,14 @@ def fitted(
         progress: Called with 1 for each step.
 
     Raises:
-        InvalidInput: Numbers that the data cannot tell, or no equilibrium at the start.
+        InvalidInput: Numbers that the data cannot tell apart.
+        NotPossible: Columns in another order, or no equilibrium at the start.
     """
     problem = _Problem(model, places, progress)
     values = np.clip(model.free.start, *problem.bounds)
     identifiable(model.free, problem.slopes(values))
     if not np.isfinite(problem.residuals(values)).all():
-        raise InvalidInput("arm", "no equilibrium", "one at the start for some sample at least")
+        raise NotPossible("the design that the fit starts from has no equilibrium at any sample")
     rounds = [None, _ROBUST] if robust else [None]
     converged, count = False, 0
     for width in rounds:
@@ -393,7 +378,7 @@ def exchanged_columns(
         other = replace(model, inputs=model.inputs[:, found[0].inputs])
         try:
             error = misses(refitted(other, _ordered(places, found[0].columns)).residuals).rms
-        except InvalidInput:
+        except (InvalidInput, NotPossible):
             continue
         if error < least:
             least, best = error, (_said(found), error)

@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.base import Base, rotation_matrices
 from softreach.arm.manipulator import Manipulator
@@ -24,11 +23,8 @@ from softreach.arm.parameters import (
 )
 from softreach.arm.rest_shape import RestShape
 from softreach.support.arguments import as_mapping, as_names, plain
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
-
-__all__ = ["FreeNumber", "FreeNumbers", "free_numbers"]
-
-Array = NDArray[np.float64]
 
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
@@ -37,8 +33,7 @@ _PLACES = ("station", "start", "end")
 """Numbers in m that lie on the arm."""
 _UNFIT = re.compile(r"(.*\.)?(lower|upper)(\[\d+\])?|base\..*|loads\.(follower|tip_moment).*")
 """Numbers that no wildcard frees: bounds, what the pose frees, loads without a derivative."""
-_UNSEEN = 1e-12
-"""Angle by which an arm that counts as bent is bent at least [rad]."""
+_UNSEEN = 1e-12  # angle by which an arm that counts as bent is bent at least [rad]
 _STEP = 1e-3  # of the scale of a number, for derivatives of tables of fourth order
 _CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 12))

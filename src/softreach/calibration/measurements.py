@@ -21,16 +21,20 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_text
-from softreach.support.errors import InvalidInput, counted, did_you_mean, in_short, warn
+from softreach.support.arrays import Array, Mask
+from softreach.support.errors import (
+    InvalidInput,
+    NotPossible,
+    counted,
+    did_you_mean,
+    in_short,
+    warn,
+)
 from softreach.support.files.text import MEGABYTE, text_of
 from softreach.support.quantity import sizes_in
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["Measurements", "read_measurements", "read_table"]
-
-Array = NDArray[np.float64]
 
 _SIZES = {
     name.lower(): (unit, size) for unit in ("m", "N", "Pa") for name, size in sizes_in(unit).items()
@@ -50,10 +54,8 @@ _MOST_ROWS = 2_000_000
 _MOST_BYTES = 1000 * MEGABYTE
 _WIDEST = 4.0
 """Distance of a place from the middle of all, in lengths of the arm, that is no pose of it."""
-_HARD = 100.0
-"""Inputs beyond the bounds of the design, in them, that are a wrong unit or a slip."""
-_SLACK = 0.01
-"""Of the largest tension: a negative one that is the zero of a load cell."""
+_HARD = 100.0  # inputs beyond the bounds of the design, in them, that are a wrong unit or a slip
+_SLACK = 0.01  # of the largest tension: a negative one that is the zero of a load cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +91,7 @@ class Measurements:
         """Number of markers."""
         return self.places.shape[1]
 
-    @property
-    def has_runs(self) -> bool:
-        """True if the source said which samples belong together."""
-        return len(self.run_names) > 1
-
-    def of(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
+    def of(self, rows: NDArray[np.intp] | Mask) -> Measurements:
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
         rank = np.empty(len(self), np.intp)
@@ -169,7 +166,7 @@ def read_measurements(
     places = np.moveaxis(np.array(each), 2, 0)
     seen = np.asarray(np.isfinite(places).all(axis=2))
     if not seen.any():
-        raise InvalidInput("places of markers", "no number", "seen in at least one sample")
+        raise NotPossible("no marker was seen in any sample: its columns hold no number")
     places[~seen] = np.nan
     if lost := [name for name, own in zip(chosen, seen.T, strict=True) if not own.any()]:
         warn(f"markers that were never seen are left out: {', '.join(lost)}")
@@ -198,7 +195,7 @@ def _refuse_repeated(columns: list[str]) -> None:
     for name in columns:  # the second of which pandas calls NAME.1
         first = re.sub(r"\.\d+$", "", name)
         if columns.count(name) > 1 or (first != name and first in columns):
-            raise InvalidInput("column", first, "there once: the data has two of this name")
+            raise NotPossible(f"the data has two columns of this name: {first}")
 
 
 def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
@@ -209,12 +206,10 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
             continue
         _, own, size = _unit(name)
         if own and own != unit:
-            raise InvalidInput(f"column {name}", f"in {own}", f"in {_unit_text(unit)}")
+            raise NotPossible(f"column {name} is in {own}, and must be in {_unit_text(unit)}")
         if not own and unit in ("m", "N", "Pa"):
-            allowed = (
-                f"a name that ends in its unit, such as {name}_{'mm' if unit == 'm' else unit}"
-            )
-            raise InvalidInput("column", name, allowed)
+            usual = f"{name}_{'mm' if unit == 'm' else unit}"
+            raise NotPossible(f"the name of column {name} must end in its unit, such as {usual}")
         values[:, k] = _numbers(table, name) * size
     if not np.isfinite(values).all():
         row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
@@ -266,7 +261,7 @@ def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
             text = text_of("data", name, opened.read(_MOST_BYTES + 1), _MOST_BYTES)
         _refuse_short(text)
         return pd.read_csv(io.StringIO(text), skipinitialspace=True, comment="#")
-    except InvalidInput:
+    except (InvalidInput, NotPossible):
         raise
     except Exception as error:  # each kind of compression has its own
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -280,12 +275,11 @@ def _refuse_short(text: str) -> None:
     count = len([name for name in head if name.strip()])
     for k, row in enumerate(rows):
         if len(row) < count:
-            allowed = f"{count} cells, as the header has: it was cut short"
-            raise InvalidInput(f"row {k} of the data", counted(len(row), "cell"), allowed)
+            cells = counted(len(row), "cell")
+            raise NotPossible(f"row {k} of the data has {cells}, and the header {count}")
 
 
 def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:
-    """The column that was asked for, or the first of the usual names."""
     if given is not None:
         if given not in columns:
             raise _missing(what, given, columns)
@@ -361,13 +355,13 @@ def _triples(columns: list[str], taken: set[str | None]) -> dict[str, list[str]]
             start = match["head"].rstrip("_ ") or match["number"]
             start += match["number"] if match["head"].rstrip("_ ") else ""
             found.setdefault(start, {})[match["axis"].lower()] = column
-    for start, axes in found.items():
+    for axes in found.values():
         if lacking := [axis for axis in "xyz" if axis not in axes]:
-            what, given = f"columns of {start or 'the place'}", ", ".join(axes.values())
-            raise InvalidInput(what, given, f"x, y and z: {lacking[0]} is missing")
+            given = ", ".join(axes.values())
+            raise NotPossible(f"a place needs x, y and z: {lacking[0]} is missing beside {given}")
     if not found:
-        allowed = "columns such as x_mm, y_mm, z_mm or marker1_x_mm"
-        raise InvalidInput("places of markers", "none", allowed)
+        usual = "x_mm, y_mm, z_mm or marker1_x_mm"
+        raise NotPossible(f"the data has no places: no columns such as {usual}")
     return {start: [axes[axis] for axis in "xyz"] for start, axes in found.items()}
 
 
@@ -389,8 +383,10 @@ def _chosen_markers(
         return {name: (chosen | by_name)[name] for name in names if name in chosen | by_name}
     if len(names) != len(triples):
         listed = ", ".join(start or "x, y, z" for start in triples)
-        allowed = f"as many as the arm has: {counted(len(names), 'marker')} ({', '.join(names)})"
-        raise InvalidInput("markers of the data", listed, allowed, "name them by `markers`")
+        own = f"{counted(len(names), 'marker')} ({', '.join(names)})"
+        raise NotPossible(
+            f"the arm has {own}, and the data others ({listed}): name their columns by `markers`"
+        )
     return dict(zip(names, triples, strict=True))
 
 
@@ -420,8 +416,10 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
         free = [c for c in columns if c not in chosen.values() and _unit(c)[1] in fitting]
         if len(free) != len(wanting):
             have, several = ", ".join(free) or "none", counted(len(wanting), "column")
-            allowed = f"{several} in {_unit_text(unit)} for {', '.join(wanting)}"
-            raise InvalidInput("inputs of the data", have, allowed, "name them by `inputs`")
+            wanted = f"{several} in {_unit_text(unit)} for {', '.join(wanting)}"
+            raise NotPossible(
+                f"the data must have {wanted}, and has {have}: name the columns by `inputs`"
+            )
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]
 

@@ -35,13 +35,9 @@ from softreach.rod.response import (
 )
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
+from softreach.support.arrays import Array, Mask
 
-__all__ = ["MarkerModel", "Prediction", "marker_stations"]
-
-Array = NDArray[np.float64]
-
-_BLOCK = 1024
-"""Samples at once: their shapes at all nodes are kept."""
+_BLOCK = 1024  # samples at once: their shapes at all nodes are kept
 _TOL = 1e-6
 _STEPS = 24
 _BODY = ("profile", "section", "actuators", "loads", "rest", "stations", "rigid_pieces", "markers")
@@ -236,7 +232,7 @@ def _slopes(
     at: _Explicit,
     state: RodState,
     changes: list[_Explicit],
-    rows: NDArray[np.bool_],
+    rows: Mask,
 ) -> Array:
     """Derivatives of the places by all numbers, (n, marker, 3, number)."""
     bundles = state.gamma.shape[1]

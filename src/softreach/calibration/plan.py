@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,24 +17,17 @@ from softreach.calibration.model import MarkerModel
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arguments import as_integer, as_names, as_number
-from softreach.support.errors import InvalidInput, Range, did_you_mean
-from softreach.support.files.text import write_text
+from softreach.support.arrays import Array, Mask
+from softreach.support.errors import InvalidInput, NotPossible, Range, did_you_mean
+from softreach.support.files.text import write_table
 
-__all__ = ["PosePlan", "plan_poses"]
-
-Array = NDArray[np.float64]
-
-_CORNERS = 10
-"""Free inputs up to which all corners of their box are candidates."""
-_APART = 0.5
-"""Distance of two poses in the box at least, over the mean distance of so many points."""
+_CORNERS = 10  # free inputs up to which all corners of their box are candidates
+_APART = 0.5  # distance of two poses in the box at least, over the mean distance of so many points
 _TRUSTED = 2.0
 """Largest reaction of a pose to the numbers that counts in full, over the median of all."""
 _ROUNDS = 50
-_GAIN = 1e-6
-"""Least gain of the logarithm of the determinant for which a pose is exchanged."""
-_START = 1e-9
-"""Information on each number before the first pose, over that of all candidates."""
+_GAIN = 1e-6  # least gain of the logarithm of the determinant for which a pose is exchanged
+_START = 1e-9  # information on each number before the first pose, over that of all candidates
 _WRITTEN = {"m": ("mm", 1e3), "Pa": ("kPa", 1e-3), "N": ("N", 1.0)}
 
 
@@ -90,20 +82,16 @@ class PosePlan:
             InvalidInput: Something else is there.
             NotWritten: It cannot be written.
         """
+        import pandas as pd
+
         arm = self.free.arm
-        sizes = [_WRITTEN.get(unit, ("", 1.0)) for unit in arm.input_units]
-        inputs = [
-            "_".join([*name.split(), *([unit] if unit else [])])
-            for name, (unit, _) in zip(arm.input_names, sizes, strict=True)
-        ]
-        places = [f"{'_'.join(name.split())}_{axis}_mm" for name in self.markers for axis in "xyz"]
-        values = self.activations * [size for _, size in sizes]
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(["sample", *inputs, *places])
-        for k, row in enumerate(values):
-            table.writerow([k, *(f"{value:.6g}" for value in row), *("" for _ in places)])
-        write_text(path, text.getvalue(), overwrite=overwrite)
+        columns: dict[str, Any] = {"sample": range(len(self))}
+        for k, (name, unit) in enumerate(zip(arm.input_names, arm.input_units, strict=True)):
+            written, size = _WRITTEN.get(unit, ("", 1.0))
+            columns["_".join([*name.split(), *written.split()])] = size * self.activations[:, k]
+        names = ("_".join(name.split()) for name in self.markers)
+        empty = dict.fromkeys((f"{name}_{axis}_mm" for name in names for axis in "xyz"), "")
+        write_table(path, pd.DataFrame(columns | empty), overwrite=overwrite)
 
     def __repr__(self) -> str:
         seen = ", ".join(self.markers)
@@ -135,8 +123,8 @@ def plan_poses(
         seed: Of the candidates, and of the order in which to measure.
 
     Raises:
-        InvalidInput: Numbers that no pose can tell apart, fewer poses than these need, or no
-            candidate with a stable equilibrium.
+        InvalidInput: Numbers that no pose can tell apart, or fewer poses than these need.
+        NotPossible: No candidate has a stable equilibrium.
     """
     arm = a_manipulator("arm", arm)
     numbers = free_numbers(arm, free)
@@ -151,8 +139,7 @@ def plan_poses(
     usable = np.isfinite(prediction.slopes).all(axis=(1, 2, 3))
     usable &= prediction.status == TipStatus.STABLE
     if not usable.any():
-        allowed = "activations at which the arm has a stable equilibrium"
-        raise InvalidInput("arm", "none in its activation box", allowed)
+        raise NotPossible("the arm has no stable equilibrium in its activation box")
     inputs = inputs[usable]
     slopes = prediction.slopes[usable].reshape(len(inputs), -1, len(numbers))
     identifiable(numbers, slopes.reshape(-1, len(numbers)))
@@ -179,12 +166,10 @@ def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
     if given is None:
         return known
     names = as_names("markers", given)
-    for name in names:
-        if name not in known or names.count(name) > 1:
-            allowed = f"of {', '.join(known)}, each once"
-            raise InvalidInput("markers", name, allowed, did_you_mean(name, known))
-    if not names:
-        raise InvalidInput("markers", "none", f"of {', '.join(known)}")
+    wrong = [name for name in names if name not in known or names.count(name) > 1]
+    if wrong or not names:
+        allowed, value = f"of {', '.join(known)}, each once", wrong[0] if wrong else "none"
+        raise InvalidInput("markers", value, allowed, did_you_mean(value, known))
     return names
 
 
@@ -239,7 +224,7 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
     return np.array(chosen, np.intp)
 
 
-def _within(at: Array, place: int, room: float) -> NDArray[np.bool_]:
+def _within(at: Array, place: int, room: float) -> Mask:
     """Candidates that are too near to one that is chosen, itself among them."""
     result = np.linalg.norm(at - at[place], axis=1) < room
     result[place] = True

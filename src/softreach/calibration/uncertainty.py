@@ -9,15 +9,10 @@ from numpy.typing import NDArray
 
 from softreach.calibration.fit import SAME, Fit, robust_width
 from softreach.calibration.measurements import Measurements
+from softreach.support.arrays import Array, Mask
 
-__all__ = ["Uncertainty", "uncertainty"]
-
-Array = NDArray[np.float64]
-
-_FEWEST_RUNS = 8
-"""Runs from which they are the clusters; with fewer, samples are."""
-_SEEN = 0.1
-"""Least share of a variance that the residuals would show if they were plain noise."""
+_FEWEST_RUNS = 8  # runs from which they are the clusters; with fewer, samples are
+_SEEN = 0.1  # least share of a variance that the residuals would show if they were plain noise
 _VAGUE = 30.0
 """Standard deviation, in changes that matter, from which the data does not tell a number."""
 
@@ -28,7 +23,7 @@ class Uncertainty:
 
     covariance: Array
     """Of what the data tells, shape (number, number)."""
-    told: NDArray[np.bool_]
+    told: Mask
     """False for a number that the data does not tell at the end of the fit, of which no residuals
     are left to say how well, or which is at a bound; shape (number,)."""
     freedom: Array
@@ -102,7 +97,7 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     return Uncertainty(whole * np.outer(scale, scale), told, degrees, by)
 
 
-def _bent(fit: Fit, seen: NDArray[np.bool_], scale: Array) -> Array:
+def _bent(fit: Fit, seen: Mask, scale: Array) -> Array:
     """Difference between the second derivatives of a robust loss and of weighted squares.
 
     Of 2W²(√(1 + d²/W²) - 1) in the distance d of a place it is w - w (1 - w²) along the residual,

@@ -19,5 +19,5 @@ def _run() -> int:
     for name in ("stdin", "stdout", "stderr"):  # else the next file opened would take its place
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
-    os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever windows there are
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files
     return run(sys.argv[1:])

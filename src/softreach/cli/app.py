@@ -1,7 +1,7 @@
 """The `softreach` command and what its exit codes mean.
 
-0 done, 1 a requirement is missed (`check`, `search`), 2 wrong input or nowhere to write, 141 nobody
-reads the output any more, 128 + signal.
+0 done, 1 a requirement is missed (`check`, `search`), 2 wrong input or nowhere to write, 141
+standard output was closed, 128 + signal.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Annotated, Any, cast
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from softreach.cli.console import HelpConsole, console
-from softreach.support.errors import InvalidInput, NotWritten, SoftreachError, check_date
+from softreach.support.errors import NotWritten, SoftreachError, check_date
 from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
@@ -39,6 +39,22 @@ def _shown_default(value: object) -> Any:
     return None if value is None or value is False else str(value)
 
 
+class _Flowing:
+    """Lays out help whose lines docstrings break; loaded when it is needed, as Rich takes time."""
+
+    def __call__(self, console: Any, options: Any, panel: Any) -> None:
+        for entry in panel.entries:
+            text = getattr(entry.description, "primary_renderable", None)
+            if text is not None:
+                text.plain = text.plain.replace("\n", " ")
+        self.__getattr__("__call__")(console, options, panel)
+
+    def __getattr__(self, name: str) -> Any:
+        from cyclopts.help import DefaultFormatter
+
+        return getattr(DefaultFormatter(), name)
+
+
 app = App(
     name="softreach",
     help="""Where a soft slender robot can go: from a design to its cloud and volumes.
@@ -54,6 +70,7 @@ Start with
     print_error=False,
     suppress_keyboard_interrupt=False,
     help_format="plaintext",
+    help_formatter=_Flowing(),
     console=cast(Any, HelpConsole()),
     default_parameter=Parameter(negative=(), show_default=_shown_default),
 )
@@ -103,7 +120,7 @@ def _start(
     ] = None,
 ) -> int | None:
     if quiet and verbose:
-        raise InvalidInput("quiet", quiet, "left out with --verbose")
+        raise SoftreachError("choose --quiet or --verbose")
     console.set(quiet=quiet, verbose=verbose)
     with importing(imports or ()):
         return app(words, result_action="return_value")

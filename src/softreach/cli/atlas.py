@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,17 +12,17 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Rows
 from softreach.cli.options import (
+    OUT,
     SAMPLING,
     AsJson,
     Durable,
     Overwrite,
     Sampling,
     check_picture,
-    out_option,
     refuse,
 )
-from softreach.cli.values import WHOLE, as_read
-from softreach.support.errors import InvalidInput, MissingExtra
+from softreach.cli.values import Whole, as_read, pairs_in
+from softreach.support.errors import InvalidInput, MissingExtra, SoftreachError
 from softreach.support.quantity import numbers_in
 
 if TYPE_CHECKING:
@@ -50,36 +51,15 @@ def build(
     store: Store,
     /,
     *,
-    vary: Annotated[
-        list[str] | None,
-        Parameter(
-            help="A parameter of the grid: taper_deg=0:3:16, left.bundles=1,2, or "
-            "rings[0].material.young_modulus_pa=1e5,1e6. May be repeated."
-        ),
-    ] = None,
-    design: Annotated[
-        str | None, Parameter(help="Design that --vary changes: minimal_trunk if left out.")
-    ] = None,
-    space: Annotated[
-        Path | None, Parameter(help="File of a design space (.toml), instead of --vary.")
-    ] = None,
+    vary: list[str] | None = None,
+    design: str | None = None,
+    space: Path | None = None,
     sampling: Sampling = SAMPLING,
-    alpha: Annotated[
-        str | None,
-        Parameter(help="Radius of the α-shapes over the length of each design: 0.05L if left out."),
-    ] = None,
-    metrics: Annotated[
-        str | None,
-        Parameter(
-            help="Groups of metrics, comma-separated, if not all: extent, convex, concave, exact, "
-            "curvature, stability; or names of metrics of your own."
-        ),
-    ] = None,
-    keep_clouds: Annotated[
-        bool, Parameter(negative="--no-keep-clouds", help="Store the tips.")
-    ] = True,
-    scheduler: Annotated[str | None, Parameter(help="Dask scheduler: tcp://host:port")] = None,
-    scheduler_file: Annotated[Path | None, Parameter(help="Dask scheduler file.")] = None,
+    alpha: str | None = None,
+    metrics: str | None = None,
+    keep_clouds: Annotated[bool, Parameter(negative="--no-keep-clouds")] = True,
+    scheduler: str | None = None,
+    scheduler_file: Path | None = None,
     shard: Shard = "0/1",
     changes: Changes = UNCHANGED,
     durable: Durable = False,
@@ -91,13 +71,25 @@ def build(
     damaged.
 
     Example: softreach atlas build a.zarr --vary taper_deg=0:3:9 --vary length_m=1,2
+
+    Args:
+        vary: A parameter of the grid: taper_deg=0:3:16, left.bundles=1,2, or
+            rings[0].material.young_modulus_pa=1e5,1e6. May be repeated.
+        design: Design that --vary changes: minimal_trunk if left out.
+        space: File of a design space (.toml), instead of --vary.
+        alpha: Radius of the α-shapes over the length of each design: 0.05L if left out.
+        metrics: Groups of metrics, comma-separated, if not all: extent, convex, concave, exact,
+            curvature, stability; or names of metrics of your own.
+        keep_clouds: Store the tips.
+        scheduler: Dask scheduler: tcp://host:port
+        scheduler_file: Dask scheduler file.
     """
     from softreach.atlas import build_atlas
     from softreach.atlas.metrics import METRIC_GROUPS
 
     groups = tuple(METRIC_GROUPS) if metrics is None else tuple(metrics.split(","))
     if "concave" not in groups:
-        refuse("left out without the metrics concave", alpha=alpha)
+        refuse("without the metrics concave", alpha=alpha)
     build_atlas(
         _space_of(space, design, vary, changes),
         store,
@@ -141,34 +133,32 @@ def verify(store: Store, /, *, json: AsJson = False) -> None:
 
 
 def _print_status(store: str, state: AtlasStatus, json: bool) -> None:
-    counts = ("designs", "done", "todo", "failed", "gaps", "unstable", "damaged")
-    rows: Rows = {name: (getattr(state, name), "") for name in counts}
-    rows["tips verified"] = ("yes" if state.tips_verified else "no: softreach atlas verify", "")
     if json:
-        rows["tips verified"] = (state.tips_verified, "")
-        rows["messages"] = ({str(k): text for k, text in state.messages.items()}, "")
+        console.json(asdict(state))
     else:
-        rows |= {f"number {k}": (text, "") for k, text in list(state.messages.items())[:10]}
-    console.rows(f"atlas {store}", rows, json)
+        console.block(f"atlas {store}", state)
 
 
 @atlas.command
 def best(
     store: Store,
-    metric: Annotated[str, Parameter(help="A metric, as softreach list metrics names it.")],
+    metric: str,
     /,
     *,
-    smallest: Annotated[bool, Parameter(help="Prefer small values.")] = False,
-    where: Annotated[
-        list[str] | None,
-        Parameter(help="A constraint, unreachability<=0.4 or taper_deg>=1. May be repeated."),
-    ] = None,
-    count: Annotated[int, WHOLE, Parameter(help="Number of designs.")] = 1,
+    smallest: bool = False,
+    where: list[str] | None = None,
+    count: Whole = 1,
     json: AsJson = False,
 ) -> None:
     """Find the designs with the largest metric, under constraints.
 
     Example: softreach atlas best a.zarr exact_volume --where "taper_deg<=1"
+
+    Args:
+        metric: A metric, as softreach list metrics names it.
+        smallest: Prefer small values.
+        where: A constraint, unreachability<=0.4 or taper_deg>=1. May be repeated.
+        count: Number of designs.
     """
     from softreach.atlas import best_designs, open_atlas
 
@@ -187,10 +177,8 @@ def figures(
     store: Store,
     /,
     *,
-    panels: Annotated[
-        int, WHOLE, Parameter(help="Largest number of columns and rows of a sheet.")
-    ] = 7,
-    out: Annotated[Path, out_option("Folder for the figures.")] = Path("figures"),
+    panels: Whole = 7,
+    out: Annotated[Path, OUT] = Path("figures"),
     overwrite: Overwrite = False,
 ) -> None:
     """Draw the atlas: sheets, corners, maps, curvature.
@@ -198,6 +186,10 @@ def figures(
     Each figure is written as PNG and PDF.
 
     Example: softreach atlas figures atlas.zarr --out figures
+
+    Args:
+        panels: Largest number of columns and rows of a sheet.
+        out: Folder for the figures.
     """
     from softreach.atlas import open_atlas
     from softreach.paper.atlas_figures import atlas_figures
@@ -214,7 +206,7 @@ def figures(
         pyplot().close(figure.get_figure(root=True))
 
 
-_NAMED_IN_FILE = "left out with --space, whose file names the design"
+_NAMED_IN_FILE = "with --space, whose file names the design"
 
 
 def _space_of(
@@ -225,10 +217,9 @@ def _space_of(
     from softreach.support.files.text import read_text
 
     if (path is None) == (vary is None):
-        raise InvalidInput("space", path, "given, or --vary, and not both")
+        raise SoftreachError("give either --vary or --space")
     if path is not None:
-        refuse(_NAMED_IN_FILE, design=design)
-        changes.refuse(_NAMED_IN_FILE)
+        refuse(_NAMED_IN_FILE, design=design, **changes.given)
         return parse_space(read_text("space", path, LONGEST), design_from)
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
@@ -238,13 +229,13 @@ def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter
 
-    pairs = (text.rpartition("=") if "=" in text else (text, "", "") for text in vary)
-    return DesignSpace.grid(base, **dict(parse_parameter(base, key, x) for key, _, x in pairs))
+    pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8") or {}
+    return DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))
 
 
 def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:
     if scheduler is not None:
-        refuse("left out with --scheduler", scheduler_file=scheduler_file)
+        refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:
         return None
     try:

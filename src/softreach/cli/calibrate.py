@@ -12,103 +12,36 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.free_numbers import Free, free_names, priors
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import (
-    OUTPUT,
-    AsJson,
-    Design,
-    Overwrite,
-    Unit,
-    check_output,
-    out_option,
-    refuse,
-)
-from softreach.cli.values import NUMBER, WHOLE, as_read, pairs_in
+from softreach.cli.options import OUTPUT, AsJson, Design, Out, Overwrite, Unit, check_output
+from softreach.cli.values import Number, Whole, as_read, pairs_in
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from softreach.calibration import Calibration, Misses
+    from softreach.calibration import Calibration, PlacementErrors
 
-_COLUMNS = Group("Columns of the data, where their names do not tell", sort_key=1)
+_COLUMNS = Group("Column names", sort_key=1)
 
 
 def calibrate(
     design: Design,
-    data: Annotated[
-        Path,
-        Parameter(
-            help="Measured poses (.csv .parquet): a column for each input and x, y, z of each "
-            "marker, with units in their names, such as tension1_N and tip_x_mm."
-        ),
-    ],
+    data: Path,
     /,
     *,
     free: Free,
-    prior: Annotated[
-        list[str] | None,
-        Parameter(
-            help="What is known of a number beforehand, its width about the value of the design "
-            "or MEAN:WIDTH: taper=1deg, rings[0].material.young_modulus=300kPa:50kPa. May be "
-            "repeated."
-        ),
-    ] = None,
-    hold_out: Annotated[
-        float, NUMBER, Parameter(help="Share of the samples, by chance, that the fit does not see.")
-    ] = 0.0,
-    noise: Annotated[
-        str | None,
-        Parameter(
-            help="Standard deviation of a measured coordinate, against which priors are weighed: "
-            "0.2mm. That of the residuals if left out."
-        ),
-    ] = None,
-    robust: Annotated[
-        bool, Parameter(negative="--no-robust", help="Let samples far off count less.")
-    ] = True,
-    rivals: Annotated[
-        bool,
-        Parameter(
-            negative="--no-rivals", help="Fit constant curvature and a quadratic law beside it."
-        ),
-    ] = True,
-    seed: Annotated[int, WHOLE, Parameter(help="Seed of the samples held out.")] = 0,
-    inputs: Annotated[
-        list[str] | None,
-        Parameter(
-            name="--input",
-            group=_COLUMNS,
-            help='Column of an input: "tendon 1=tension1_N". May be repeated.',
-        ),
-    ] = None,
-    markers: Annotated[
-        list[str] | None,
-        Parameter(
-            name="--marker",
-            group=_COLUMNS,
-            help="Start of the columns of a marker: tip=disk3. May be repeated.",
-        ),
-    ] = None,
-    run: Annotated[
-        str | None,
-        Parameter(
-            group=_COLUMNS, help="Column that says which samples belong together, as run does."
-        ),
-    ] = None,
-    order: Annotated[
-        str | None,
-        Parameter(group=_COLUMNS, help="Column in whose order samples were taken, as time_s does."),
-    ] = None,
+    prior: list[str] | None = None,
+    hold_out: Number = 0.0,
+    noise: str | None = None,
+    robust: Annotated[bool, Parameter(negative="--no-robust")] = True,
+    rivals: Annotated[bool, Parameter(negative="--no-rivals")] = True,
+    seed: Whole = 0,
+    inputs: Annotated[list[str] | None, Parameter(name="--input", group=_COLUMNS)] = None,
+    markers: Annotated[list[str] | None, Parameter(name="--marker", group=_COLUMNS)] = None,
+    run: Annotated[str | None, Parameter(group=_COLUMNS)] = None,
+    order: Annotated[str | None, Parameter(group=_COLUMNS)] = None,
     changes: Changes = UNCHANGED,
-    out: Annotated[
-        Path | None, out_option("Write the calibrated design to this TOML file.")
-    ] = None,
-    report: Annotated[
-        Path | None,
-        Parameter(group=OUTPUT, help="Write a report with pictures to this .html file."),
-    ] = None,
-    table: Annotated[
-        Path | None,
-        Parameter(group=OUTPUT, help="Write what was predicted and missed to this .csv file."),
-    ] = None,
+    out: Out = None,
+    report: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
+    table: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -119,6 +52,25 @@ def calibrate(
     places beside that of simpler laws, and what limits the fit.
 
     Example: softreach calibrate arm.toml poses.csv --free pose --free "rings*modulus" -o bench.toml
+
+    Args:
+        data: Measured poses (.csv .parquet): a column for each input and x, y, z of each marker,
+            with units in their names, such as tension1_N and tip_x_mm.
+        prior: What is known of a number beforehand, its width about the value of the design or
+            MEAN:WIDTH: taper=1deg, rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
+        hold_out: Fraction of samples held out at random.
+        noise: Standard deviation of a measured coordinate, against which priors are weighed: 0.2mm.
+            That of the residuals if left out.
+        robust: Down-weight outliers.
+        rivals: Fit constant curvature and a quadratic law beside it.
+        seed: Seed of the held-out samples.
+        inputs: Column of an input: "tendon 1=tension1_N". May be repeated.
+        markers: Start of the columns of a marker: tip=disk3. May be repeated.
+        run: Column that groups samples into runs, if not run.
+        order: Column to sort by, if not time_s.
+        out: Write the calibrated design to this TOML file.
+        report: Write a report with pictures to this .html file.
+        table: Write what was predicted and missed to this .csv file.
     """
     from softreach import calibration
     from softreach.arm.design_file import DESIGN_FILE
@@ -129,11 +81,9 @@ def calibrate(
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
-    if out is None and report is None and table is None:
-        refuse("left out where no file is written: give --out too", overwrite=overwrite)
-    for path, formats in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)):
-        if path is not None:
-            check_output(path, formats, overwrite)
+    outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
+    for path, formats in outputs or [(None, {})]:
+        check_output(path, formats, overwrite)
     with progress.bar("fitting", None) as step:
         result = calibration.calibrate(
             arm,
@@ -179,8 +129,6 @@ def read_noise(text: str) -> float:
 
 def _record(result: Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
-    from softreach.calibration.report import error_rows
-
     repeated = result.repeatability
     return {
         "samples": len(result.data),
@@ -188,8 +136,7 @@ def _record(result: Calibration) -> dict[str, Any]:
         "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
         "numbers": _numbers(result),
         "errors": [
-            {"law": row.law, "samples": row.samples, **_errors(row.errors)}
-            for row in error_rows(result)
+            {"law": row.law, "samples": row.samples, **_errors(row.errors)} for row in result.errors
         ],
         "correlated": [list(pair) for pair in result.correlated],
         "outlier_rows": result.outliers.tolist(),
@@ -221,6 +168,6 @@ def _numbers(result: Calibration) -> list[Mapping[str, Any]]:
     ]
 
 
-def _errors(errors: Misses) -> dict[str, float]:
+def _errors(errors: PlacementErrors) -> dict[str, float]:
     keys = ("median_m", "mean_m", "rms_m", "below_95_percent_m", "places")
     return dict(zip(keys, errors, strict=True))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.values import NUMBER, pairs_in
+from softreach.cli.values import Number, pairs_in
 from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, warn
 
 if TYPE_CHECKING:
@@ -22,57 +22,37 @@ _POSTURES = {"upright": "up", "hanging": "down"}
 """Words for the way that a base points."""
 
 
+Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
+"""Text that may begin with a minus."""
+
+
 @Parameter(name="*", group=Group("Changes of the design", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class Changes:
-    """Changes that a command makes to the design that it takes."""
+    """Changes that a command makes to the design that it takes.
 
-    base: Annotated[
-        str | None,
-        Parameter(
-            help="The way the arm points from its base in the world: up (upright), down (hanging), "
-            "x, -x, y or -y.",
-            allow_leading_hyphen=True,
-        ),
-    ] = None
-    revolution_deg: Annotated[
-        float | None,
-        NUMBER,
-        Parameter(help="Revolution of every helical fiber [deg], each in its own sense."),
-    ] = None
-    taper_deg: Annotated[float | None, NUMBER, Parameter(help="Taper angle [deg].")] = None
-    payload: Annotated[
-        str | None,
-        Parameter(help="Mass at the tip with its unit: 200g.", allow_leading_hyphen=True),
-    ] = None
-    gravity: Annotated[
-        str | None,
-        Parameter(
-            help="down (with loads, if left out), up, sideways (along +x), none, or x,y,z [m/s²] "
-            "in the world, whose +z points up.",
-            allow_leading_hyphen=True,
-        ),
-    ] = None
-    tip_force: Annotated[
-        str | None,
-        Parameter(
-            help="Force on the tip in the world, x,y,z [N]: 0,0,-0.5 or 0,0,-500mN.",
-            allow_leading_hyphen=True,
-        ),
-    ] = None
-    point: Annotated[
-        str | None,
-        Parameter(help="Marker that counts as the tip, such as that of a tool."),
-    ] = None
-    settings: Annotated[
-        list[str] | None,
-        Parameter(
-            name="--set",
-            help="PATH=VALUE of any parameter, as softreach list parameters DESIGN names them: "
-            "left.offset_deg=30, or with the unit in the value, left.offset=30deg. May be "
-            "repeated.",
-        ),
-    ] = None
+    Attributes:
+        base: The way the arm points from its base in the world: up (upright), down (hanging), x,
+            -x, y or -y.
+        revolution_deg: Revolution of every helical fiber [deg]; each keeps its handedness.
+        taper_deg: Taper angle [deg].
+        payload: Mass at the tip with its unit: 200g.
+        gravity: down, up, sideways (along +x), none, or x,y,z [m/s²] in the world, whose +z points
+            up; down if left out and there are loads.
+        tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5 or 0,0,-500mN.
+        point: Marker that counts as the tip, such as that of a tool.
+        settings: PATH=VALUE of any parameter, as softreach list parameters DESIGN names them:
+            left.offset_deg=30, or with the unit in the value, left.offset=30deg. May be repeated.
+    """
+
+    base: Signed = None
+    revolution_deg: Number | None = None
+    taper_deg: Number | None = None
+    payload: Signed = None
+    gravity: Signed = None
+    tip_force: Signed = None
+    point: str | None = None
+    settings: Annotated[list[str] | None, Parameter(name="--set")] = None
 
     @property
     def given(self) -> dict[str, object]:
@@ -113,11 +93,6 @@ class Changes:
         if points not in POINTS:
             raise InvalidInput("base", self.base, f"one of {', '.join([*_POSTURES, *POINTS])}")
         return arm.replace(base=arm.base.replace(points=points))
-
-    def refuse(self, why: str) -> None:
-        """Refuse whatever was given, where there is no design to change."""
-        for name, value in self.given.items():
-            raise InvalidInput(name, value, why)
 
     def _angles(self) -> dict[str, float]:
         from softreach.arm.written import from_written

@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import (
-    OUTPUT,
-    AsJson,
-    Design,
-    Overwrite,
-    Unit,
-    check_picture,
-    out_option,
-    refuse,
-)
-from softreach.cli.values import NUMBER
+from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, View, check_picture
+from softreach.cli.values import Number
 
 if TYPE_CHECKING:
     from softreach.requirements import Check, Finding
@@ -31,17 +20,13 @@ EXIT = {"met": 0, "missed": 1, "undecided": 3}
 
 def check(
     design: Design,
-    needs: Annotated[Path, Parameter(help="Requirements (.toml).")],
+    needs: Path,
     /,
     *,
-    accuracy: Annotated[
-        float, NUMBER, Parameter(help="Error of shares that are covered, and of volumes.")
-    ] = 1e-2,
+    accuracy: Number = 1e-2,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Draw the arm at the places (.png .pdf .svg).")] = None,
-    view: Annotated[
-        str | None, Parameter(group=OUTPUT, help="oblique (if left out), front, side or top.")
-    ] = None,
+    out: Out = None,
+    view: View = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -54,19 +39,19 @@ def check(
     is 0 if all is met, 1 if something is missed, and 3 if something is undecided.
 
     Example: softreach check arm.toml needs.toml --out check.png
+
+    Args:
+        needs: Requirements (.toml).
+        accuracy: Accuracy of coverages and volumes.
+        out: Draw the arm at the places (.png .pdf .svg).
     """
-    from softreach.picture.projection import view_angles
     from softreach.requirements import Requirements
     from softreach.requirements import check as checked
     from softreach.support import progress
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
-    if view is not None:
-        view_angles(view)
-    if out is None:
-        refuse("left out without a picture: give --out check.png too", view=view)
-    check_picture(out, overwrite)
+    check_picture(out, overwrite, view=view)
     requirements = Requirements.load(needs, length=arm.length)
     shown = arm.replace(display_unit=lengths.unit.name)
     with progress.bar("checking", None) as step:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
@@ -15,13 +13,13 @@ from softreach.cli.options import (
     SAMPLING,
     AsJson,
     Design,
+    Out,
     Overwrite,
     Sampling,
     Unit,
     check_output,
-    out_option,
 )
-from softreach.cli.values import NUMBER
+from softreach.cli.values import Number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,12 +30,9 @@ def cloud(
     /,
     *,
     sampling: Sampling = SAMPLING,
-    tol: Annotated[float, NUMBER, Parameter(help="Largest tip error, in L.")] = 1e-6,
+    tol: Number = 1e-6,
     changes: Changes = UNCHANGED,
-    out: Annotated[
-        Path | None,
-        out_option("Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out."),
-    ] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -45,6 +40,10 @@ def cloud(
     """Sample the reachability cloud of a design and store it as Zarr.
 
     Example: softreach cloud minimal_trunk --n 400000 --out trunk.zarr
+
+    Args:
+        tol: Largest tip error, in L.
+        out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
     from time import perf_counter
 

@@ -39,7 +39,7 @@ def _printable(text: object) -> str:
 
 
 class Console:
-    """Everything that commands print goes through here.
+    """Prints for all commands.
 
     Attributes:
         quiet: Results and errors only.
@@ -50,13 +50,17 @@ class Console:
     verbose = False
 
     def set(self, *, quiet: bool = False, verbose: bool = False) -> None:
-        """Say how much is printed."""
+        """Set how much is printed."""
         self.quiet = progress.hidden = quiet
         self.verbose = verbose
 
     def line(self, text: object) -> None:
         """A result in words."""
         sys.stdout.write(f"{_printable(text)}\n")
+
+    def block(self, title: str, result: object) -> None:
+        """A result that prints itself, below its title."""
+        self.line("\n  ".join([title, *str(result).splitlines()]))
 
     def json(self, value: Any, indent: int | None = None) -> None:
         """A result for machines; null where there is no number."""
@@ -115,12 +119,12 @@ class Console:
 
     def error(self, text: str) -> None:
         """A line on standard error."""
-        with suppress(OSError, ValueError):  # nobody reads it
+        with suppress(OSError, ValueError):  # it was closed
             sys.stderr.write(f"{_printable(text)}\n")
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """A block whose warnings and compilations are told, and whose letters can be printed."""
+        """Print warnings and compilations during a block, with letters that can be printed."""
         compilations, log = _Compilations(), logging.getLogger("softreach")
         streams = [s for s in (sys.stdout, sys.stderr) if isinstance(s, TextIOWrapper)]
         before, level = [stream.errors for stream in streams], log.level
@@ -141,7 +145,7 @@ class Console:
                     stream.reconfigure(errors=errors)
 
     def flush(self) -> None:
-        """Hand over what was printed, so that a full disk is not found out after the last word.
+        """Write what was printed, so that a full disk is found before the end.
 
         Raises:
             NotWritten: It cannot be written.
@@ -157,7 +161,7 @@ class Console:
             raise NotWritten("standard output", error.errno or 0, reason) from None
 
     def discard(self) -> None:
-        """Send what was printed and cannot be written nowhere; Python would complain of it."""
+        """Drop output that cannot be written; Python would print an error."""
         with suppress(OSError, ValueError):
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, sys.stdout.fileno())
@@ -185,7 +189,7 @@ def _rich_console() -> RichConsole:
 
 
 class _Compilations(logging.Handler):
-    """Tells that kernels are compiled, so that nobody takes a first run for one that hangs."""
+    """Prints that kernels are compiled, as a first run may seem to hang."""
 
     told = False
 

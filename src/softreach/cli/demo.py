@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import AsJson, Overwrite, Unit, check_output, out_option
-from softreach.cli.values import WHOLE
+from softreach.cli.options import OUT, AsJson, Overwrite, Unit, check_output
+from softreach.cli.values import Whole
 from softreach.cli.volume import check_hull_memory, volume_rows
 
 _FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
@@ -18,8 +18,8 @@ _FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
 
 def demo(
     *,
-    n: Annotated[int, WHOLE, Parameter(name=("--n", "-n"), help="Number of samples.")] = 400_000,
-    out: Annotated[Path, out_option("Folder for the results.")] = Path("out"),
+    n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 400_000,
+    out: Annotated[Path, OUT] = Path("out"),
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -29,6 +29,10 @@ def demo(
     The design is minimal_trunk (Ω = 108°, φ = 2°); all is written into one folder.
 
     Example: softreach demo --out out
+
+    Args:
+        n: Number of samples.
+        out: Folder for the results.
     """
     from time import perf_counter
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, Rows
-from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option, refuse
+from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output, refuse
 from softreach.cli.values import to_degrees
-from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -25,11 +24,9 @@ def design(
     design: Design | None = None,
     /,
     *,
-    schema: Annotated[
-        bool, Parameter(help="Print the JSON schema of design files for editors, nothing else.")
-    ] = False,
+    schema: bool = False,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Write the design to this TOML file.")] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -40,20 +37,23 @@ def design(
     with --out goes into the design file.
 
     Example: softreach design minimal_trunk --taper-deg 3
+
+    Args:
+        schema: Print the JSON schema of design files for editors, nothing else.
+        out: Write the design to this TOML file.
     """
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.rod.summary import describe
 
     if schema:
-        changes.refuse("left out with --schema")
-        given = {"design": design, "out": out, "overwrite": overwrite, "unit": unit}
-        refuse("left out with --schema", **given)
+        given = {"out": out, "overwrite": overwrite, "unit": unit}
+        refuse("with --schema", **given, **changes.given)
         from softreach.arm.design_file.schema import json_schema
 
         console.json(json_schema(), indent=2)
         return
     if design is None:
-        raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
+        raise SoftreachError("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
         arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
@@ -119,20 +119,25 @@ def _rows_of_matter(facts: DesignSummary) -> Rows:
 
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
+    """Bounds and effects of each activation; neighbors that are equal share a line."""
+    texts = [
+        f"{_span(arm.bounds[k])}{_suffix(unit)}: length {_span(100.0 * facts.bundle_strain[k])} %, "
+        f"ζ {_span(facts.bundle_extension[k])}, |κ| R2 {_span(facts.bundle_bending[k])}"
+        for k, unit in enumerate(arm.bundle_units)
+    ]
     rows: Rows = {}
-    for k, name in enumerate(arm.bundle_names):
-        unit = "" if arm.bundle_units[k] == "1" else f" {arm.bundle_units[k]}"
-        effects = (
-            f"length {_span(100.0 * facts.bundle_strain[k])} %",
-            f"ζ {_span(facts.bundle_extension[k])}",
-            f"|κ| R2 {_span(facts.bundle_bending[k])}",
-        )
-        rows[f"activation {name}"] = (f"{_span(arm.bounds[k])}{unit}: {', '.join(effects)}", "")
+    for text, group in groupby(zip(texts, arm.bundle_names, strict=True), itemgetter(0)):
+        first, *others = [name for _, name in group]
+        label = f"{first} to {others[-1]}" if len(others) > 1 else ", ".join([first, *others])
+        rows[f"activation {label}"] = (text, "")
     for drive in arm.drives:
-        unit = "" if drive.unit == "1" else f" {drive.unit}"
         gains = ", ".join(f"{gain:+g} {name}" for name, gain in drive.gains.items())
-        rows[f"drive {drive.name}"] = (f"{_span(drive.bounds)}{unit}: {gains}", "")
+        rows[f"drive {drive.name}"] = (f"{_span(drive.bounds)}{_suffix(drive.unit)}: {gains}", "")
     return rows
+
+
+def _suffix(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
 
 
 def _span(ends: Any) -> str:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
@@ -14,13 +11,13 @@ from softreach.cli.options import (
     Activation,
     AsJson,
     Design,
+    Out,
     Overwrite,
     Unit,
+    View,
     activation_of,
     check_picture,
     is_page,
-    out_option,
-    refuse,
     write_page,
 )
 from softreach.cli.values import activation_text
@@ -35,12 +32,9 @@ def equilibria(
     /,
     *,
     activation: Activation = None,
-    view: Annotated[
-        str | None,
-        Parameter(help="View of the picture: front, side, top or oblique (if left out)."),
-    ] = None,
+    view: View = None,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Draw them: .png .pdf .svg, or .html to turn")] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -50,15 +44,13 @@ def equilibria(
     Stable ones come first. The posture of the arm that hangs first is marked.
 
     Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
+
+    Args:
+        out: Draw them: .png .pdf .svg, or .html to turn
     """
-    from softreach.picture.projection import view_angles
     from softreach.rod import equilibria as all_of
 
-    if out is None:
-        refuse("left out without a picture: give --out too", view=view)
-    elif view is not None:
-        view_angles(view)  # what is wrong with it is said before anything is computed
-    check_picture(out, overwrite, page=True)
+    check_picture(out, overwrite, view=view, page=True)
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     result = all_of(arm, activation_of(activation, arm))

@@ -33,12 +33,12 @@ Format = Annotated[
 ]
 
 
-_OTHER = "left out for ActiveFilaments.jl, whose lengths are in m"
+_OTHER = "for ActiveFilaments.jl, whose lengths are in m"
 
 
 def export(
     source: Source,
-    out: Annotated[Path, Parameter(help="The file to write; its suffix chooses the format.")],
+    out: Path,
     /,
     *,
     activation: Activation = None,
@@ -49,18 +49,21 @@ def export(
 ) -> None:
     """Convert a cloud or an arm for other programs.
 
-    A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu .vtk).
+    A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
-    .glb .vtu .vtk), or the source of a filament of ActiveFilaments.jl (.jl).
+    .glb .vtu), or the source of a filament of ActiveFilaments.jl (.jl).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
+
+    Args:
+        out: The file to write; its suffix chooses the format.
     """
     check_unit(unit)
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
     if is_stored(source):
-        refuse("left out for a cloud, which has many", activation=activation)
-        changes.refuse("left out for a stored cloud: give the design instead")
+        refuse("on a cloud, which has many", activation=activation)
+        refuse("on a stored cloud: give the design instead", **changes.given)
         written = _cloud(source, out, format, overwrite, unit)
     else:
         arm = design_from(source, changes)
@@ -106,9 +109,9 @@ def _design(
     unit: str | None,
 ) -> list[Path]:
     if out.suffix == ".jl":
-        from softreach.exchange.activefilaments.script import FILAMENT_SCRIPT, write_design
+        from softreach.exchange.activefilaments.definition import FILAMENT_SCRIPT, write_design
 
-        refuse("left out for a filament's definition, which has none", activation=activation)
+        refuse("on a filament's definition, which has none", activation=activation)
         refuse(_OTHER, unit=unit)
         check_output(out, FILAMENT_SCRIPT, overwrite)
         write_design(arm, out, overwrite=overwrite)

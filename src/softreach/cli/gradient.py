@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Rows
 from softreach.cli.options import AsJson, Design
-from softreach.cli.values import NUMBER
+from softreach.cli.values import Number
 
 if TYPE_CHECKING:
     from softreach.workspace import VolumeGradient
@@ -21,15 +19,10 @@ _UNITS = {"volume": "m³", "convex_volume": "m³", "unreachability": ""}
 
 def gradient(
     design: Design,
-    parameters: Annotated[
-        list[str],
-        Parameter(help="Parameters, as softreach list parameters DESIGN names them."),
-    ],
+    parameters: list[str],
     /,
     *,
-    accuracy: Annotated[
-        float, NUMBER, Parameter(help="Relative error allowed in what is rasterized.")
-    ] = 3e-3,
+    accuracy: Number = 3e-3,
     changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
@@ -38,6 +31,10 @@ def gradient(
     Also its convex hull and its unreachability; everything in SI units.
 
     Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
+
+    Args:
+        parameters: Parameters, as softreach list parameters DESIGN names them.
+        accuracy: Relative error allowed in what is rasterized.
     """
     from softreach.support import progress
     from softreach.workspace import volume_gradient

@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Overwrite, Unit, check_output, refuse
-from softreach.cli.values import NUMBER
+from softreach.cli.values import Number
 from softreach.support.errors import InvalidInput
 
 
 def import_file(
-    source: Annotated[Path, Parameter(help="Filament (.json), or cloud: NAME.csv of two files.")],
-    out: Annotated[Path, Parameter(help="Design (.toml) or cloud (.zarr) to write.")],
+    source: Path,
+    out: Path,
     /,
     *,
-    design: Annotated[
-        str | None, Parameter(help="Design that a cloud belongs to: .toml, .json or built-in.")
-    ] = None,
-    tol: Annotated[
-        float | None,
-        NUMBER,
-        Parameter(help="Largest error of the tips that a cloud is compared with, in L (1e-6)."),
-    ] = None,
+    design: str | None = None,
+    tol: Number | None = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -38,9 +29,15 @@ def import_file(
     NAME_gamma.csv beside it; its tips are compared with softreach's own.
 
     Example: softreach import filament.json filament.toml
+
+    Args:
+        source: Filament (.json), or cloud: NAME.csv of two files.
+        out: Design (.toml) or cloud (.zarr) to write.
+        design: Design that a cloud belongs to: .toml, .json or built-in.
+        tol: Largest error of the tips that a cloud is compared with, in L (1e-6).
     """
     if source.suffix == ".json":
-        refuse("left out for a filament: it is of clouds", design=design, tol=tol)
+        refuse("on a filament, only on a cloud", design=design, tol=tol)
         _design(source, out, overwrite, unit, json)
     elif source.suffix == ".csv":
         _cloud(source, out, design, 1e-6 if tol is None else tol, overwrite, unit, json)

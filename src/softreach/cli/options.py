@@ -13,8 +13,8 @@ from cyclopts import Group, Parameter
 from softreach.cli.changes import Changes, design_from, say_limits
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, check_unit
-from softreach.cli.values import WHOLE
-from softreach.support.errors import InvalidInput
+from softreach.cli.values import Whole
+from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in
 from softreach.support.units import TYPED, read_length
@@ -28,8 +28,11 @@ if TYPE_CHECKING:
 
 OUTPUT = Group("Output options", sort_key=3)
 
+OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
+"""The one name of the file or folder that a command writes."""
+
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
-_STORED = "left out for a stored cloud: give the design instead"
+_STORED = "on a stored cloud: give the design instead"
 
 Design = Annotated[
     str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
@@ -56,33 +59,30 @@ Unit = Annotated[
 ]
 Durable = Annotated[
     bool,
-    Parameter(group=OUTPUT, help="Wait until not even a power cut can lose what is written."),
+    Parameter(group=OUTPUT, help="Flush to disk before exiting."),
 ]
-Overwrite = Annotated[
-    bool,
-    Parameter(group=OUTPUT, help="Overwrite existing output."),
+Overwrite = Annotated[bool, Parameter(group=OUTPUT, help="Overwrite existing output.")]
+Out = Annotated[Path | None, OUT]
+View = Annotated[
+    str | None,
+    Parameter(group=OUTPUT, help="View of the picture: oblique (if left out), front, side, top."),
 ]
-
-
-def out_option(help: str) -> Parameter:
-    """`--out`, the one name of the file or folder that a command writes."""
-    return Parameter(name=("--out", "-o"), group=OUTPUT, help=help)
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """Options of the sampling of a cloud."""
+    """Options of the sampling of a cloud.
 
-    n: Annotated[
-        int | None,
-        WHOLE,
-        Parameter(name=("--n", "-n"), help="Number of samples: 400000 if left out."),
-    ] = None
-    seed: Annotated[int | None, WHOLE, Parameter(help="Seed of the sampler: 0 if left out.")] = None
-    sampler: Annotated[
-        str | None, Parameter(help="uniform (if left out), boundary, sobol or grid.")
-    ] = None
+    Attributes:
+        n: Number of samples: 400000 if left out.
+        seed: Seed of the sampler: 0 if left out.
+        sampler: uniform (if left out), boundary, sobol or grid.
+    """
+
+    n: Annotated[Whole | None, Parameter(name=("--n", "-n"))] = None
+    seed: Whole | None = None
+    sampler: str | None = None
 
     @property
     def count(self) -> int:
@@ -97,18 +97,18 @@ class Sampling:
             InvalidInput: A seed for a sampler without chance.
         """
         if self.sampler == "grid":
-            refuse("left out for the sampler grid, which is not random", seed=self.seed)
+            refuse("on the sampler grid, which is not random", seed=self.seed)
         return {"n": self.count, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
 
 
 SAMPLING = Sampling()
 
 
-def refuse(why: str, **options: object) -> None:
-    """Refuse options that would be ignored, if any of them is given."""
+def refuse(where: str, **options: object) -> None:
+    """Refuse options that would be ignored there, such as "without --out", if any is given."""
     for name, value in options.items():
         if value is not None and value is not False:
-            raise InvalidInput(name, value, why)
+            raise SoftreachError(f"--{name.replace('_', '-')} has no effect {where}")
 
 
 def is_stored(source: str) -> bool:
@@ -128,7 +128,7 @@ def cloud_of(
 
     check_unit(unit)
     if is_stored(source):
-        changes.refuse(_STORED)
+        refuse(_STORED, **changes.given)
         refuse(_STORED, **vars(sampling))
         cloud = open_cloud(source)
         say_limits(arm := design_of(cloud))
@@ -202,16 +202,23 @@ def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
     from softreach.support.files.formats import format_of
 
     if path is None:
-        refuse("left out where no file is written: give --out too", overwrite=overwrite)
+        refuse("without --out", overwrite=overwrite)
     else:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")
 
 
-def check_picture(path: Path | None, overwrite: bool, *, page: bool = False) -> None:
-    """Refuse a place for a picture, or for a page that turns, as `check_output`."""
+def check_picture(
+    path: Path | None, overwrite: bool, *, view: str | None = None, page: bool = False
+) -> None:
+    """Refuse a view, and a place for a picture or for a page that turns, as `check_output`."""
+    from softreach.picture.projection import view_angles
     from softreach.support.files.formats import PAGES, PICTURES
 
+    if path is None:
+        refuse("without --out", view=view)
+    elif view is not None:
+        view_angles(view)
     check_output(path, {**PICTURES, **PAGES} if page else PICTURES, overwrite)
 
 

@@ -5,18 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
-
 from softreach.cli.console import console
-from softreach.cli.options import Overwrite, out_option
+from softreach.cli.options import OUT, Overwrite
 
 
 def paper(
     *,
-    quick: Annotated[
-        bool, Parameter(help="Small clouds: coarse numbers in under a minute.")
-    ] = False,
-    out: Annotated[Path, out_option("Folder for the report and its figures.")] = Path("paper"),
+    quick: bool = False,
+    out: Annotated[Path, OUT] = Path("paper"),
     overwrite: Overwrite = False,
 ) -> None:
     """Recompute the paper's figures and statements into a report.
@@ -24,6 +20,10 @@ def paper(
     The same command continues after an interruption.
 
     Example: softreach paper --out paper --quick
+
+    Args:
+        quick: Small clouds: coarse numbers in under a minute.
+        out: Folder for the report and its figures.
     """
     from softreach.paper import reproduce_paper
 

@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
-
 from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, Rows
-from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_picture, out_option
-from softreach.cli.values import NUMBER
-from softreach.support.errors import InvalidInput
+from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_picture
+from softreach.cli.values import Number
+from softreach.support.errors import SoftreachError
 
 
 def payload(
     design: Design,
     /,
     *,
-    share: Annotated[
-        float, NUMBER, Parameter(help="Share to keep of the volume without a payload.")
-    ] = 0.8,
-    payloads: Annotated[
-        str | None,
-        Parameter(help="Masses at the tip, instead of the design's own payload: 2g,5g,10g"),
-    ] = None,
-    accuracy: Annotated[
-        float, NUMBER, Parameter(help="Relative error allowed in each volume.")
-    ] = 0.01,
+    share: Number = 0.8,
+    payloads: str | None = None,
+    accuracy: Number = 0.01,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Draw the curve: .png .pdf .svg")] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -41,6 +29,12 @@ def payload(
     and the largest payload that keeps a share of the volume.
 
     Example: softreach payload lce_arm --gravity up --share 0.8
+
+    Args:
+        share: Share to keep of the volume without a payload.
+        payloads: Masses at the tip, instead of the design's own payload: 2g,5g,10g
+        accuracy: Relative error allowed in each volume.
+        out: Draw the curve: .png .pdf .svg
     """
     from softreach.support import progress
     from softreach.workspace.payload import payload_curve
@@ -49,7 +43,7 @@ def payload(
     lengths = Lengths.of(arm, unit)
     check_picture(out, overwrite)
     if arm.loads is None:
-        raise InvalidInput("gravity", None, "given for a design without loads: down, up, sideways")
+        raise SoftreachError("this design has no loads; add --gravity down")
     masses = None if payloads is None else [read_mass("payloads", m) for m in payloads.split(",")]
     with progress.bar("computing volumes", None) as step:
         curve = payload_curve(arm, masses, accuracy=accuracy, progress=step)

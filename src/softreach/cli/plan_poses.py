@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -13,8 +12,8 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.free_numbers import Free, free_names
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option
-from softreach.cli.values import WHOLE, as_read
+from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output
+from softreach.cli.values import Whole, as_read
 
 if TYPE_CHECKING:
     from softreach.calibration.free_numbers import FreeNumber
@@ -25,19 +24,13 @@ def plan_poses(
     /,
     *,
     free: Free,
-    n: Annotated[int, WHOLE, Parameter(name=("--n", "-n"), help="Number of poses.")] = 20,
-    noise: Annotated[
-        str,
-        Parameter(help="Standard deviation of a measured coordinate and of what the model lacks."),
-    ] = "1mm",
-    markers: Annotated[
-        str | None,
-        Parameter(help="Markers that are going to be seen, comma-separated: all if left out."),
-    ] = None,
-    candidates: Annotated[int, WHOLE, Parameter(help="Number of poses to choose from.")] = 2000,
-    seed: Annotated[int, WHOLE, Parameter(help="Seed of candidates and of their order.")] = 0,
+    n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 20,
+    noise: str = "1mm",
+    markers: str | None = None,
+    candidates: Whole = 2000,
+    seed: Whole = 0,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Write the poses as a CSV file to fill in.")] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -49,6 +42,14 @@ def plan_poses(
     places of the markers; softreach calibrate reads it once it is filled in.
 
     Example: softreach plan-poses arm.toml --free pose --free "rings*modulus" -o poses.csv
+
+    Args:
+        n: Number of poses.
+        noise: Standard deviation of a measured coordinate, with model error.
+        markers: Markers that will be measured, comma-separated: all if left out.
+        candidates: Number of poses to choose from.
+        seed: Seed of candidates and of their order.
+        out: Write the poses as a CSV file to fill in.
     """
     from softreach import calibration
     from softreach.support.files.formats import TABLES

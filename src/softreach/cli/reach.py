@@ -12,6 +12,7 @@ from softreach.cli.console import console
 from softreach.cli.design import load_rows
 from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import (
+    OUT,
     OUTPUT,
     AsJson,
     Design,
@@ -19,11 +20,10 @@ from softreach.cli.options import (
     Unit,
     check_output,
     is_page,
-    out_option,
     refuse,
     write_page,
 )
-from softreach.cli.values import NUMBER
+from softreach.cli.values import Number
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -35,25 +35,10 @@ def reach(
     design: Design,
     /,
     *,
-    accuracy: Annotated[
-        float, NUMBER, Parameter(help="Relative error allowed in the volume.")
-    ] = 3e-3,
+    accuracy: Number = 3e-3,
     changes: Changes = UNCHANGED,
-    out: Annotated[
-        list[Path] | None,
-        out_option(
-            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), draw slices (.png .pdf .svg), or "
-            "the set as a web page that turns (.html). May be repeated."
-        ),
-    ] = None,
-    at: Annotated[
-        str | None,
-        Parameter(
-            group=OUTPUT,
-            help="Point x,y,z that the slices meet at: the middle of the set if left out.",
-            allow_leading_hyphen=True,
-        ),
-    ] = None,
+    out: Annotated[list[Path] | None, OUT] = None,
+    at: Annotated[str | None, Parameter(group=OUTPUT, allow_leading_hyphen=True)] = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -64,6 +49,12 @@ def reach(
     is not reached, and the number of activations that reach each place.
 
     Example: softreach reach minimal_trunk --out reach.stl --out reach.png
+
+    Args:
+        accuracy: Relative error allowed in the volume.
+        out: Write the boundary (.ply .stl .obj .glb .vtu), draw slices (.png .pdf .svg), or
+            the set as a web page that turns (.html). May be repeated.
+        at: Point x,y,z that the slices meet at: the middle of the set if left out.
     """
     from softreach.inverse.request import position_in
     from softreach.support import progress
@@ -74,13 +65,15 @@ def reach(
     outs = sorted(out or [], key=_is_picture)  # pictures come last
     _check_outputs(arm, outs, overwrite)
     if not any(map(_is_picture, outs)):
-        refuse("left out without a picture: give --out slices.png too", at=at)
+        refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | _rows(reached)
-    if reached.lost_share > 0.0:  # not stable, or torn
-        rows["activation box left out"] = (100.0 * reached.lost_share, "%")
+    if reached.lost_share > 0.0:
+        rows["activations without a posture"] = (100.0 * reached.lost_share, "%")
+    if reached.hysteresis_share > 0.0:
+        rows["activations with two postures (hysteresis)"] = (100 * reached.hysteresis_share, "%")
     console.rows(f"reachable set of {design}", rows, json, lengths)
     for path in outs:
         _write(reached, path, point, lengths, overwrite)

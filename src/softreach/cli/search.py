@@ -14,87 +14,32 @@ from softreach.cli.changes import Changes, design_from
 from softreach.cli.check import EXIT, finding_record
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import AsJson, Overwrite, Unit, out_option
-from softreach.cli.values import NUMBER, WHOLE, as_read, pairs_in
+from softreach.cli.options import OUT, AsJson, Overwrite, Unit
+from softreach.cli.values import Number, Whole, as_read, pairs_in
 
 if TYPE_CHECKING:
     from softreach.optimization import Candidate, Search
 
-_ASKED = Group("In place of what the file says", sort_key=1)
+_ASKED = Group("Override the file", sort_key=1)
 
 
 def search(
-    needs: Annotated[Path, Parameter(help="Requirements (.toml), with a table [search].")],
+    needs: Path,
     /,
     *,
-    design: Annotated[
-        list[str] | None,
-        Parameter(
-            group=_ASKED,
-            help="Design to vary: a file (.toml) or a built-in design. Repeated, one is chosen.",
-        ),
-    ] = None,
-    point: Annotated[
-        str | None,
-        Parameter(group=_ASKED, help="Marker that counts as the tip, such as that of a tool."),
-    ] = None,
-    free: Annotated[
-        list[str] | None,
-        Parameter(
-            group=_ASKED,
-            help="A free parameter, its range with units or a tie: taper_deg=0:3.2, "
-            "left.revolution=-1rad:1rad, right.revolution=-left.revolution. May be repeated.",
-        ),
-    ] = None,
-    choice: Annotated[
-        list[str] | None,
-        Parameter(
-            group=_ASKED,
-            help="Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.",
-        ),
-    ] = None,
-    maximize: Annotated[
-        str | None,
-        Parameter(
-            group=_ASKED,
-            help="Objectives to make large, comma-separated; softreach list objectives has them.",
-        ),
-    ] = None,
-    minimize: Annotated[
-        str | None, Parameter(group=_ASKED, help="Objectives to make small, comma-separated.")
-    ] = None,
-    designs: Annotated[
-        int | None,
-        WHOLE,
-        Parameter(
-            name=("--designs", "-n"),
-            group=_ASKED,
-            help="Number of designs to look at: 200 if left out everywhere.",
-        ),
-    ] = None,
-    seed: Annotated[int | None, WHOLE, Parameter(group=_ASKED, help="Seed of the search.")] = None,
-    accuracy: Annotated[
-        float | None,
-        NUMBER,
-        Parameter(group=_ASKED, help="Relative error of volumes: 3e-3 if left out everywhere."),
-    ] = None,
-    sampler: Annotated[
-        str | None, Parameter(group=_ASKED, help="auto, cma, tpe, nsga2, nsga3, sobol or random.")
-    ] = None,
-    polish: Annotated[
-        bool | None,
-        Parameter(
-            negative="--no-polish", group=_ASKED, help="Improve designs by their derivatives."
-        ),
-    ] = None,
-    storage: Annotated[
-        Path | None,
-        Parameter(
-            help="File in which every design is kept, a journal or SQLite (.db), by which a search "
-            "goes on; searches of other seeds may share it. FOLDER/search.journal if left out."
-        ),
-    ] = None,
-    out: Annotated[Path, out_option("Folder for the designs, tables and report.")] = Path("best"),
+    design: Annotated[list[str] | None, Parameter(group=_ASKED)] = None,
+    point: Annotated[str | None, Parameter(group=_ASKED)] = None,
+    free: Annotated[list[str] | None, Parameter(group=_ASKED)] = None,
+    choice: Annotated[list[str] | None, Parameter(group=_ASKED)] = None,
+    maximize: Annotated[str | None, Parameter(group=_ASKED)] = None,
+    minimize: Annotated[str | None, Parameter(group=_ASKED)] = None,
+    designs: Annotated[Whole | None, Parameter(name=("--designs", "-n"), group=_ASKED)] = None,
+    seed: Annotated[Whole | None, Parameter(group=_ASKED)] = None,
+    accuracy: Annotated[Number | None, Parameter(group=_ASKED)] = None,
+    sampler: Annotated[str | None, Parameter(group=_ASKED)] = None,
+    polish: Annotated[bool | None, Parameter(negative="--no-polish", group=_ASKED)] = None,
+    storage: Path | None = None,
+    out: Annotated[Path, OUT] = Path("best"),
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -106,12 +51,28 @@ def search(
     1 if it misses one, and 3 if one is undecided.
 
     Example: softreach search needs.toml --free taper_deg=0:3 --maximize exact_volume -o best
+
+    Args:
+        needs: Requirements (.toml), with a table [search].
+        design: Design file (.toml) or built-in design. Repeat to let the search choose.
+        point: Marker that counts as the tip, such as that of a tool.
+        free: A free parameter, its range with units or a tie: taper_deg=0:3.2,
+            left.revolution=-1rad:1rad, right.revolution=-left.revolution. May be repeated.
+        choice: Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.
+        maximize: Objectives to make large, comma-separated; softreach list objectives has them.
+        minimize: Objectives to make small, comma-separated.
+        designs: Number of designs to look at: 200 if left out everywhere.
+        seed: Seed of the search.
+        accuracy: Relative error of volumes: 3e-3 if left out everywhere.
+        sampler: auto, cma, tpe, nsga2, nsga3, sobol or random.
+        polish: Improve designs by their derivatives.
+        storage: Journal or SQLite file (.db) of all designs, to resume a search or to share it
+            with other seeds. FOLDER/search.journal if left out.
+        out: Folder for the designs, tables and report.
     """
-    from softreach import optimization
-    from softreach.optimization.folder import check_folder
+    from softreach.optimization.result import check_folder
     from softreach.optimization.search_file import read_search
     from softreach.requirements.requirements import LONGEST
-    from softreach.support import progress
     from softreach.support.files.text import read_text
 
     options = {"designs": designs, "seed": seed, "accuracy": accuracy, "sampler": sampler}
@@ -135,10 +96,23 @@ def search(
     if storage is None:
         out.mkdir(parents=True, exist_ok=True)
         storage = out / "search.journal"
+    result = _searched(asked, storage)
+    if json:
+        console.json(_record(result, out))
+    else:
+        console.line(result.report(lengths.unit.name))
+    result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
+    return EXIT[result.verdict]
+
+
+def _searched(asked: Any, storage: Path) -> Search:
+    from softreach import optimization
+    from softreach.support import progress
+
     watch = _Watch(asked.options)
     with progress.bar(watch.label, watch.total) as step:
-        result = optimization.search(
-            base,
+        return optimization.search(
+            asked.base,
             asked.free,
             asked.requirements,
             choices=asked.choices,
@@ -147,12 +121,6 @@ def search(
             progress=step,
             **asked.options,
         )
-    if json:
-        console.json(_record(result, out))
-    else:
-        console.line(result.report(lengths.unit.name))
-    result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
-    return EXIT[result.verdict]
 
 
 class _Watch:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
-
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.console import console
 from softreach.cli.options import (
+    OUT,
     SAMPLING,
     Activation,
     Overwrite,
@@ -19,7 +18,6 @@ from softreach.cli.options import (
     check_picture,
     cloud_of,
     is_page,
-    out_option,
     shape_of,
     write_page,
 )
@@ -32,20 +30,11 @@ def show(
     source: Source,
     /,
     *,
-    color: Annotated[
-        str | None,
-        Parameter(
-            help="rgb (mixed lights: if left out, of up to three bundles), strongest (bundle: if "
-            "left out, of more), effort, the name of a bundle, or compliance: how far the tip "
-            "yields."
-        ),
-    ] = None,
+    color: str | None = None,
     activation: Activation = None,
     sampling: Sampling = SAMPLING,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, out_option("Picture file: .png .pdf .svg, or .html to turn")] = Path(
-        "cloud.png"
-    ),
+    out: Annotated[Path, OUT] = Path("cloud.png"),
     overwrite: Overwrite = False,
     unit: Unit = None,
 ) -> None:
@@ -55,6 +44,11 @@ def show(
     (.html) is one file, which needs no network.
 
     Example: softreach show trunk.zarr --activation -1,0,-0.5 --out trunk.pdf
+
+    Args:
+        color: rgb (mixed lights: if left out, of up to three bundles), strongest (bundle: if left
+            out, of more), effort, the name of a bundle, or compliance: how far the tip yields.
+        out: Picture file: .png .pdf .svg, or .html to turn
     """
     from softreach import plot
     from softreach.cloud.clouds import design_of

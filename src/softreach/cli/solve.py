@@ -3,47 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import Parameter
-
-from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
 from softreach.cli.options import AsJson, Design, Unit, points_in, refuse
-from softreach.cli.values import WHOLE, activation_text
-from softreach.support.errors import InvalidInput
+from softreach.cli.values import Whole, activation_text
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.inverse import Solution
 
-_EXACT = 1e-6  # of L: a nearer tip is at its target, as far as tips are known
+_EXACT = 1e-6  # of L, the error of tips
 
 
 def solve(
     design: Design,
     /,
     *,
-    target: Annotated[
-        str | None,
-        Parameter(
-            help="Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.",
-            allow_leading_hyphen=True,
-        ),
-    ] = None,
-    targets: Annotated[
-        Path | None, Parameter(help="CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.")
-    ] = None,
-    within: Annotated[
-        str | None,
-        Parameter(help="Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m)."),
-    ] = None,
-    family: Annotated[
-        int | None,
-        WHOLE,
-        Parameter(help="With more than three free bundles: solutions for each target (1)."),
-    ] = None,
+    target: Signed = None,
+    targets: Path | None = None,
+    within: str | None = None,
+    family: Whole | None = None,
     changes: Changes = UNCHANGED,
     unit: Unit = None,
     json: AsJson = False,
@@ -54,17 +37,22 @@ def solve(
     distance. Places are in the world: --base hanging turns the arm in it.
 
     Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
+
+    Args:
+        target: Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.
+        targets: CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.
+        within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
+        family: With more than three free bundles: solutions for each target (1).
     """
     from softreach.inverse import solve_inverse
     from softreach.inverse.request import length_in, position_in
 
     if (target is None) == (targets is None):
-        raise InvalidInput("target", target, "given, or --targets, and not both")
+        raise SoftreachError("give either --target or --targets")
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
-        why = "left out for a design with three free bundles or fewer: all solutions are found"
-        refuse(why, family=family)
+        refuse("on up to three free bundles, where all solutions are found", family=family)
     if targets is None:
         points = [position_in("target", target or "", arm.length)]
     else:

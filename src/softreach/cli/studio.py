@@ -12,7 +12,7 @@ from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import check_unit
 from softreach.cli.options import OUTPUT, Overwrite, Unit, refuse
-from softreach.cli.values import WHOLE
+from softreach.cli.values import Whole
 
 if TYPE_CHECKING:
     from softreach.studio import Start
@@ -23,42 +23,16 @@ _HERE = "127.0.0.1"
 
 
 def studio(
-    source: Annotated[
-        str,
-        Parameter(help="Design or its file (.toml), saved state (.json) or cloud (.zarr)."),
-    ] = "minimal_trunk",
+    source: str = "minimal_trunk",
     /,
     *,
-    host: Annotated[
-        str, Parameter(help="Address to listen on; beyond this machine the page asks for a token.")
-    ] = _HERE,
-    port: Annotated[int | None, WHOLE, Parameter(help="A free port by default.")] = None,
-    fresh: Annotated[
-        bool,
-        Parameter(help="Begin with the design itself, not where the last work on it ended."),
-    ] = False,
-    open_page: Annotated[
-        bool,
-        Parameter(name="--open", negative="--no-open", help="Open the page in the browser."),
-    ] = True,
-    token: Annotated[
-        bool | None,
-        Parameter(
-            negative="--no-token",
-            help="Ask pages for a secret; by default where other machines can connect.",
-        ),
-    ] = None,
-    static: Annotated[
-        Path | None,
-        Parameter(
-            group=OUTPUT,
-            help="Write a page with sliders into this folder, which needs no studio, and end.",
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        Parameter(group=OUTPUT, help="A slider of that page: taper_deg=0:3:8. May be repeated."),
-    ] = None,
+    host: str = _HERE,
+    port: Whole | None = None,
+    fresh: bool = False,
+    open_page: Annotated[bool, Parameter(name="--open", negative="--no-open")] = True,
+    token: Annotated[bool | None, Parameter(negative="--no-token")] = None,
+    static: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
+    vary: Annotated[list[str] | None, Parameter(group=OUTPUT)] = None,
     unit: Unit = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -68,14 +42,23 @@ def studio(
     and its snapshots are kept in a folder of your own, and found again.
 
     Example: softreach studio redundant_trunk --no-open
+
+    Args:
+        source: Design or its file (.toml), saved state (.json) or cloud (.zarr).
+        host: Address to listen on; beyond this machine the page asks for a token.
+        port: A free port by default.
+        fresh: Ignore saved work.
+        open_page: Open the page in the browser.
+        token: Ask pages for a secret; by default where other machines can connect.
+        static: Write a page with sliders into this folder, and exit.
+        vary: A slider of that page: taper_deg=0:3:8. May be repeated.
     """
     if static is not None:
         local = {"host": None if host == _HERE else host, "port": port}
-        refuse("left out with --static, which serves nothing", **local, fresh=fresh, token=token)
+        refuse("with --static, which serves nothing", **local, fresh=fresh, token=token)
         _write_static(source, static, vary, unit, overwrite=overwrite)
         return
-    without = "left out without --static and its folder"
-    refuse(without, vary=vary, unit=unit, overwrite=overwrite)
+    refuse("without --static", vary=vary, unit=unit, overwrite=overwrite)
     import threading
     import warnings
     import webbrowser
@@ -137,7 +120,7 @@ def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
 
     as_it_is = source.lower().endswith(".json") or start.reach is not None
     if as_it_is:
-        refuse("left out for a state or a cloud, which is always shown as it is", fresh=fresh)
+        refuse("on a state or a cloud, which is always shown as it is", fresh=fresh)
     return work_on(start.state.design, goes_on=not fresh and not as_it_is)
 
 

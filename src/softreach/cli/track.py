@@ -5,18 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
-
-from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
 from softreach.cli.console import console
 from softreach.cli.lengths import Lengths
 from softreach.cli.options import (
+    OUT,
     Design,
     Overwrite,
     Unit,
     activation_of,
     check_output,
-    out_option,
     points_in,
 )
 
@@ -26,17 +24,12 @@ if TYPE_CHECKING:
 
 def track(
     design: Design,
-    path: Annotated[
-        Path, Parameter(help="CSV file with columns x, y, z, in order; m or as it says.")
-    ],
+    path: Path,
     /,
     *,
-    start: Annotated[
-        str | None,
-        Parameter(help="Activations to start from: -1,0,-0.5", allow_leading_hyphen=True),
-    ] = None,
+    start: Signed = None,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, out_option("CSV file for the activations.")] = Path("activations.csv"),
+    out: Annotated[Path, OUT] = Path("activations.csv"),
     overwrite: Overwrite = False,
     unit: Unit = None,
 ) -> None:
@@ -45,6 +38,11 @@ def track(
     The activations change continuously along the path and go into a CSV file.
 
     Example: softreach track minimal_trunk path.csv --out activations.csv
+
+    Args:
+        path: CSV file with columns x, y, z, in order; m or as it says.
+        start: Activations to start from: -1,0,-0.5
+        out: CSV file for the activations.
     """
     from softreach.export.clouds import path_csv
     from softreach.inverse.path import track_path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
@@ -29,11 +29,8 @@ def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
     return Parameter(converter=convert)
 
 
-WHOLE = _read_by(read_whole_number, "a whole number such as 20000 or 2e4")
-"""Of every option that is an `int`."""
-
-NUMBER = _read_by(read_number, "a finite number such as 0.5 or 1e-3")
-"""Of every option that is a `float`."""
+Whole = Annotated[int, _read_by(read_whole_number, "a whole number such as 20000 or 2e4")]
+Number = Annotated[float, _read_by(read_number, "a finite number such as 0.5 or 1e-3")]
 
 
 def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, str] | None:

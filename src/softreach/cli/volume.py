@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.console import console
@@ -13,13 +10,13 @@ from softreach.cli.lengths import Rows
 from softreach.cli.options import (
     SAMPLING,
     AsJson,
+    Out,
     Overwrite,
     Sampling,
     Source,
     Unit,
     check_surface,
     cloud_of,
-    out_option,
     radius_of,
 )
 
@@ -31,14 +28,10 @@ def volume(
     source: Source,
     /,
     *,
-    alpha: Annotated[
-        str, Parameter(help="α-shape radius: 0.05L, 5cm, 0.05 (m), or critical.")
-    ] = "0.05L",
+    alpha: str = "0.05L",
     sampling: Sampling = SAMPLING,
     changes: Changes = UNCHANGED,
-    out: Annotated[
-        Path | None, out_option("Write the α-shape here: .ply .stl .obj .glb .vtu .vtk")
-    ] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -49,6 +42,10 @@ def volume(
     softreach reach computes the exact volume, without samples and with its error.
 
     Example: softreach volume trunk.zarr --alpha 0.03L --out hull.ply
+
+    Args:
+        alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical.
+        out: Write the α-shape here: .ply .stl .obj .glb .vtu
     """
     from softreach.cloud.volume import concave_hull, convex_hull, flat_areas
     from softreach.schema import is_stable

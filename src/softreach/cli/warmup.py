@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Iterator
+from itertools import chain
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -13,13 +13,7 @@ from softreach.cli.console import console
 
 def warmup(
     *,
-    loads: Annotated[
-        bool,
-        Parameter(
-            negative="--no-loads",
-            help="Also what arms under loads need, for half a minute more.",
-        ),
-    ] = True,
+    loads: Annotated[bool, Parameter(negative="--no-loads")] = True,
 ) -> int:
     """Compile all kernels now, so that no later command has to.
 
@@ -27,17 +21,19 @@ def warmup(
     Exits with 1 if they cannot be kept.
 
     Example: softreach warmup --no-loads
+
+    Args:
+        loads: Also what arms under loads need, for half a minute more.
     """
     from softreach.kernels.compiler import not_kept
     from softreach.support.errors import no_warnings
     from softreach.support.progress import bar
 
-    jobs = [*_free(), *(_loaded() if loads else ())]
-    with bar("compiling", len(jobs)) as done, no_warnings():  # of clouds and grids too coarse
-        for job in jobs:
-            if not not_kept:
-                job()
-                done(1)
+    with bar("compiling", None) as done, no_warnings():  # of clouds and grids too coarse
+        for _ in chain(_free(), _loaded() if loads else ()):
+            if not_kept:
+                break
+            done(1)
     if not_kept:
         reason = f"nothing could be kept: {not_kept[0]}"
         console.error(f"{reason}; set NUMBA_CACHE_DIR to a folder that can be written")
@@ -46,7 +42,8 @@ def warmup(
     return 0
 
 
-def _free() -> list[Callable[[], object]]:
+def _free() -> Iterator[object]:
+    """Results that need the kernels of arms without loads, each computed when it is asked for."""
     from softreach import workspace
     from softreach.arm import designs
     from softreach.arm.base import Base
@@ -58,22 +55,20 @@ def _free() -> list[Callable[[], object]]:
     hanging = arm.replace(base=Base(points="down"))
     target, beyond = (0.2, 0.1, 0.6), (2.0, 0.0, 0.0)
     path = (target, (0.2, 0.1, 0.61))
-    return [
-        _hulls,
-        _triangle,
-        _calibration,
-        partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
-        partial(tip_jacobian, hanging, [[-1.0, 0.0, -0.4]]),
-        partial(configuration, arm, [-1.0, 0.0, -0.4]),
-        _set,
-        partial(solve_inverse, arm, [target, beyond]),
-        lambda: prepared_map(arm).tree,
-        partial(track_path, arm, path),
-        partial(workspace.reachable_set, redundant, accuracy=0.1),
-        partial(solve_inverse, redundant, [target], near=[-0.5] * 4),
-        partial(solve_inverse, redundant, [target]),
-        partial(track_path, redundant, path),
-    ]
+    yield _hulls()
+    yield _triangle()
+    yield _calibration()
+    yield tip_jacobian(arm, [[-1.0, 0.0, -0.4]])
+    yield tip_jacobian(hanging, [[-1.0, 0.0, -0.4]])
+    yield configuration(arm, [-1.0, 0.0, -0.4])
+    yield _set()
+    yield solve_inverse(arm, [target, beyond])
+    yield prepared_map(arm).tree
+    yield track_path(arm, path)
+    yield workspace.reachable_set(redundant, accuracy=0.1)
+    yield solve_inverse(redundant, [target], near=[-0.5] * 4)
+    yield solve_inverse(redundant, [target])
+    yield track_path(redundant, path)
 
 
 def _set() -> None:
@@ -133,23 +128,18 @@ def _triangle() -> None:
     ZBuffer(Extent(0.0, 1.0, 0.0, 1.0), 4).draw_triangles(np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
 
 
-def _loaded() -> list[Callable[[], object]]:
+def _loaded() -> Iterator[object]:
     from softreach.arm import designs
     from softreach.arm.loads import Loads
     from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
     from softreach.rod.loaded.all_equilibria import equilibria
 
     free = designs.lce_arm()
-    kinds = (
-        Loads(gravity=(0, 0, 9.81), payload=0.001),
-        Loads(follower_force=(0, 0.001, 0)),
-    )
-    arms = [free.replace(loads=loads) for loads in kinds]
-    rest = [0.0] * free.bundles
-    pulled = free.input_bounds[:, 0].tolist()
-    functions = (partial(f, arm) for arm in arms for f in (tip_positions, tip_jacobian))
-    return [
-        *(partial(f, [rest]) for f in functions),
-        *(partial(configuration, arm, rest) for arm in arms),
-        partial(equilibria, arms[0], pulled),
-    ]
+    rest, pulled = [0.0] * free.bundles, free.input_bounds[:, 0].tolist()
+    weight = free.replace(loads=Loads(gravity=(0, 0, 9.81), payload=0.001))
+    follower = free.replace(loads=Loads(follower_force=(0, 0.001, 0)))
+    for arm in (weight, follower):
+        yield tip_positions(arm, [rest])
+        yield tip_jacobian(arm, [rest])
+        yield configuration(arm, rest)
+    yield equilibria(weight, pulled)

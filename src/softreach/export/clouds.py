@@ -17,7 +17,6 @@ from softreach.export.formats import (
     load_library,
     write_by_suffix,
     write_ply_points,
-    write_vtk,
     write_vtu,
 )
 from softreach.schema import a_cloud, activation_units
@@ -149,15 +148,14 @@ def export_cloud(
     unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
-    """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
+    """Write a cloud as .ply, .csv, .parquet, .npz, .mat or .vtu, chosen by the suffix.
 
     Tables have the columns x, y, z and one activation per bundle, such as ``gamma_left``; in CSV,
     where nothing else would say the unit, x_mm, y_mm, z_mm if it is not the meter. NPZ and MAT hold
     the arrays tip, activation and bundle. Clouds of arms under loads have the column or array
-    status too: 0 stable, 1 unstable; 2 no equilibrium, 3 undecided and 4 snaps,
-    whose tips are NaN. Design,
-    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
-    them. PLY carries the picture's colors too.
+    status too: 0 stable, 1 unstable; 2 no equilibrium, 3 undecided and 4 snaps, whose tips are NaN.
+    Design, seed, tolerance, version and units go along, except in CSV and VTU, which have no place
+    for them. PLY carries the picture's colors too.
 
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
@@ -287,6 +285,5 @@ CLOUD_FILES: Formats = {
         ),
         "meshio",
     ),
-    ".vtk": format_file(lambda table, file: write_vtk(_point_mesh(table), file), "meshio"),
 }
 """Formats of clouds."""

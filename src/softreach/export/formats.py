@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import importlib
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -16,16 +15,6 @@ from numpy.typing import NDArray
 from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, format_of
-
-__all__ = [
-    "format_file",
-    "load_library",
-    "write_by_suffix",
-    "write_ply_mesh",
-    "write_ply_points",
-    "write_vtk",
-    "write_vtu",
-]
 
 _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
@@ -61,22 +50,6 @@ def write_by_suffix(
 def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:
     """Write a mesh of meshio, which for this format opens what it is given itself."""
     load_library("meshio").vtu.write(os.fspath(file.name), mesh, **options)
-
-
-def write_vtk(mesh: Any, file: BufferedWriter) -> None:
-    """Write a mesh of meshio, and read it back.
-
-    The function that it writes arrays with does not notice when a full disk takes only a part of
-    the last bytes.
-    """
-    vtk, path = load_library("meshio").vtk, os.fspath(file.name)
-    vtk.write(path, mesh)
-    try:
-        complete = vtk.read(path).points.shape == mesh.points.shape
-    except Exception:  # whatever reading half a file may raise
-        complete = False
-    if not complete:
-        raise OSError(errno.EIO, "the file is cut off; is the disk full?")
 
 
 def write_ply_points(

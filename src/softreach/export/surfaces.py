@@ -17,7 +17,6 @@ from softreach.export.formats import (
     load_library,
     write_by_suffix,
     write_ply_mesh,
-    write_vtk,
     write_vtu,
 )
 from softreach.geometry.surface import SurfaceMesh, parted
@@ -65,7 +64,7 @@ def export_mesh(
     unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
-    """Write a triangle mesh as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+    """Write a triangle mesh as .ply, .stl, .obj, .glb or .vtu, chosen by the suffix.
 
     A closed surface that touches itself along edges is parted there, by a thousandth of their
     length, so that it can be printed. STL and GLB keep single precision. glTF has y up: a GLB
@@ -131,7 +130,7 @@ def export_arm(
     unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
-    """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+    """Write a deformed arm as .ply, .stl, .obj, .glb or .vtu, chosen by the suffix.
 
     The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
     that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
@@ -254,6 +253,5 @@ SURFACE_FILES: Formats = {
     ".obj": format_file(_write_obj, "trimesh"),
     ".glb": format_file(_write_glb, "trimesh"),
     ".vtu": format_file(lambda scene, file: write_vtu(_mesh(scene.parts), file), "meshio"),
-    ".vtk": format_file(lambda scene, file: write_vtk(_mesh(scene.parts), file), "meshio"),
 }
 """Formats of surfaces and arms."""

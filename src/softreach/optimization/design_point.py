@@ -23,8 +23,6 @@ from softreach.workspace.boundary import boundary_samples
 from softreach.workspace.gradient import VolumeGradient, gradient_of
 from softreach.workspace.tip_derivatives import TipDerivatives
 
-__all__ = ["OF_ARM", "STEP", "DesignPoint"]
-
 OF_ARM: dict[str, Callable[[Manipulator], float]] = {
     "mass": mass,
     "load_number": load_number,

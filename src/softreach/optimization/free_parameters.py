@@ -16,18 +16,9 @@ from softreach.arm.parameters import Parameter, changed, parameters_by_every_nam
 from softreach.arm.tables import check_extension
 from softreach.support.arguments import as_given, as_mapping, plain
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.lazy import lazy
 from softreach.support.quantity import read_quantity
-
-__all__ = [
-    "FreeParameter",
-    "FreeParameters",
-    "Tie",
-    "Values",
-    "free_parameters",
-    "known_parameters",
-]
 
 Values = Mapping[str, float | str]
 """Free parameter -> its value [SI unit], or the chosen name."""
@@ -190,6 +181,7 @@ def free_parameters(
     Raises:
         InvalidInput: An unknown parameter, a range that is reversed, empty or beyond what the
             parameter may be, a choice without values, or a tie to what is not free.
+        NotPossible: Choices of bundles of an actuator without an offset.
     """
     bases = as_mapping("base", base, a_manipulator) if isinstance(base, Mapping) else {}
     bases = bases or {"": a_manipulator("base", base)}
@@ -295,8 +287,8 @@ def _with_bundles(arm: Manipulator, count: Any) -> Manipulator:
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise InvalidInput(f"choices {BUNDLES}", as_given(count), "whole numbers of 1 or more")
     if arm.drives or "offset" not in fields_of(type(first)):
-        what = "an arm with drives" if arm.drives else f"of {first.name}, which has no offset"
-        raise InvalidInput(f"choices {BUNDLES}", what, "asked of actuators that have an offset")
+        what = "arms with drives" if arm.drives else f"{first.name}, which has no offset"
+        raise NotPossible(f"the number of bundles cannot be chosen for {what}")
     offset = float(first.value_on("offset", arm.profile, arm.section))
     turns = offset + 2.0 * np.pi * np.arange(count) / count
     copies = (

@@ -27,17 +27,6 @@ if TYPE_CHECKING:
 
     from softreach.workspace import ReachableSet
 
-__all__ = [
-    "OBJECTIVES",
-    "SETS",
-    "DesignCase",
-    "Goal",
-    "Objective",
-    "Value",
-    "goals",
-    "known_objective",
-]
-
 SETS = {
     "exact_volume": "volume",
     "exact_convex_volume": "convex_volume",
@@ -46,7 +35,7 @@ SETS = {
 """Goals and measures of the reachable set, and what they are called there."""
 
 _COARSE, _FINE = 1 << 12, 1 << 15
-"""Samples of a cloud, for what is asked of one, of coarse and of fine cases."""
+"""Samples of the cloud of coarse and of fine cases."""
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
 
@@ -60,7 +49,7 @@ class Value(NamedTuple):
 
 @dataclass(eq=False)
 class DesignCase:
-    """A design under requirements, and what is asked of it at one accuracy, each computed once."""
+    """A design under requirements at one accuracy; its sets, cloud and check are computed once."""
 
     arm: Manipulator
     requirements: Requirements
@@ -175,7 +164,7 @@ def goals(
     }
     for goal in result:
         if goal.objective.asks and not has[goal.objective.asks]:
-            allowed = f"asked with {goal.objective.asks} among the requirements"
+            allowed = f"left out: the requirements have no {goal.objective.asks}"
             raise InvalidInput("objective", goal.name, allowed)
     return tuple(result)
 

@@ -18,8 +18,6 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
-__all__ = ["Polished", "can_polish", "point_of", "polished"]
-
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
 MOST_DESIGNS = 60
@@ -114,7 +112,7 @@ def _solved(program: _Program, first: Array) -> Array:
 
     point = program.point(first)
     constraints = []
-    for kind, parts in (("eq", point.equations), ("ineq", point.rooms)):
+    for kind, parts in (("eq", point.equations), ("ineq", point.inequalities)):
         if parts:
             fun, jac = program.asked(kind, stacked), program.asked(kind, stacked_slopes)
             constraints.append({"type": kind, "fun": fun, "jac": jac})
@@ -193,7 +191,7 @@ class _Program:
         return parameters.moved(self._start.values, np.clip(reals, low, high))
 
     def point(self, unknowns: Array) -> Point:
-        """All that is asked at some unknowns; a design that poses alone differ at is made once."""
+        """The program at some unknowns; designs that differ in their poses alone are made once."""
         key = unknowns.tobytes()
         if key not in self._points:
             count = len(self._problem.parameters.real)
@@ -228,10 +226,10 @@ class _Program:
             return np.zeros(len(unknowns))
 
     def asked(self, kind: str, what: Callable[[Sequence[Part]], Array]) -> Callable[[Array], Array]:
-        """Function of unknowns: values or derivatives of equations ("eq") or rooms ("ineq")."""
+        """Values or derivatives of equations ("eq") or inequalities ("ineq") by the unknowns."""
 
         def values(unknowns: Array) -> Array:
             point = self.point(unknowns)
-            return what(point.equations if kind == "eq" else point.rooms)
+            return what(point.equations if kind == "eq" else point.inequalities)
 
         return values

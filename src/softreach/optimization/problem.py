@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, Self
 
@@ -18,8 +18,6 @@ from softreach.optimization.objectives import SETS, DesignCase, Goal, Value
 from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
 from softreach.support.errors import InvalidDesign, InvalidInput
-
-__all__ = ["NEAR", "Candidate", "Fidelity", "Problem"]
 
 NEAR = 0.1
 """Relative distance within which objectives at the ends of polishes agree."""
@@ -54,10 +52,6 @@ class Candidate:
         """True of an arm that meets all requirements and has all objectives."""
         known = all(math.isfinite(value.value) for value in self.objectives)
         return self.excess == 0.0 and not self.fault and known
-
-    def with_designs(self, designs: int) -> Self:
-        """The same, for which so many designs were looked at."""
-        return replace(self, designs=designs)
 
     def to_dict(self) -> dict[str, Any]:
         """All of it in plain values; `from_dict` makes an equal one."""

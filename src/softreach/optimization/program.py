@@ -18,8 +18,6 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 
-__all__ = ["Point"]
-
 EFFORTS = ("mean_effort", "worst_effort")
 _FAR = 0.1  # over L or relative: room beyond which a rule is not differentiated
 _ROOM = 0.98  # of the distance within which a tip must come to a place
@@ -31,7 +29,7 @@ _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
 @dataclass(eq=False)
 class Point:
-    """A design with its poses: cost, equations and rooms, each with all derivatives.
+    """A design with its poses: cost, equations and inequalities, each with all derivatives.
 
     Unknowns are the real parameters over their ranges, then the poses in the unit cube of the free
     inputs, one for each payload and place.
@@ -62,7 +60,7 @@ class Point:
         return tuple(part for part in self._tips if part.within == 0.0)
 
     @lazy
-    def rooms(self) -> tuple[Part, ...]:
+    def inequalities(self) -> tuple[Part, ...]:
         """Quantities kept above 0: limits, measures, regions, other goals."""
         near = (_near_place(part) for part in self._tips if part.within > 0.0)
         return (*near, *self._rules(), *self._shares(), *self._of_design(), *self._other_goals())
@@ -103,7 +101,6 @@ class Point:
 
     @lazy
     def _tips(self) -> list[Part]:
-        """Tip less place over L of each pose."""
         needs, parts = self.design.problem.requirements, []
         within = needs.within
         for number, (rod, cube) in enumerate(self._by_payload()):
@@ -194,7 +191,6 @@ class Point:
                 yield self._limit(target.name, -1.0, share, target.share, slope)
 
     def _of_design(self) -> Iterator[Part]:
-        """Limits and measures that follow from the design or its set."""
         needs = self.design.problem.requirements
         asked = [
             (name, sense, limit)
@@ -233,7 +229,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Part:
-    """Equations or rooms of one requirement, whose derivatives are made when asked for."""
+    """Equations or inequalities of one requirement, differentiated when they are used first."""
 
     name: str
     """Of the requirement."""

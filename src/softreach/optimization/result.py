@@ -3,33 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.optimization.objectives import Goal
+from softreach.arm.number import unit_suffix
+from softreach.arm.written import with_suffix
+from softreach.optimization.free_parameters import FreeParameter
+from softreach.optimization.objectives import Goal, Value
 from softreach.optimization.problem import NEAR, Candidate, Problem
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
-from softreach.support.arguments import as_flag
-from softreach.support.errors import SoftreachError
-from softreach.support.report import Report
-from softreach.support.units import LengthUnit, as_unit, handy_unit
+from softreach.support.arguments import as_flag, as_path
+from softreach.support.errors import SoftreachError, counted
+from softreach.support.files.atomic import check_place
+from softreach.support.files.text import write_table, write_text
+from softreach.support.report import Report, Section, check_libraries
+from softreach.support.units import LengthUnit, as_unit, handy_unit, readable, readable_unit
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Search"]
-
 _AT_END = 1e-3  # of a range
+_FOUND = "# Found by a search of softreach"
+_FILES = ("best.toml", "front.csv", "candidates.csv", "report.html")
+_PICTURE = (
+    "Designs that were judged, in their order or by their objectives, and the free parameters "
+    "of the best in their ranges."
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -223,9 +234,33 @@ class Search:
             NotWritten: They cannot be written.
             MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        from softreach.optimization.folder import save
+        place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)
+        check_folder(place, overwrite=overwrite)
+        width = max(2, len(str(len(self.front))))
+        several = [f"front_{number:0{width}}.toml" for number in range(1, len(self.front) + 1)]
+        names = several if len(self.goals) > 1 else ["best.toml"]
+        for name, each in zip(names, self.front, strict=True):
+            with suppress(SoftreachError):  # no such arm can exist
+                write_text(place / name, self._design_text(each), overwrite=overwrite)
+        # Designs of an older search would be taken for designs of this one.
+        for path in (*place.glob("front_*.toml"), place / "best.toml") if overwrite else ():
+            with suppress(OSError):
+                if path.name not in names and path.read_text("utf-8").startswith(_FOUND):
+                    path.unlink()
+        for name, every in (("front", False), ("candidates", True)):
+            table = self.table(every=every, unit=unit or "m")
+            write_table(place / f"{name}.csv", table, overwrite=overwrite)
+        self.report(unit).save(place / "report.html", overwrite=overwrite)
 
-        save(self, folder, unit, overwrite=overwrite)
+    def _design_text(self, each: Candidate) -> str:
+        arm = self.problem.parameters.arm(each.values)
+        pairs = zip(self.goals, each.objectives, strict=bool(each.objectives))
+        lines = [
+            f"{_FOUND}{'' if each.is_feasible else '; it does not meet all requirements'}.",
+            *(f"# {goal.name}: {_value_text(goal, value, self.unit)}" for goal, value in pairs),
+            *(f"# {key}: {text}" for key, text in self.provenance.items()),
+        ]
+        return "\n".join(lines) + f"\n\n{arm.file_text}"
 
     def table(self, *, every: bool = False, unit: str = "m") -> pd.DataFrame:
         """Parameters and objectives with their errors, a row for each design of the front.
@@ -234,9 +269,29 @@ class Search:
             every: All candidates instead, in their order.
             unit: Of lengths: m, cm, mm or L.
         """
-        from softreach.optimization.report import table_of
+        import pandas as pd
 
-        return table_of(self, as_unit(unit, self._length), every=as_flag("every", every))
+        length, records = as_unit(unit, self._length), []
+        for number, each in enumerate(self.every if as_flag("every", every) else self.front, 1):
+            record: dict[str, Any] = {
+                "design": number,
+                "front": int(any(each is one for one in self.front)),
+                "fidelity": each.fidelity,
+                "feasible": int(each.is_feasible),
+                "excess": each.excess,
+            }
+            objectives = each.objectives or [Value(math.nan)] * len(self.goals)
+            for goal, value in zip(self.goals, objectives, strict=True):
+                suffix, size = _written_unit(goal.objective.unit, length)
+                record[f"{goal.name}{suffix}"] = value.value / size
+                record[f"{goal.name}_error{suffix}"] = value.error / size
+            for parameter in self.problem.parameters.free:
+                suffix, size = _written_unit(parameter.unit, length)
+                value = each.values[parameter.name]
+                value = value if isinstance(value, str) else value / size
+                record[with_suffix(parameter.name, suffix)] = value
+            records.append(record | {"missed": "; ".join(each.missed), "fault": each.fault})
+        return pd.DataFrame.from_records(records)
 
     def report(self, unit: str | None = None) -> Report:
         """Numbers, requirements, front and pictures, to be printed, or saved as an .html file.
@@ -244,9 +299,37 @@ class Search:
         Args:
             unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
         """
-        from softreach.optimization.report import report_of
-
-        return report_of(self, self.unit if unit is None else as_unit(unit, self._length))
+        shown = self.unit if unit is None else as_unit(unit, self._length)
+        missed = sorted((x for x in self.findings if not x.met), key=lambda each: -each.excess)
+        fault = self.best.fault.splitlines()[:1] if self.best.fault else map(str, missed)
+        try:
+            design = self.arm.to_toml()
+        except SoftreachError as error:
+            design = str(error)
+        return Report(
+            title="Search of designs",
+            verdict=_verdict(self),
+            state=self.verdict,
+            facts=[
+                f"{counted(self.designs, 'design')}, {self.seconds:.1f} s",
+                *_remarks(self),
+                *fault,
+            ],
+            sections=[
+                _best(self, shown),
+                Section(
+                    title="Requirements",
+                    head=("requirement", "", "of the best design"),
+                    rows=[(each.name, each.word, each.text) for each in self.findings],
+                    printed=0,
+                ),
+                *_front(self, shown),
+                Section(title="Pictures", figures=lambda: _figures(self, shown)),
+                Section(title="Provenance", rows=[*self.provenance.items()], printed=0),
+                Section(title="The best design", text=design),
+                Section(title="The requirements", text=self.problem.requirements.to_toml()),
+            ],
+        )
 
     @property
     def unit(self) -> LengthUnit:
@@ -267,7 +350,6 @@ class Search:
         return str(self.report())
 
     def _repr_html_(self) -> str:
-        """The best design beside the text, for notebooks."""
         from html import escape
 
         from softreach.arm.skin import arm_card
@@ -279,5 +361,126 @@ class Search:
         return f"{card}<pre>{escape(repr(self))}</pre>"
 
 
+def check_folder(folder: Path, *, overwrite: bool) -> None:
+    """Refuse a folder that the files of a search could not be written to.
+
+    Raises:
+        InvalidInput: Something else is there.
+        NotWritten: Nothing can be written there.
+        MissingExtra: matplotlib or Jinja2 is not installed.
+    """
+    check_libraries()
+    for name in _FILES:
+        check_place(folder / name, overwrite=overwrite, name="out")
+
+
 def _key(candidate: Candidate, names: Sequence[str]) -> tuple[float | str, ...]:
     return tuple(candidate.values[name] for name in names)
+
+
+def _best(search: Search, unit: LengthUnit) -> Section:
+    pairs = zip(search.goals, search.best.objectives, strict=bool(search.best.objectives))
+    rows = [(_goal_text(goal), _value_text(goal, value, unit), "") for goal, value in pairs]
+    ends = ", ".join(f"{name} at its {end} end" for name, end in search.at_ends.items())
+    return Section(
+        title="Best design",
+        head=("number", "best", "range"),
+        rows=[*rows, *_parameter_rows(search, unit)],
+        note=f"At an end of their range: {ends}. A wider one may be better." if ends else "",
+    )
+
+
+def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
+    goals, free = search.goals, search.problem.parameters.free
+    rows = []
+    for number, each in enumerate(search.front, 1):
+        pairs = zip(goals, each.objectives or [Value(math.nan)] * len(goals), strict=True)
+        numbers = (_number_text(p, each.values[p.name], unit) for p in free)
+        rows.append((str(number), *(_value_text(*pair, unit) for pair in pairs), *numbers))
+    if len(rows) > 1:
+        yield Section(
+            title="Front",
+            head=("front", *map(_goal_text, goals), *(p.name for p in free)),
+            rows=rows,
+            note="Designs that no other one beats in every objective, each judged to full "
+            "accuracy.",
+        )
+
+
+def _verdict(search: Search) -> str:
+    needs, best = search.problem.requirements, search.best
+    count = len(needs.targets) + len(needs.keeps) + len(needs.limits.given) + len(needs.measures)
+    if math.isinf(best.excess) or best.fault:
+        return "Search: no design that can be judged was found"
+    if search.verdict != "met":
+        number = len(best.missed if search.verdict == "missed" else best.undecided)
+        return f"Search: requirements {search.verdict}, {number} of {count} by the best design"
+    several = len(search.goals) > 1
+    front = f"front of {counted(len(search.front), 'design')}" if several else "best design"
+    return f"Search: {front}" + (f", {counted(count, 'requirement')} met" if count else "")
+
+
+def _goal_text(goal: Goal) -> str:
+    return f"{'largest' if goal.sense > 0 else 'least'} {goal.name}"
+
+
+def _value_text(goal: Goal, value: Value, unit: LengthUnit) -> str:
+    if not math.isfinite(value.value):
+        return "-"
+    return readable(value.value, goal.objective.unit, unit, value.error)
+
+
+def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[Sequence[str]]:
+    values, ends, parameters = search.best.values, search.at_ends, search.problem.parameters
+    free = {parameter.name: parameter for parameter in parameters.free}
+    for name, each in free.items():
+        if each.choices:
+            reach = f"one of {', '.join(_number_text(each, x, unit) for x in each.choices)}"
+        else:
+            low = each.low / readable_unit(each.unit, each.high, unit)[1]
+            reach = f"{low:.5g} to {readable(each.high, each.unit, unit)}"
+        end = f", at its {ends[name]} end" if name in ends else ""
+        yield name, _number_text(each, values[name], unit) + end, reach
+    for tie in parameters.ties:
+        value = tie.factor * float(values[tie.of]) + tie.constant
+        yield tie.name, _number_text(free[tie.of], value, unit), f"follows {tie.of}"
+
+
+def _number_text(parameter: FreeParameter, value: float | str, unit: LengthUnit) -> str:
+    return value if isinstance(value, str) else readable(value, parameter.unit, unit)
+
+
+def _remarks(search: Search) -> Iterator[str]:
+    problem, judged = search.problem, search.judged
+    ways = [f"{judged['bounds']} by bounds alone"] if judged["bounds"] else []
+    ways += [f"{judged['coarse']} on coarse sets (to {problem.coarse:g})"] * bool(judged["coarse"])
+    ways.append(f"{judged['full']} to full accuracy ({problem.accuracy:g})")
+    shown = "; numbers shown are of full accuracy" if search.best.fidelity == "full" else ""
+    yield f"judged: {', '.join(ways)}{shown}"
+    # Agreement of polishes from designs apart, whose spread is that of searches by other seeds.
+    count, near = search.restarts
+    if search.goals and search.best.is_feasible:
+        said = f"{near} of {counted(count, 'restart')} ended within {100 * NEAR:g} % of it"
+        doubt = "" if near > 1 else ": other seeds may find better designs; allow for more designs"
+        yield f"how sure: {said}{doubt}"
+
+
+def _figures(search: Search, unit: LengthUnit) -> Iterator[tuple[Any, str]]:
+    from softreach.plot.arm import plot_check
+    from softreach.plot.results import plot_search
+
+    yield plot_search(search, unit=unit), _PICTURE
+    if search.problem.requirements.targets or search.problem.requirements.keeps:
+        with suppress(SoftreachError):  # nothing holds it under its loads
+            caption = "The best design at the places that it must reach."
+            yield plot_check(search.check, unit=unit).figure, caption
+
+
+def _written_unit(unit: str, length: LengthUnit) -> tuple[str, float]:
+    """Suffix of a column, and the size of its unit; pressures stay in Pa."""
+    if unit == "Pa":
+        return "_pa", 1.0
+    name, size = readable_unit(unit, 0.0, length)
+    if unit not in ("m", "m2", "m3"):
+        return unit_suffix(unit).replace("/", "_per_"), size
+    return f"_{name.replace('²', '2').replace('³', '3')}", size

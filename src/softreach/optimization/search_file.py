@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from softreach.arm.design_file.keys import key_text, unknown_key
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import unknown_parameter
 from softreach.arm.written import Written
@@ -18,11 +17,9 @@ from softreach.optimization.objectives import goals, known_objective
 from softreach.optimization.study import SAMPLERS
 from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_flag, as_integer, as_number, as_one_of
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, did_you_mean
-from softreach.support.files.text import tables_of
+from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean
+from softreach.support.files.toml import WRONG, FaultReader, tables_of
 from softreach.workspace.reach import ACCURACIES
-
-__all__ = ["SearchFile", "read_search"]
 
 _OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
     "designs": lambda name, value: as_integer(name, value, 1, 1_000_000),
@@ -34,8 +31,6 @@ _OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
 _SENSES = ("maximize", "minimize")
 _TABLES = ("free", "choices")
 _KEYS = ("design", *_SENSES, *_OPTIONS, *_TABLES)
-_WRONG: Any = object()
-"""In place of a value that has faults."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +87,7 @@ def read_search(
         document = tables_of(text)
     except ValueError:
         document = {}  # for which the requirements are refused
-    reader = _Reader(document.get("search", {}), given or {}, folder, design_from)
+    reader = _Reader(document, given or {}, folder, design_from)
     bases = reader.bases()
     free, choices = reader.parameters(bases)
     lengths = {arm.length for arm in bases.values()}
@@ -117,29 +112,21 @@ def read_search(
     )
 
 
-class _Reader:
-    """Reads the table, and what was given beside it, and keeps their faults."""
+class _Reader(FaultReader):
+    """Reads the table, and what was given beside it."""
 
     def __init__(
         self,
-        raw: Any,
+        document: Mapping[str, Any],
         given: Mapping[str, Any],
         folder: Path,
         design_from: Callable[[str], Manipulator],
     ) -> None:
-        self.faults: list[Fault] = []
-        self._folder, self._design_from = folder, design_from
-        self._given = given
-        self._raw: dict[str, Any] = raw if isinstance(raw, dict) else {}
-        if not isinstance(raw, dict):
-            self._refuse("search", raw, "must be a table")
-        for key in self._raw:
-            if key not in _KEYS:
-                allowed = unknown_key(key, {name: name for name in _KEYS})
-                self._refuse(f"search.{key_text(key)}", self._raw[key], allowed)
-        for key in _TABLES:
-            if not isinstance(self._raw.get(key, {}), dict):
-                self._refuse(f"search.{key}", self._raw.pop(key), "must be a table")
+        super().__init__()
+        self._folder, self._design_from, self._given = folder, design_from, given
+        self._raw = self._table(document, "search")
+        self._check_keys(self._raw, "search", _KEYS)
+        self._raw |= {key: self._table(self._raw, key, "search.") for key in _TABLES}
 
     def bases(self) -> dict[str, Manipulator]:
         """Designs to vary by what they are called; none where none can be read."""
@@ -154,11 +141,9 @@ class _Reader:
         bases = {}
         for name in names:
             file = self._folder / name
-            try:
-                bases[name] = self._design_from(str(file) if of_file and file.is_file() else name)
-            except InvalidInput as error:
-                self._refuse(path, name, f"must be {error.allowed}")
-        return bases
+            place = str(file) if of_file and file.is_file() else name
+            bases[name] = self._tried(path, name, partial(self._design_from, place))
+        return {name: arm for name, arm in bases.items() if arm is not WRONG}
 
     def parameters(
         self, bases: Mapping[str, Manipulator]
@@ -216,12 +201,6 @@ class _Reader:
             self._tried(path, name, partial(known_objective, word, name))
         return list(names)
 
-    def _tried(self, path: str, value: Any, make: Callable[[], Any]) -> Any:
-        try:
-            return make()
-        except InvalidInput as error:
-            return self._refuse(path, value, f"must be {error.allowed}")
-
     def _value(self, key: str) -> tuple[str, Any]:
         """A value and what errors call it."""
         if key in self._given:
@@ -232,7 +211,7 @@ class _Reader:
         """Path in errors, key and value of a table; what was given goes before the file."""
         given, known = self._given.get(table, {}), names.by_key if names else {}
         said = {known[key].name if key in known else key for key in given}
-        for key, value in flat_keys(self._raw.get(table, {})):
+        for key, value in flat_keys(self._raw[table]):
             if (known[key].name if key in known else key) not in said:
                 yield f"search.{table}.{key}", key, value
         for key, value in given.items():
@@ -255,20 +234,19 @@ class _Reader:
         if key == "bundles" and isinstance(value, str):
             values = [int(x) if x.strip().isdecimal() else x for x in values]
         made = self._tried(path, value, partial(free_parameters, dict(bases), {}, {key: values}))
-        return _WRONG if made is _WRONG else list(values)
+        return WRONG if made is WRONG else list(values)
 
     def _range(self, names: Written, path: str, key: str, value: Any) -> Any:
-        """(low, high), or the text of a tie."""
         if isinstance(value, str) and ":" not in value:
             return value
         ends = value.split(":") if isinstance(value, str) else value
         numbers = self._numbers(names, path, key, ends, 2)
-        if numbers is _WRONG or numbers[0] < numbers[1]:
-            return _WRONG if numbers is _WRONG else tuple(numbers)
+        if numbers is WRONG or numbers[0] < numbers[1]:
+            return WRONG if numbers is WRONG else tuple(numbers)
         return self._refuse(path, value, "must be a range with low < high")
 
     def _numbers(self, names: Written, path: str, key: str, values: Any, count: int | None) -> Any:
-        """Numbers in SI units; `_WRONG` where some are none or beyond what they may be."""
+        """Numbers in SI units; `WRONG` where some are none or beyond what they may be."""
         parameter = names.by_key[key]
         wanted = {None: "a list of different numbers", 2: "a range [low, high]"}
         if not isinstance(values, list | tuple) or (count or len(values)) != len(values):
@@ -292,9 +270,5 @@ class _Reader:
     def _add(self, path: str, table: dict[str, Any], name: str, value: Any) -> None:
         if name in table:
             self._refuse(path, None, "is given twice")
-        elif value is not _WRONG:
+        elif value is not WRONG:
             table[name] = value
-
-    def _refuse(self, path: str, value: Any, allowed: str) -> Any:
-        self.faults.append(Fault(path, value, allowed))
-        return _WRONG

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from os import PathLike
 from typing import Any
@@ -32,8 +33,6 @@ from softreach.support.arguments import (
 from softreach.support.arrays import Array
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES
-
-__all__ = ["search"]
 
 _BATCH = 4  # designs asked together, whatever the number of threads, so that this changes nothing
 _COARSER = 10.0  # times the accuracy, on the way
@@ -206,7 +205,6 @@ class _Run:
             return self.problem.judge(values, bounds=bounds)
 
     def _polish(self) -> None:
-        """Local optima next to the best designs that no polish has begun at."""
         if not self._polishes or self._left < _LEAST_OF_POLISH:
             return
         room = max(1, self._left // _DESIGNS_OF_POLISH)
@@ -243,7 +241,7 @@ class _Run:
             end = polished(
                 self.problem, start, goal=goal, floors=floors, designs=most, accuracy=accuracy
             )
-        return end.candidate.with_designs(end.designs)
+        return replace(end.candidate, designs=end.designs)
 
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best designs that lie apart from each other and from ends of polishes."""

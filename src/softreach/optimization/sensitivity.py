@@ -20,14 +20,12 @@ from softreach.optimization.result import Search
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, no_warnings
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["Multiplier", "Sensitivity", "VarianceShares", "sensitivity"]
 
 _ACTIVE = 1e-3  # room below which a requirement may decide
 _AT_END = 1e-6  # of a range
@@ -165,7 +163,8 @@ def sensitivity(
         progress: Called with the number of designs looked at since its last call.
 
     Raises:
-        InvalidInput: A problem without a candidate, or an n that is no power of two.
+        InvalidInput: An n that is no power of two.
+        NotPossible: A problem without a candidate.
         InvalidDesign: The candidate cannot exist.
     """
     as_instance("of", of, (Search, Problem), "a Search, or a Problem with a candidate")
@@ -174,7 +173,7 @@ def sensitivity(
     else:
         problem = of
         if candidate is None:
-            raise InvalidInput("candidate", "none", "given with a problem")
+            raise NotPossible("give a candidate too: a problem has no best design")
     as_instance("candidate", candidate, Candidate, "a Candidate")
     n, seed = as_integer("n", n, 0, _MOST), as_integer("seed", seed, 0)
     if n & (n - 1):
@@ -255,7 +254,7 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     size = float(np.linalg.norm(slope))
     bounds = [
         _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
-        for part in point.rooms
+        for part in point.inequalities
         for k in np.flatnonzero(part.value <= _ACTIVE)
     ]
     bounds += _ends(problem, point)

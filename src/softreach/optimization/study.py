@@ -1,4 +1,4 @@
-"""Study of a search: designs asked of Optuna's samplers and told, in a storage that resumes."""
+"""Study of a search: designs from Optuna's samplers, in a storage from which it resumes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,6 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     import optuna
 
-__all__ = ["SAMPLERS", "Sampler", "Study"]
-
 Sampler = Literal["auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random"]
 SAMPLERS = ("auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random")
 
@@ -31,17 +29,15 @@ _NAME = "softreach"
 _MISSED = 1e12
 """Cost of a design that misses requirements by 1: more than any objective has, as only the order
 matters to the samplers."""
-_NEVER = 1e15
-"""Cost of what cannot exist."""
-_WARM = 10
-"""Designs that CMA-ES begins from at least: the best tenth of them must be one or more."""
+_NEVER = 1e15  # cost of what cannot exist
+_WARM = 10  # designs that CMA-ES begins from at least: the best tenth of them must be one or more
 _JUDGED, _KEY, _PROBLEM = "judged", "asked", "problem"
 
 
 class Study:
     """Designs of a search: where they come from, and the storage in which they are kept.
 
-    The sampler is fed in memory, in one order whatever happens; the storage says what was judged
+    The sampler is fed in memory, always in the same order; the storage says what was judged
     before. A search that was killed so asks for the same designs again, and judges only the rest.
     """
 
@@ -79,7 +75,7 @@ class Study:
                 self._study.enqueue_trial(dict(values))
 
     def ask(self, count: int) -> list[tuple[Any, dict[str, float | str]]]:
-        """Trials to be told, and their designs."""
+        """Trials, whose costs `tell` reports, and their designs."""
         with _quiet():
             trials = [self._study.ask(self._space) for _ in range(count)]
         return [(trial, dict(trial.params)) for trial in trials]
@@ -176,8 +172,8 @@ class Study:
             allowed = "a file that can be written, of this kind of search"
             raise InvalidInput("storage", place, allowed, in_short(error)) from error
         if noted not in (None, self.problem.digest):
-            allowed = "that of the same designs, requirements and objectives"
-            hint = "it is of another search: remove it, or choose another file"
+            allowed = "a new file, or that of the same designs, requirements and objectives"
+            hint = "it belongs to another search: remove it, or choose another file"
             raise InvalidInput("storage", place, allowed, hint)
         return study
 
@@ -303,7 +299,6 @@ def _library() -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without what Optuna logs for people who use it themselves."""
     optuna = _library()
     before = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)

@@ -9,22 +9,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.optimization.arms_made import ArmsMade, arms_made, tried, with_places, with_region
-from softreach.optimization.deviations import Spread, deviations_of
-from softreach.optimization.first_order import FirstOrder
+from softreach.optimization.deviations import FirstOrder, Spread, deviations_of
+from softreach.optimization.monte_carlo import ArmsMade, arms_made, tried, with_places, with_region
 from softreach.requirements.requirements import Requirements
 from softreach.rod.rods import tip_map
 from softreach.schema import provenance
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput, counted, no_warnings
+from softreach.support.errors import NotPossible, counted, no_warnings
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["TargetTolerance", "Tolerance", "tolerance"]
 
 _MOST = 1_000_000
 
@@ -87,8 +84,8 @@ def tolerance(
         progress: Called with the number of arms made since its last call.
 
     Raises:
-        InvalidInput: Fewer than three free bundles, an unknown parameter or one that cannot
-            deviate, or a number out of range.
+        InvalidInput: An unknown parameter or one that cannot deviate, or a number out of range.
+        NotPossible: Fewer than three free bundles.
         InvalidDesign: The design has no neighbors with other values of a parameter.
         MissingExtra: scikit-image is not installed.
     """
@@ -99,8 +96,9 @@ def tolerance(
     checked = as_integer("checked", checked, 0, samples)
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     seed, progress = as_integer("seed", seed, 0), as_progress(progress)
-    if tip_map(deviations.arm).box.dimension < 3:
-        raise InvalidInput("arm", "fewer than three free bundles", "three of them or more")
+    if (count := tip_map(deviations.arm).box.dimension) < 3:
+        found = counted(count, "free bundle")
+        raise NotPossible(f"a tolerance needs three free bundles or more, and this arm has {found}")
     with no_warnings():
         first = FirstOrder(deviations, needs, accuracy, deviations.draws(samples, seed))
         arms = arms_made(first, checked, seed, progress)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
+from softreach import plot
+from softreach.atlas import DamagedStore, atlas_cloud
+from softreach.atlas.store import DONE
+from softreach.cloud.curvature import curvature_statistics
+from softreach.cloud.volume import concave_hull
+from softreach.geometry.hull import Hull
+from softreach.plot import SheetAxis, sheet_axes
+from softreach.schema import is_stable
 from softreach.support.errors import warn
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from softreach.geometry.hull import Hull
-    from softreach.plot import SheetAxis
 
 __all__ = ["atlas_figures", "hulls_of"]
 
@@ -27,20 +30,18 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         atlas: A grid of two parameters, from `open_atlas`.
         panels: Columns and rows of the sheets at most.
     """
-    from softreach import plot
-
     for metric in _METRICS:
         if metric in atlas and np.isfinite(atlas[metric].values).any():
             yield f"map_{metric}", plot.plot_metric_map(atlas, metric)
     if "x_min" not in atlas:
         return
     box: dict[str, Any] = {"box_over_length": plot.box_over_length(atlas)}
-    picked = _thinned(atlas, panels)
-    edges = plot.sheet_axes(picked)
+    picked, ends = _thinned(atlas, panels), _thinned(atlas, 2)
+    edges = sheet_axes(picked)
     yield "clouds", plot.plot_cloud_sheet(_clouds(picked), *edges, **box)
-    yield "corners", plot.plot_opposite_sides(_corners(atlas), **box)
-    if (statistics := _curvature(atlas)) is not None:
-        yield "curvature", statistics
+    yield "corners", plot.plot_opposite_sides(_corners(ends), **box)
+    if (curvature := _curvature(ends)) is not None:
+        yield "curvature", curvature
     yield "hulls", plot.plot_hull_sheet(hulls_of(picked), *edges, length=1.0, **box)
 
 
@@ -56,9 +57,6 @@ def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
 
 def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
     """(column, row) -> the cloud of the design there, if it is done and not damaged."""
-    from softreach.atlas import DamagedStore, atlas_cloud
-    from softreach.atlas.store import DONE
-
     first, second = map(str, atlas["status"].dims)
 
     def cloud_at(column: int, row: int) -> xr.Dataset | None:
@@ -76,31 +74,20 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
 
 def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
     """(column, row) -> the hull of the design there in lengths of its own, if it is done."""
-    from softreach.cloud.volume import concave_hull
-    from softreach.rod.tip_map import TipStatus
-
     cloud_at = _clouds(atlas)
-    alpha_over_length = (
-        float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
-    )
+    alpha = float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
 
     def hull_at(column: int, row: int) -> Hull | None:
-        cloud = cloud_at(column, row)
-        if cloud is None:
+        if (cloud := cloud_at(column, row)) is None:
             return None
-        tips = cloud.tip.values / cloud.tip.attrs["length"]
-        if "status" in cloud:
-            tips = tips[cloud.status.values == TipStatus.STABLE]
-        return concave_hull(tips, alpha_over_length)
+        tips = cloud.tip.values[is_stable(cloud.tip)]
+        return concave_hull(tips / cloud.tip.attrs["length"], alpha)
 
     return hull_at
 
 
-def _corners(atlas: xr.Dataset) -> dict[str, xr.Dataset]:
+def _corners(ends: xr.Dataset) -> dict[str, xr.Dataset]:
     """Title and cloud at the ends of both parameters, in the paper's order."""
-    from softreach.plot import sheet_axes
-
-    ends = _thinned(atlas, 2)
     across, up = sheet_axes(ends)
     cloud_at = _clouds(ends)
     places = [(column, row) for column in range(2) for row in range(2)]
@@ -115,20 +102,16 @@ def _at(axis: SheetAxis, k: int) -> str:
     return f"{symbol} = {axis.values[k]:.4g}{space}{unit}"
 
 
-def _curvature(atlas: xr.Dataset) -> Any:
+def _curvature(ends: xr.Dataset) -> Any:
     """The first against the last value of the second parameter, at the last of the first.
 
     None if neither design is done.
     """
-    from softreach.cloud.curvature import curvature_statistics
-    from softreach.plot import plot_curvature, sheet_axes
-
-    ends = _thinned(atlas, 2)
     across, up = sheet_axes(ends)
-    clouds = {f"{_at(up, k)}": _clouds(ends)(len(across.values) - 1, k) for k in range(2)}
-    panels = {label: cloud for label, cloud in clouds.items() if cloud is not None}
-    if not panels:
+    clouds = {_at(up, k): _clouds(ends)(len(across.values) - 1, k) for k in range(2)}
+    done = {label: cloud for label, cloud in clouds.items() if cloud is not None}
+    if not done:
         return None
-    ax = plot_curvature({label: curvature_statistics(cloud) for label, cloud in panels.items()})
+    ax = plot.plot_curvature({label: curvature_statistics(cloud) for label, cloud in done.items()})
     ax.set_title(_at(across, -1), fontsize=9)
     return ax

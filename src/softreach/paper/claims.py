@@ -47,19 +47,18 @@ class Claim:
     says: str
     """The statement, in the paper's words or nearly so."""
     how: str
-    """Way of its check."""
+    """How it is checked."""
     part: str
-    """The part of the report that computes what it needs."""
+    """The part of the report that computes the numbers."""
     check: Callable[[Numbers], Finding]
-    """From the part's numbers to a finding."""
     full: bool = False
     """True if only the full sizes test it."""
 
 
 def _claims() -> Iterator[Claim]:
     text = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
-    for row in tomllib.loads(text)["claim"]:
-        part, function = row.pop("check").split(".")
+    for name, row in tomllib.loads(text).items():
+        part, function = name.split(".")
         check = getattr(import_module(f"softreach.paper.sections.{part}"), function)
         yield Claim(**row, part=part, check=check)
 

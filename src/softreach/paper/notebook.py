@@ -1,4 +1,4 @@
-"""Notebook of a section of the report, on disk as soon as it is done, and sizes of its clouds."""
+"""What a part of the report found, on disk as soon as it is done, and the sizes of its clouds."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
+from softreach.plot.style import pyplot, save_figure
 from softreach.support.files.atomic import writing
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -31,21 +28,21 @@ class Notebook:
     """Numbers and figures of one part; `close` makes them last, so that a rerun skips the part."""
 
     folder: Path
+    """Of the figures, within that of all results."""
     part: str
     key: Mapping[str, Any]
     """Everything that the results depend on; a notebook of another key is stale."""
     numbers: dict[str, Any] = field(default_factory=dict)
+    """Plain ones, texts, lists or dicts of them."""
     pictures: list[Picture] = field(default_factory=list)
     seconds: float = 0.0
 
     def note(self, **numbers: Any) -> None:
-        """Keep numbers by name: plain ones, texts, lists or dicts of them."""
+        """Keep numbers by name."""
         self.numbers |= numbers
 
-    def draw(self, label: str, name: str, caption: str, figure: Figure | Axes) -> None:
-        """Save a figure as PNG and PDF, and close it."""
-        from softreach.plot.style import pyplot, save_figure
-
+    def draw(self, label: str, name: str, caption: str, figure: Any) -> None:
+        """Save a figure, or axes in it, as PNG and PDF, and close it."""
         for suffix in ("png", "pdf"):
             save_figure(figure, self.folder / f"{name}.{suffix}", overwrite=True)
         pyplot().close(figure.get_figure(root=True))
@@ -80,7 +77,7 @@ class Notebook:
         return self.folder / f"{self.part}.json"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Settings:
     """Sizes of the paper's clouds and sweeps, or smaller ones."""
 
@@ -102,24 +99,8 @@ class Settings:
     """Seed of every cloud."""
 
 
-FULL = Settings(
-    designs=16,
-    samples=400_000,
-    alpha=0.05,
-    panels=7,
-    accuracy=3e-3,
-    redundant_samples=2_000_000,
-    queries=10_000,
-)
+FULL = Settings(16, 400_000, 0.05, 7, 3e-3, 2_000_000, 10_000)
 """The sizes that the paper states (sections 3 and 5)."""
 
-QUICK = Settings(
-    designs=4,
-    samples=10_000,
-    alpha=0.13,
-    panels=2,
-    accuracy=5e-2,
-    redundant_samples=50_000,
-    queries=1_000,
-)
-"""The same in under a minute; its numbers are coarse."""
+QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)
+"""Coarse numbers in under a minute."""

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 from softreach.support.arrays import Array
 from softreach.support.quantity import round_above
 
-__all__ = ["AxesBox", "Edge", "Side", "axes_box", "round_box", "seen_from"]
-
 _TICK = 0.02  # length of a tick, of the largest side
 _MOST = 8  # ticks along the longest edge
 _WIDE, _HIGH = 32.0, 16.0  # pixels from one number to the next, beside or above each other
@@ -33,7 +31,7 @@ class Edge(NamedTuple):
 
 
 class Side(NamedTuple):
-    """Side from which a box is seen, as far as its drawing depends on it."""
+    """Side from which a box is seen: all that its drawing depends on."""
 
     visible: tuple[int, int, int]
     """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""

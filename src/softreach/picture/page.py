@@ -23,18 +23,6 @@ from softreach.picture.thumbnail import Dots, Skin
 from softreach.support.arrays import Array
 from softreach.support.units import LengthUnit
 
-__all__ = [
-    "ColorScale",
-    "Figure3D",
-    "PackedPart",
-    "PagePart",
-    "Swatches",
-    "css_color",
-    "packed",
-    "script_text",
-    "web_page",
-]
-
 _STEPS = 65535
 _HEIGHT = 560  # pixels, in notebooks
 _BUTTONS = "front", "side", "top", "oblique"

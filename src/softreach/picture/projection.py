@@ -8,18 +8,6 @@ from numpy.typing import ArrayLike
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
-__all__ = [
-    "VIEWS",
-    "View",
-    "is_mirrored",
-    "on_paper",
-    "plane_of",
-    "project",
-    "sight_axis",
-    "view_angles",
-    "view_axes",
-]
-
 View = str | tuple[float, float]
 
 VIEWS: dict[str, tuple[float, float]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,7 @@ from softreach.plot.style import (
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_instance, as_number
-from softreach.support.arrays import Array, Mask, as_stations
+from softreach.support.arrays import Array, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, MET, MISSED, bundle_color
 from softreach.support.units import LengthUnit, in_lengths
@@ -221,24 +221,8 @@ def plot_designs(
     return figure
 
 
-class _Check(Protocol):
-    @property
-    def arm(self) -> Manipulator: ...
-    @property
-    def places(self) -> Array: ...
-    @property
-    def reached(self) -> Mask: ...
-    @property
-    def nearest(self) -> Array: ...
-    @property
-    def regions(self) -> Sequence[tuple[str, Any]]: ...
-    @property
-    def findings(self) -> Sequence[Any]: ...
-    def shapes(self, count: int) -> xr.Dataset | None: ...
-
-
 def plot_check(
-    check: _Check,
+    check: Any,
     *,
     ax: Axes | None = None,
     view: View = "oblique",
@@ -290,7 +274,7 @@ def plot_check(
     return panel.ax
 
 
-def _draw_places(panel: Panel, check: _Check) -> None:
+def _draw_places(panel: Panel, check: Any) -> None:
     met = check.reached.all(axis=0)
     load = (~check.reached).sum(axis=1).argmax()  # under which most are missed
     gaps = np.stack([check.places[~met], check.nearest[load, ~met]], axis=1)

@@ -90,7 +90,7 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
             attribute `scale` is "log" if ratios count, and `clipped` true if its extreme values
             stand for all beyond them; or RGB from 0 to 1 per sample.
 
-    Unstable equilibria of arms under loads are magenta, whatever the color of the others.
+    Unstable equilibria of arms under loads are always magenta.
 
     Raises:
         InvalidInput: No such bundle, or an array of another length.
@@ -157,7 +157,7 @@ _OF_ALL = {"strongest": _strongest, "effort": _effort}
 
 
 def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
-    """Activations with samples first and bundles second, whatever the dimension is called."""
+    """Activations over samples and bundles, for any name of that dimension."""
     activation = cloud["activation"]
     (bundle,) = (dim for dim in activation.dims if dim != "sample")
     return activation.transpose("sample", bundle)

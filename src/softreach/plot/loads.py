@@ -114,7 +114,7 @@ def plot_compliance(
 ) -> Axes:
     """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
 
-    They are to scale, as far as the tip yields in proportion to the force.
+    They are to scale where the tip yields in proportion to the force.
 
     Args:
         arm: The design.
@@ -142,7 +142,8 @@ def plot_compliance(
     if matrices.shape[1:] != (3, 3):
         raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
     if len(matrices) != len(shapes):
-        raise InvalidInput("compliance", f"{len(matrices)} of them", f"one each of {len(shapes)}")
+        allowed = f"{len(shapes)}, one for each configuration"
+        raise InvalidInput("compliance", f"{len(matrices)} matrices", allowed)
     if force is None:  # that keeps the ellipsoids small
         softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
         force = round_below(_LARGEST * arm.length / softest)

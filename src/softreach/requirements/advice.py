@@ -10,8 +10,6 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.units import LengthUnit
 
-__all__ = ["advice"]
-
 _AT_BOUND = 1e-6  # of the range
 _NEWTON_STEPS = 12
 _LONGEST_STEP = 0.3  # of the ranges

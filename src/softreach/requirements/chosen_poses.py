@@ -11,7 +11,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.prepared import prepared_map
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
-from softreach.requirements.check_result import TOL
 from softreach.requirements.poses import PoseRules
 from softreach.rod.bending import some_corners
 from softreach.rod.rods import tip_map
@@ -22,8 +21,7 @@ from softreach.support.errors import InvalidInput, no_warnings
 from softreach.support.progress import Progress
 from softreach.workspace.search import nearest_tips
 
-__all__ = ["Chooser", "Posed", "chosen", "descended", "effort_scales", "solved"]
-
+TOL = 1e-6  # over L: a place that is reached to the error of the tips is reached
 _BLOCK = 32_768  # places at once: bounds the memory
 _FAMILY = 32  # activations tried for a place of an arm with more than three free bundles
 _MOST_TRIED = 4_096  # places for which they are
@@ -74,7 +72,7 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     except InvalidInput as error:
         if error.name != "loads":
             raise
-        return _fallen(rules, places)
+        return _without_equilibrium(rules, places)
     best = _best(rules, solutions)
     broken = (best.excess.sum(axis=1) > 0.0) & (solutions.statuses == Status.REACHED)
     if (tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
@@ -101,7 +99,7 @@ def descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     tips = rod.tips(gamma)
     known = np.isfinite(tips).all(axis=1)
     if not known.any():
-        return _fallen(rules, places)
+        return _without_equilibrium(rules, places)
     gamma, tips = gamma[known], tips[known]
     near = KDTree(tips).query(places, k=min(_NEIGHBORS, len(tips)))[1].reshape(count, -1)
     owner = np.repeat(np.arange(count), near.shape[1])
@@ -164,8 +162,8 @@ def effort_scales(arm: Manipulator) -> Array:
     return np.where(largest > 0.0, largest, 1.0)
 
 
-def _fallen(rules: PoseRules, places: Array) -> Posed:
-    """Poses of an arm that no activation holds under its loads: none counts as near."""
+def _without_equilibrium(rules: PoseRules, places: Array) -> Posed:
+    """Poses of an arm that no activation holds under its loads: its tip is near no place."""
     arm, count = rules.arm, len(places)
     away = np.linalg.norm(places - arm.base.position, axis=1) + arm.length
     gamma = np.tile(rules.rod.box.low, (count, 1))

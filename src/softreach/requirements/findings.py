@@ -24,8 +24,6 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     from softreach.workspace import ReachableSet
 
-__all__ = ["Finding", "Verdict", "quick_excess", "verdict_of"]
-
 Verdict = Literal["met", "missed", "undecided"]
 """A requirement is undecided where its margin is smaller than the error of that."""
 

@@ -22,8 +22,6 @@ from softreach.support.arrays import Array, as_points, read_only
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.files.text import MEGABYTE
 
-__all__ = ["Keep", "Limits", "Target"]
-
 MOST_PLACES = 1_000_000
 """Places that all targets may have together."""
 LONGEST = 64 * MEGABYTE

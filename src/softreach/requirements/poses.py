@@ -21,8 +21,6 @@ from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 
-__all__ = ["PoseRules", "worst_pose"]
-
 _LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""
 _BLOCK = 256  # poses at once

@@ -28,11 +28,9 @@ from softreach.support.arrays import (
     check_finite,
     read_only,
 )
-from softreach.support.errors import InvalidInput, counted
+from softreach.support.errors import InvalidInput, NotPossible, counted
 from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
-
-__all__ = ["Box", "HalfSpace", "Mesh", "Region", "Sphere"]
 
 Triple = tuple[float, float, float]
 
@@ -83,7 +81,8 @@ class Region(ABC):
             n: Number of places; the same n gives the same places.
 
         Raises:
-            InvalidInput: The region has no end, or fills next to nothing of the box around it.
+            InvalidInput: The region has no end.
+            NotPossible: It fills next to nothing of the box around it.
         """
         n = as_integer("n", n, 1, _MOST_PLACES)
         low, high = self.bounds
@@ -97,7 +96,7 @@ class Region(ABC):
             kept.append(points[self.distance(points) <= 0.0])
             count, drawn = count + len(kept[-1]), drawn + len(points)
             if count < _EMPTIEST * drawn and drawn > 1.0 / _EMPTIEST:
-                raise InvalidInput("region", self, "thick enough for places inside it")
+                raise NotPossible(f"{self} is too thin to draw places from it")
         return np.concatenate(kept)[:n]
 
     def section_distances(
@@ -271,7 +270,8 @@ class Mesh(Region):
     """Solid inside closed triangles.
 
     Raises:
-        InvalidInput: Triangles that leave an edge open, share one by more than two, or do not face
+        InvalidInput: Vertices or triangles that are none.
+        NotPossible: Triangles that leave an edge open, share one by more than two, or do not face
             the same way; or nothing inside.
     """
 
@@ -289,10 +289,10 @@ class Mesh(Region):
     def __post_init__(self) -> None:
         vertices = as_points("vertices", self.vertices)
         faces = as_faces("faces", self.faces, len(vertices))
-        _check_closed(faces, self.source or "mesh")
+        _check_closed(faces, self.source or "the mesh")
         volume = enclosed_volume(vertices, faces)
         if not abs(volume) > 0.0:
-            raise InvalidInput(self.source or "mesh", "no volume", "around some space")
+            raise NotPossible(f"{self.source or 'the mesh'} encloses no volume")
         faces = faces if volume > 0.0 else faces[:, ::-1]
         object.__setattr__(self, "vertices", read_only(vertices.copy()))
         object.__setattr__(self, "faces", read_only(np.ascontiguousarray(faces, np.int64)))  # pyright: ignore[reportArgumentType]
@@ -307,8 +307,9 @@ class Mesh(Region):
                 softreach wrote into it, and m for a GLB.
 
         Raises:
-            InvalidInput: No such file, too large a one, no triangles in it, a mesh with holes, or
-                no unit where the file says none.
+            InvalidInput: No such file, too large a one, no triangles in it, or no unit where the
+                file says none.
+            NotPossible: A mesh with holes.
             MissingExtra: trimesh is not installed.
         """
         name = as_path("path", path)
@@ -474,16 +475,16 @@ def _triple(name: str, value: object) -> Triple:
 
 
 def _check_closed(faces: Any, name: str) -> None:
-    """Refuse triangles that leave a hole or do not face the same way."""
     if not len(faces):
-        raise InvalidInput(name, "no triangles", "a closed surface")
+        raise NotPossible(f"{name} has no triangles")
     ways = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     _, counts = np.unique(np.sort(ways, axis=1), axis=0, return_counts=True)
     if number := int((counts == 1).sum()):
-        text = f"a mesh with holes: {counted(number, 'open edge')}"
-        raise InvalidInput(name, text, "closed, so that inside and outside can be told apart")
+        raise NotPossible(f"{name} has holes: close its {counted(number, 'open edge')}")
     if number := int((counts != 2).sum()):
-        text = f"{counted(number, 'edge')} of more than two triangles"
-        raise InvalidInput(name, text, "a surface that does not branch")
+        many = counted(number, "edge")
+        raise NotPossible(
+            f"the surface of {name} branches: it has {many} of more than two triangles"
+        )
     if len(np.unique(ways, axis=0)) < len(ways):
-        raise InvalidInput(name, "triangles that face both ways", "of triangles that all face out")
+        raise NotPossible(f"some triangles of {name} face out and others in: turn them one way")

@@ -29,8 +29,6 @@ from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.text import read_text, write_text
 
-__all__ = ["Requirements"]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Requirements:
@@ -142,7 +140,7 @@ class Requirements:
 
     def to_toml(self) -> str:
         """The text of a file, from which `from_toml` makes the same."""
-        return written(self)
+        return written(**vars(self))
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a TOML file.

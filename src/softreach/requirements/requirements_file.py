@@ -2,37 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from softreach.arm.design_file.keys import inline_table, key_text, unknown_key, value_text
 from softreach.atlas.metrics import known_metric
 from softreach.inverse.request import positions_in
 from softreach.requirements.parts import LIMIT_UNITS, LONGEST, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
-from softreach.support.files.text import read_text, tables_of
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, SoftreachError
+from softreach.support.files.text import read_text
+from softreach.support.files.toml import (
+    WRONG,
+    FaultReader,
+    document_of,
+    inline_table,
+    key_text,
+    value_text,
+)
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
 
-if TYPE_CHECKING:
-    from softreach.requirements.requirements import Requirements
-
-__all__ = ["read", "written"]
-
 _KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
 """At the top, beside payloads; `search` is read by the search of designs."""
-_SUFFIXES = {
-    "m": {"m": "m", "cm": "cm", "mm": "mm", "over_length": "L"},
-    "kg": {"kg": "kg", "g": "g"},
-    "N": {"n": "N"},
-    "Pa": {"pa": "Pa", "kpa": "kPa"},
-}
-"""SI unit -> suffix of a key -> unit."""
 _EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa"}
+"""SI unit of numbers that have one -> how such a number may be written."""
 _SHAPES: Mapping[str, Mapping[str, str]] = {
     "box": {"low": "m", "high": "m"},
     "sphere": {"center": "m", "radius": "m"},
@@ -41,8 +37,6 @@ _SHAPES: Mapping[str, Mapping[str, str]] = {
 }
 """Region -> its numbers and their units."""
 _KINDS = {"box": Box, "sphere": Sphere, "half_space": HalfSpace}
-_WRONG: Any = object()
-"""In place of a value that has faults."""
 _EXAMPLE = {kind: {"region": Sphere((0.0, 0.0, 0.0), 1.0)} for kind in (Target, Keep)} | {
     Limits: {}
 }
@@ -60,12 +54,7 @@ def read(text: str, folder: Path, length: float | None, source: str) -> dict[str
     Raises:
         InvalidDesign: Faults under the keys of the text.
     """
-    if len(text) > LONGEST:
-        raise InvalidDesign([Fault("TOML", None, f"must be at most {LONGEST:,} long")], source)
-    try:
-        document = tables_of(text)
-    except ValueError as error:
-        raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
+    document = document_of(text, LONGEST, source)
     reader = _Reader(folder, length)
     parts = reader.parts(document)
     if reader.faults:
@@ -73,14 +62,14 @@ def read(text: str, folder: Path, length: float | None, source: str) -> dict[str
     return parts
 
 
-class _Reader:
+class _Reader(FaultReader):
     def __init__(self, folder: Path, length: float | None) -> None:
+        super().__init__()
         self.folder, self.length = folder, length
-        self.faults: list[Fault] = []
 
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""
-        self._check_keys(document, "", {"payloads": "kg"}, _KEYS)
+        self._check_keys(document, "", ("payloads", *_KEYS), _keys("payloads", "kg"))
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
         payloads = self._value(document, "", "payloads", "kg", several=True)
@@ -124,7 +113,8 @@ class _Reader:
         self, raw: dict[str, Any], path: str, numbers: Mapping[str, str], words: tuple[str, ...]
     ) -> dict[str, Any]:
         """Values of a table by field: numbers, words, and the region that it has."""
-        self._check_keys(raw, path, numbers, (*words, *_SHAPES, "mesh_unit"))
+        shown = (*numbers, *words, *_SHAPES, "mesh_unit")
+        self._check_keys(raw, path, shown, _all_keys(numbers))
         values = {
             name: value
             for name, unit in numbers.items()
@@ -159,12 +149,12 @@ class _Reader:
         if not isinstance(table, dict):
             return self._refuse(path, table, "must be a table" + " or a file" * (shape == "mesh"))
         if shape == "mesh":
-            self._check_keys(table, path, {"vertices": "m"}, ("faces",))
+            self._check_keys(table, path, ("vertices", "faces"), _keys("vertices", "m"))
             vertices = self._value(table, path, "vertices", "m", several=True)
             values = {"vertices": vertices, "faces": table.get("faces")}
             return self._made(Mesh, table, path, values)
         numbers = _SHAPES[shape]
-        self._check_keys(table, path, numbers)
+        self._check_keys(table, path, numbers, _all_keys(numbers))
         values = {
             name: self._value(table, path, name, unit, several=name != "radius", needed=True)
             for name, unit in numbers.items()
@@ -172,7 +162,7 @@ class _Reader:
         return self._made(_KINDS[shape], table, path, values)
 
     def _limits(self, raw: dict[str, Any]) -> Any:
-        self._check_keys(raw, "limits", LIMIT_UNITS)
+        self._check_keys(raw, "limits", LIMIT_UNITS, _all_keys(LIMIT_UNITS))
         values = {
             name: self._value(raw, "limits", name, unit) for name, unit in LIMIT_UNITS.items()
         }
@@ -188,25 +178,27 @@ class _Reader:
             elif not isinstance(table, dict):
                 self._refuse(path, table, "must be a table with at_least, at_most or both")
             else:
-                unit = metric.unit if metric.unit in _SUFFIXES else ""
+                unit = metric.unit if metric.unit in _EXAMPLES else ""
                 ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
-                self._check_keys(table, path, ends)
+                self._check_keys(table, path, ends, _all_keys(ends))
                 measures[name] = tuple(
                     self._value(table, path, end, unit, plain=True) for end in ends
                 )
         return measures
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
-        """A part of checked numbers; `_WRONG` and a fault where it refuses them."""
-        wrong = [name for name, value in values.items() if value is _WRONG]
+        """A part of checked numbers; `WRONG` and a fault where it refuses them."""
+        wrong = [name for name, value in values.items() if value is WRONG]
         if wrong and kind not in _EXAMPLE:
-            return _WRONG
+            return WRONG
         values = {name: value for name, value in values.items() if name not in wrong}
         if {"region", "places"} & set(wrong):  # so that the others can be judged
             values = _EXAMPLE[kind] | values
         try:
             made = kind(**values)
-            return _WRONG if wrong else made
+            return WRONG if wrong else made
+        except NotPossible as error:
+            return self._refuse(path, None, str(error))
         except InvalidInput as error:
             field = error.name.partition(" ")[0].partition("[")[0]
             key = next((key for key in raw if key.startswith(field)), "")
@@ -228,14 +220,7 @@ class _Reader:
     ) -> Any:
         """A number, or several, in SI units under a key with or without its unit; None without.
 
-        Args:
-            raw: The table.
-            path: Its path.
-            name: The key without a unit.
-            unit: SI unit; "" for none.
-            several: A list, in lists if need be.
-            needed: Its absence is a fault.
-            plain: Numbers may go without their unit, which is known.
+        `several` are in lists; `plain` ones may go without their unit.
         """
         known = _keys(name, unit)
         keys = [key for key in known if key in raw]
@@ -285,60 +270,36 @@ class _Reader:
             return "the length L of the arm is not known here: give m, cm or mm"
         if symbol or not unit:
             return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
-        suffix = next(key for key, each in _SUFFIXES[unit].items() if each == unit)
         units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
         hint = "" if unit != "m" or self.length is not None else "; L is not known here"
         return (
             f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under '
-            f"{name}_{suffix}{hint}"
+            f"{name}_{unit.lower()}{hint}"
         )
 
-    def _check_keys(
-        self,
-        raw: dict[str, Any],
-        path: str,
-        numbers: Mapping[str, str],
-        others: tuple[str, ...] = (),
-    ) -> None:
-        known = {*others, *(key for name, unit in numbers.items() for key in _keys(name, unit))}
-        start = f"{path}." if path else ""
-        for key in (key for key in raw if key not in known):
-            shown = {name: name for name in (*numbers, *others)}
-            self._refuse(start + key_text(key), raw[key], unknown_key(key, shown))
 
-    def _table(self, document: dict[str, Any], key: str) -> dict[str, Any]:
-        raw = document.get(key, {})
-        if isinstance(raw, dict):
-            return raw
-        self._refuse(key, raw, "must be a table")
-        return {}
-
-    def _tables(self, document: dict[str, Any], key: str) -> Iterator[tuple[dict[str, Any], str]]:
-        raw = document.get(key, [])
-        if not isinstance(raw, list):
-            self._refuse(key, raw, f"must be tables: write [[{key}]]")
-            return
-        for k, table in enumerate(raw):
-            if isinstance(table, dict):
-                yield table, f"{key}[{k}]"
-            else:
-                self._refuse(f"{key}[{k}]", table, "must be a table")
-
-    def _refuse(self, path: str, value: Any, allowed: str) -> Any:
-        self.faults.append(Fault(path, value, allowed))
-        return _WRONG
+def _all_keys(numbers: Mapping[str, str]) -> list[str]:
+    return [key for name, unit in numbers.items() for key in _keys(name, unit)]
 
 
 def _keys(name: str, unit: str) -> dict[str, str]:
-    """Keys of a number, and the units that they say."""
-    return {name: ""} | {f"{name}_{x}": symbol for x, symbol in _SUFFIXES.get(unit, {}).items()}
+    units = {each.lower(): each for each in unit_names(unit) if each.isascii()} if unit else {}
+    units |= {"over_length": "L"} if unit == "m" else {}
+    return {name: ""} | {f"{name}_{suffix}": symbol for suffix, symbol in units.items()}
 
 
-def written(needs: Requirements) -> str:
-    """The text of a file; lengths in m, masses in kg."""
-    head = {"version": 1} | ({"payloads_kg": needs.payloads} if needs.payloads else {})
+def written(
+    *,
+    targets: Sequence[Target],
+    keeps: Sequence[Keep],
+    limits: Limits,
+    payloads: Sequence[float],
+    measures: Mapping[str, tuple[float | None, float | None]],
+) -> str:
+    """The text of a file with these fields; lengths in m, masses in kg."""
+    head = {"version": 1} | ({"payloads_kg": payloads} if payloads else {})
     blocks = [["# softreach requirements", *_lines(head)]]
-    for target in needs.targets:
+    for target in targets:
         lines = ["[[reach]]", *_lines({"name": target.name})]
         if target.places is not None:
             rows = (f"  {value_text(row)}," for row in target.places.tolist())
@@ -346,17 +307,16 @@ def written(needs: Requirements) -> str:
         elif target.region is not None:
             lines += [_region_line(target.region), *_lines({"share": target.share})]
         blocks.append(lines + _lines({"within_m": target.within} if target.within else {}))
-    for keep in sorted(needs.keeps, key=lambda keep: not keep.inside):
+    for keep in sorted(keeps, key=lambda keep: not keep.inside):
         words = {"of": keep.of, "when": keep.when}
         words |= {"clearance_m": keep.clearance} if keep.clearance else {}
         start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
         blocks.append([*start, _region_line(keep.region), *_lines(words)])
-    if limits := needs.limits.given:
-        keys = (f"{name}_{LIMIT_UNITS[name].lower()}".rstrip("_") for name in limits)
-        blocks.append(["[limits]", *_lines(dict(zip(keys, limits.values(), strict=True)))])
-    if needs.measures:
-        blocks.append(["[measures]"])
-    for name, ends in needs.measures.items():
+    if limits.given:
+        keys = (f"{name}_{LIMIT_UNITS[name].lower()}".rstrip("_") for name in limits.given)
+        blocks.append(["[limits]", *_lines(dict(zip(keys, limits.given.values(), strict=True)))])
+    blocks += [["[measures]"]] if measures else []
+    for name, ends in measures.items():
         pairs = zip(("at_least", "at_most"), ends, strict=True)
         table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
         blocks[-1].append(f"{key_text(name)} = {table}")

@@ -21,6 +21,7 @@ from softreach.rod.tip_map import (
     Array,
     Frame,
     Frames,
+    Held,
     Shapes,
     Status,
     TipMap,
@@ -227,6 +228,13 @@ class ArmMap(TipMap):
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         return self.rod.extension_and_turn(self.inputs.activations(gamma))
+
+    def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held | None:
+        held = self.rod.held(self.inputs.activations(gamma), sizes)
+        if held is not None and not self.pose.is_identity:
+            for places in (held.tips, held.end_tips):
+                self._place(places, None, None, None)
+        return held
 
     def farthest(self) -> float:
         return self.rod.farthest()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, groupby
 from typing import Any
 
 import numpy as np
@@ -29,10 +29,19 @@ from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, bending_over_bounds
 from softreach.support.errors import Fault, InvalidInput
+from softreach.support.quantity import columns
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
 
 Array = NDArray[np.float64]
+
+_TEXTS = ("lacking", "validity", "warnings")
+_UNITS = {"helical_angles": "rad", "revolutions": "rad", "base_radius": "m", "tip_radius": "m"}
+_UNITS |= {
+    "breakpoints": "m",
+    "mass": "kg",
+    "stiffness": "(K0 [N], K1, K3 [N m²], at base and tip)",
+}
 
 
 @dataclass(frozen=True)
@@ -78,6 +87,29 @@ class DesignSummary:
     """Limit of the linear law of each kind of actuator."""
     warnings: tuple[str, ...]
     """Limits that the design touches, each with its number."""
+
+    def __str__(self) -> str:
+        rows, texts = [], [*self.lacking, *self.validity, *self.warnings]
+        for name, value in vars(self).items():
+            if value is not None and np.size(value) and name not in _TEXTS:
+                numbers = (
+                    _spans(value)
+                    if isinstance(value, np.ndarray) and value.ndim == 2
+                    else _in_row(np.ravel(value))
+                )
+                rows.append((name.replace("_", " "), f"{numbers} {_UNITS.get(name, '')}".rstrip()))
+        return "\n".join([*columns(rows), *texts])
+
+
+def _in_row(numbers: Array) -> str:
+    return ", ".join(f"{number:.4g}" for number in numbers)
+
+
+def _spans(ends: Array) -> str:
+    """Ranges, of which neighbors that are equal stand once: "3 × 0.9 to 1"."""
+    texts = [f"{low:.4g} to {high:.4g}" for low, high in ends]
+    counts = [(len([*same]), text) for text, same in groupby(texts)]
+    return ", ".join(f"{count} × {text}" if count > 1 else text for count, text in counts)
 
 
 def describe(arm: Manipulator) -> DesignSummary:

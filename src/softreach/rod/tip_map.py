@@ -273,6 +273,18 @@ class TipMap(ABC):
         """
         return np.full(len(centers), self.linearization_error(half_widths))
 
+    def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held | None:
+        """All postures that are held without a snap from rest; None where each γ has one alone.
+
+        That is the part of all stable equilibria that is connected with the posture at rest, with
+        those that lean to either side.
+
+        Args:
+            gamma: Activations at the nodes of a grid in C order, shape (nodes, bundles).
+            sizes: Nodes along each axis of the grid.
+        """
+        return None
+
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""
         return self._filled(activations)["tips"]
@@ -373,6 +385,23 @@ class Strains(NamedTuple):
     """u in the directors, per unit of activated arclength [1/m], shape (n, station, 3)."""
     extension: Array
     """ζ [-], shape (n, station)."""
+
+
+class Held(NamedTuple):
+    """All postures that a loaded arm holds at the nodes of a grid, and how they go on beside."""
+
+    node: NDArray[np.intp]
+    """The node of each, shape (n,)."""
+    tips: Array
+    """Their tips [m], shape (n, 3)."""
+    links: NDArray[np.intp]
+    """Pairs of neighbors that are on one branch, shape (l, 2)."""
+    ends: NDArray[np.intp]
+    """Postures whose branch ends on the way to a node beside, and that node, shape (e, 2)."""
+    end_tips: Array
+    """Tips where these end [m], shape (e, 3)."""
+    is_doubled: NDArray[np.bool_]
+    """Mask of nodes at which two are held on the side of the posture, shape (nodes,)."""
 
 
 class Shapes(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 
 from softreach.requirements import Box, Check, Finding, Keep, Requirements, Target
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
-from softreach.support.files.text import tables_of
+from softreach.support.files.toml import tables_of
 from softreach.support.units import LengthUnit
 
 __all__ = [

@@ -58,7 +58,12 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
     """
     arm, solid, known = reach.arm, reach.exact, parameters(reach.arm)
     found = VolumeSlopes(arm, reach.volume, {})
-    if not isinstance(solid, ReachableSolid) or solid.lost_share or not solid.volume > 0:
+    if (
+        not isinstance(solid, ReachableSolid)
+        or solid.lost_share
+        or solid.is_torn
+        or not solid.volume > 0
+    ):
         return found  # what remains are differences between neighbors, which take minutes
     scale = {
         slider.name: slider.scale

@@ -236,7 +236,7 @@ def _errors(reached: ReachableSet, scene: Scene, box: np.ndarray) -> Iterator[st
     yield f"Places are rounded to {step:.1g} {unit.name}"
     if reached.lost_share > 0.0:
         share = 100.0 * reached.lost_share
-        yield f"{share:.2g} % of the activation box left out: no stable equilibrium, or torn"
+        yield f"No posture is held at {share:.2g} % of activations"
 
 
 def _page(space: DesignSpace, entries: list[_Entry], unit: str, title: str) -> str:

@@ -16,14 +16,14 @@ __all__ = [
     "InvalidDesign",
     "InvalidInput",
     "MissingExtra",
+    "NotPossible",
     "NotWritten",
     "Range",
     "SoftreachError",
     "SoftreachWarning",
 ]
 
-_LONGEST = 300
-"""Characters of a value that an error shows."""
+_LONGEST = 300  # characters of a value that an error shows
 
 
 def counted(number: int, noun: str) -> str:
@@ -64,6 +64,13 @@ class InvalidInput(SoftreachError, ValueError):
         self.name, self.value, self.allowed = name, value, allowed
         message = f"{name} = {in_short(value)}: must be {allowed}"
         super().__init__(f"{message}; {hint}" if hint else message)
+
+
+class NotPossible(SoftreachError, ValueError):
+    """Something that cannot be done, although no single argument is wrong; one sentence says why.
+
+    The sentence says what stands in the way, and what to do.
+    """
 
 
 def check_date() -> None:

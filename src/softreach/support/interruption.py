@@ -9,15 +9,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-__all__ = ["INTERRUPTED", "check_stopped", "run_stoppable"]
-
 INTERRUPTED = "interrupted: nothing half-written was left behind"
 
-_came: list[int] = []  # signals that asked this process to end
+_came: list[int] = []  # signals to end this process
 
 
 def check_stopped() -> None:
-    """Raise KeyboardInterrupt if a signal has asked for the end; called once an item.
+    """Raise KeyboardInterrupt after a signal to end; called once an item.
 
     Python loses an exception that a handler of signals raises while a finalizer runs.
     """

@@ -1,11 +1,9 @@
-"""Attributes that are computed when first asked for, without a lock."""
+"""Attributes that are computed at their first use, without a lock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar, overload
-
-__all__ = ["lazy"]
 
 Result = TypeVar("Result")
 

@@ -1,4 +1,4 @@
-"""Free memory, and checks of what is asked of it."""
+"""Free memory, and the refusal of what needs more."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import sys
 from pathlib import Path
 
 from softreach.support.errors import InvalidInput
-
-__all__ = ["check_memory", "free_memory", "return_memory"]
 
 _UNKNOWN = 4e9  # where the system does not say
 _NOTICED = 1e8  # bytes; below, the system is not asked

@@ -5,19 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "BEST",
-    "BODY",
-    "MET",
-    "MISSED",
-    "STEEL",
-    "Color",
-    "activation_colors",
-    "bundle_color",
-    "eight_bit",
-    "material_fill",
-]
-
 Color = tuple[float, float, float]
 
 BODY: Color = (0.87, 0.85, 0.82)

@@ -18,11 +18,31 @@ from typing import Any, TypeVar
 
 from softreach.support.interruption import check_stopped
 
-__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count", "threads_here", "undivided"]
-
 Result = TypeVar("Result")
 
-_here = threading.local()
+
+class _Unwanted(BaseException):
+    """The result is no longer wanted; a task must not take this for a failure of its own."""
+
+
+class _Wanted:
+    def __init__(self, outer: _Wanted | None) -> None:
+        self.given_up, self._outer = False, outer
+
+    def check(self) -> None:
+        """Raise if this pool, or one that it was started in, was given up."""
+        if self.given_up:
+            raise _Unwanted
+        if self._outer is not None:
+            self._outer.check()
+
+
+class _Here(threading.local):
+    undivided = False
+    wanted: _Wanted | None = None
+
+
+_here = _Here()
 
 
 def thread_count() -> int:
@@ -37,7 +57,7 @@ def thread_count() -> int:
 
 def threads_here() -> int:
     """Number of threads that work begun on this one may be spread over: 1 where `undivided`."""
-    return 1 if getattr(_here, "undivided", False) else thread_count()
+    return 1 if _here.undivided else thread_count()
 
 
 def blocks(total: int, size: int) -> list[slice]:
@@ -56,7 +76,7 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
     """
     drawn = iter(tasks)
     first = list(islice(drawn, 2))
-    if len(first) < 2 or getattr(_here, "undivided", False):
+    if len(first) < 2 or _here.undivided:
         for task in chain(first, drawn):
             _check_wanted()
             task()
@@ -75,7 +95,7 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
 @contextmanager
 def undivided() -> Iterator[None]:
     """Let `run` call its tasks on this thread, which is one of several with work of their own."""
-    before, _here.undivided = getattr(_here, "undivided", False), True
+    before, _here.undivided = _here.undivided, True
     try:
         yield
     finally:
@@ -111,33 +131,10 @@ def meanwhile(task: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
         yield submit(task).result
 
 
-class _Unwanted(BaseException):
-    """Nobody waits for what this task computes; no task may take it for a failure of its own."""
-
-
-class _Wanted:
-    def __init__(self, outer: _Wanted | None) -> None:
-        self.given_up, self._outer = False, outer
-
-    def check(self) -> None:
-        """Raise if nobody does, here or where the pool itself was started."""
-        if self.given_up:
-            raise _Unwanted
-        if self._outer is not None:
-            self._outer.check()
-
-
-class _Here(threading.local):
-    wanted: _Wanted | None = None
-
-
-_HERE = _Here()
-
-
 def _check_wanted() -> None:
     check_stopped()
-    if _HERE.wanted is not None:
-        _HERE.wanted.check()
+    if _here.wanted is not None:
+        _here.wanted.check()
 
 
 Submit = Callable[[Callable[[], Result]], "Future[Result]"]
@@ -146,11 +143,11 @@ Submit = Callable[[Callable[[], Result]], "Future[Result]"]
 @contextmanager
 def _pool(threads: int) -> Iterator[Submit[Any]]:
     """Threads for a block; if it raises, what has not begun never does."""
-    wanted = _Wanted(_HERE.wanted)
+    wanted = _Wanted(_here.wanted)
 
     def called(task: Callable[[], Any]) -> Any:
         wanted.check()
-        _HERE.wanted = wanted
+        _here.wanted = wanted
         return task()
 
     pool = ThreadPoolExecutor(threads)
@@ -164,7 +161,6 @@ def _pool(threads: int) -> Iterator[Submit[Any]]:
 
 
 def _drain(pending: set[Future[object]]) -> set[Future[object]]:
-    """Wait for one task at least, raise what it raised, and return those still to come."""
     done, rest = wait(pending, return_when=FIRST_COMPLETED)
     for future in done:
         future.result()

@@ -18,8 +18,6 @@ from typing import Any
 import softreach
 from softreach.support.errors import InvalidInput
 
-__all__ = ["ACTUATORS", "METRICS", "PROFILES", "declared", "imported", "importing", "loaded"]
-
 ACTUATORS, PROFILES, METRICS = (
     f"softreach.{each}" for each in ("actuators", "profiles", "metrics")
 )

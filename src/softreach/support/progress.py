@@ -10,8 +10,6 @@ from contextlib import contextmanager, suppress
 
 from softreach.support.arguments import as_function
 
-__all__ = ["Progress", "as_progress", "bar", "hidden", "silent"]
-
 hidden = False
 """No bars and no lines; `softreach --quiet` sets it."""
 
@@ -87,6 +85,6 @@ class _Lines:
             self._told = now
             of_total = "" if self._total is None else f": {self._done:,} of {self._total:,}"
             minutes, seconds = divmod(round(now - self._begun), 60)
-            with suppress(OSError, ValueError):  # nobody reads it
+            with suppress(OSError, ValueError):  # standard error is closed
                 sys.stderr.write(f"{self._label()}{of_total}, {minutes}:{seconds:02} so far\n")
                 sys.stderr.flush()

@@ -7,19 +7,6 @@ import re
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
 
-__all__ = [
-    "columns",
-    "numbers_in",
-    "quantity",
-    "read_number",
-    "read_quantity",
-    "read_whole_number",
-    "round_above",
-    "round_below",
-    "sizes_in",
-    "unit_names",
-]
-
 _SMALLEST = 1e-3  # below it, numbers are written with a power of ten
 _FINEST = 1e-9  # of the value: what follows is rounding
 

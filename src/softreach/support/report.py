@@ -11,19 +11,17 @@ from os import PathLike
 from typing import Any
 
 from softreach.support.arguments import as_flag, as_path
-from softreach.support.errors import MissingExtra, counted
+from softreach.support.errors import counted
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
 from softreach.support.quantity import columns
 
-__all__ = ["REPORT", "Report", "Section", "check_libraries", "page_template", "png_source"]
+__all__ = ["REPORT", "Report", "Section", "check_libraries"]
 
 REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
 
 _DPI = 160
-_MOST_ROWS = 30
-"""Rows of a table that are printed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,11 +35,11 @@ class Section:
     note: str = ""
     points: Sequence[str] = ()
     figures: Callable[[], Iterable[tuple[Any, str]]] = tuple
-    """Draws figures of matplotlib, each with its caption."""
+    """Draws figures of matplotlib, or reads PNG files, each with its caption."""
     text: str = ""
     """Shown as it is, such as a design file."""
-    is_printed: bool = True
-    """Rows and points are among the lines; the rest is on the page alone."""
+    printed: int = 30
+    """Rows among the lines, with the points; with 0 all of it is on the page alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,17 +50,17 @@ class Report:
     verdict: str
     state: str
     """Kind of verdict, by which the page is colored: met, missed, undecided, noise and so on."""
-    facts: Sequence[str]
-    """Remarks on the whole."""
     sections: Sequence[Section]
+    facts: Sequence[str] = ()
+    """Remarks on the whole."""
 
     def __str__(self) -> str:
         lines = [self.verdict, *self.facts]
         for section in self.sections:
-            if section.is_printed:
-                rows = [section.head] * bool(section.head) + list(section.rows[:_MOST_ROWS])
+            if section.printed:
+                rows = [section.head] * bool(section.head) + list(section.rows[: section.printed])
                 lines += columns(rows) if section.rows else ()
-                if (more := len(section.rows) - _MOST_ROWS) > 0:
+                if (more := len(section.rows) - section.printed) > 0:
                     lines.append(f"... and {counted(more, 'more row')}")
                 lines += section.points
         return "\n  ".join(lines)
@@ -81,7 +79,7 @@ class Report:
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         format_of(path, REPORT)
         check_libraries()
-        template = page_template("softreach.support", "report.html.jinja")
+        template = _template()
         pictures = [[(_source(f), c) for f, c in part.figures()] for part in self.sections]
         page = template.render(report=self, parts=list(zip(self.sections, pictures, strict=True)))
         with writing(path, overwrite=overwrite) as file:
@@ -97,29 +95,23 @@ def check_libraries() -> None:
     check_installed(("matplotlib", "plot"), ("jinja2", "paper"))
 
 
-def page_template(package: str, name: str) -> Any:
-    """A page of a package to be filled, everything in it escaped.
+def _template() -> Any:
+    """The page to be filled, everything in it escaped."""
+    from jinja2 import Environment, StrictUndefined
 
-    Raises:
-        MissingExtra: Jinja2 is not installed.
-    """
-    try:
-        from jinja2 import Environment, StrictUndefined
-    except ModuleNotFoundError as error:
-        raise MissingExtra(("jinja2", "paper")) from error
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    return environment.from_string(files(package).joinpath(name).read_text(encoding="utf-8"))
-
-
-def png_source(image: bytes) -> str:
-    """Source of a PNG picture inside a page."""
-    return f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
+    text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
+    return Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True).from_string(
+        text
+    )
 
 
 def _source(figure: Any) -> str:
-    from matplotlib import pyplot as plt
+    """Source of a picture inside the page."""
+    if not isinstance(figure, bytes):
+        from matplotlib import pyplot as plt
 
-    image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=_DPI)
-    plt.close(figure)
-    return png_source(image.getvalue())
+        image = io.BytesIO()
+        figure.savefig(image, format="png", dpi=_DPI)
+        plt.close(figure)
+        figure = image.getvalue()
+    return f"data:image/png;base64,{base64.b64encode(figure).decode('ascii')}"

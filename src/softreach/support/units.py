@@ -14,20 +14,6 @@ if TYPE_CHECKING:
 
     from softreach.support.arrays import Array
 
-__all__ = [
-    "METER",
-    "TYPED",
-    "UNITS",
-    "LengthUnit",
-    "as_unit",
-    "handy_unit",
-    "in_lengths",
-    "lengths_in",
-    "read_length",
-    "readable",
-    "readable_unit",
-]
-
 UNITS = ("m", "cm", "mm", "L")
 """Names of the units; L is the length of an arm."""
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 
-__all__ = ["SCHEMA_VERSION", "versions"]
-
 SCHEMA_VERSION = 3
 """Of the names, dimensions and units of datasets."""
 

@@ -68,11 +68,12 @@ class ReachableSet(ABC):
     convex_volume_error: float = 0.0
     """Error of `convex_volume`, estimated from two grids [m³]."""
     lost_share: float = 0.0
-    """Share of the activation box that is left out, by volume [-]: cells of the activation grid
-    with a corner that has no stable equilibrium, or with neighbors on different branches. It
-    shrinks on finer grids toward the share of activations that have no stable equilibrium. For more
-    than three free bundles, which have no grid, this is what a sample of the box tells. 0 for an
-    arm without loads."""
+    """Share of the activation box at which no posture is held [-], told by the activation grid; for
+    more than three free bundles, which have no grid, by a sample. 0 for an arm without loads."""
+    hysteresis_share: float = 0.0
+    """Share of the activation box at which two postures are held, the one or the other by the way
+    that the arm has come [-]; mirror images of those that lean do not count. 0 where nothing tells:
+    for more than three free bundles, and in one plane."""
 
     @property
     def arm(self) -> Manipulator:
@@ -111,8 +112,10 @@ class ReachableSet(ABC):
 
         variables = self._numbers()
         if self.tip_map.supports_unstable:
-            meaning = "share of the activation box left out: no stable equilibrium, or torn"
-            variables["lost_share"] = ((), self.lost_share, {"units": "1", "long_name": meaning})
+            meanings = {"lost": "without a posture", "hysteresis": "with two postures"}
+            for name, meaning in meanings.items():
+                about = {"units": "1", "long_name": f"share of the activation box {meaning}"}
+                variables[f"{name}_share"] = ((), getattr(self, f"{name}_share"), about)
         attrs = {**provenance(self.arm, self.tip_map.frame), "tol": self.tip_map.tol}
         attrs |= {"activation_grid": self.cells} if self.cells else {}
         return xr.Dataset(variables, attrs=attrs | {"dimension": self.dimension})
@@ -120,8 +123,10 @@ class ReachableSet(ABC):
     def __repr__(self) -> str:
         size, *details = self._lines()
         if self.lost_share > 0.0:
-            share = f"{100 * self.lost_share:.2g} % of the activation box"
-            details.append(f"{share} left out: no stable equilibrium, or torn")
+            details.append(f"no posture is held at {100 * self.lost_share:.2g} % of activations")
+        if self.hysteresis_share > 0.0:
+            share = f"{100 * self.hysteresis_share:.2g} % of activations"
+            details.append(f"hysteresis: two postures are held at {share}")
         box, rod = self.tip_map.box, self.tip_map
         power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
         grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""

@@ -10,12 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
 
-from softreach.geometry.surface import Surface, level_set
+from softreach.geometry.surface import Surface, enclosed_volume, level_set
+from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Index
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.image import Image
 
+_AWAY, _EVENED, _FAR = 1.0, 0.7, 3.0  # cells: a level set, widths of a filter, and no farther
 _CLASSES = 4  # every other line along both directions
 
 
@@ -41,6 +44,37 @@ def _level_set(image: Image, level: float) -> Surface:
         return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
     vertices, faces = level_set(field, level)
     return Surface(vertices=lattice.origin + lattice.cell * vertices, faces=faces)
+
+
+def wrapped_surface(image: Image, volume: float) -> Surface:
+    """A closed surface around a volume without teeth and holes, however thin and rough parts are.
+
+    It is the level set one cell away from the image, evened out, each of whose vertices is then
+    moved back along its normal, all as far, until the stated volume is enclosed. Gaps below two
+    cells are filled.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    lattice = image.lattice
+    vertices, faces = level_set(gaussian_filter(_distances(image), _EVENED), _AWAY)
+    places = lattice.origin + lattice.cell * vertices
+    back = _AWAY * lattice.cell * vertex_normals(places, faces)
+    far, near = (enclosed_volume(places - part * back, faces) for part in (0.0, 1.0))
+    part = float(np.clip((far - volume) / (far - near), 0.5, 1.5))
+    return Surface(vertices=places - part * back, faces=faces)
+
+
+def _distances(image: Image) -> Array:
+    """From cell centers to an image, 0 inside, in cells up to three."""
+    covered, surface = image.counts[0] > 0, image.critical_surface
+    near = covered & ~binary_erosion(covered)
+    near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
+    near = binary_dilation(near, np.ones((3, 3, 3)), iterations=2) & ~covered
+    centers = image.lattice.origin + image.lattice.cell * np.argwhere(near)
+    distances = np.where(covered, 0.0, _FAR)
+    distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)
+    return distances
 
 
 @dataclass(frozen=True, eq=False)

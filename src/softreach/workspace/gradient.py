@@ -110,7 +110,7 @@ def gradient_of(
         raise InvalidInput("arm", "a set without a volume", "one of three free bundles or more")
     parameter_of = find_parameters(solid.arm, names)
     wanted = [parameter_of[name] for name in names]
-    if solid.lost_share > 0.0:
+    if solid.is_torn or solid.lost_share > 0.0:
         volume, convex = _by_differences(solid, wanted, accuracy, progress)
     else:
         volume, convex = _swept(solid, wanted, accuracy, progress)

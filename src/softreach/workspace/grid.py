@@ -63,44 +63,37 @@ def grid_tips(
     return tips
 
 
-def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: Mask) -> Array:
+def grid_stretches(rod: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
     """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
 
-    From differences of the tips, and by J itself where these might have the wrong sign, as well as
-    at the corners of cells that are left out, and everywhere if the map has kinks.
+    From differences of the tips, and by J itself where these might have the wrong sign, and
+    everywhere if the map has kinks.
 
     Args:
         rod: The tip map.
-        tips: From `grid_tips`.
+        tips: Of the vertices [m].
         cells: Number of cells along each axis.
-        left_out: Cells over which no differences can be taken, shape (cells, cells, cells).
+        is_lifted: Cells that are not mapped by their vertices, shape (cells, cells, cells).
 
     Returns:
-        Shape ((cells + 1)³,); 0 where there is no stable equilibrium.
+        Shape ((cells + 1)³,); 0 at vertices of no other cells.
     """
-    determinants = stretches(tips, np.array([cells] * 3))
+    used = corners_of(~is_lifted).ravel()
+    determinants = np.where(used, stretches(tips, np.array([cells] * 3)), 0.0)
     determinants *= cells**3 / (8.0 * rod.box.volume)
-    unsure = corners_of(left_out).ravel()
-    largest = _largest(rod, np.abs(determinants[~unsure]))
-    unsure |= np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
-    small = np.flatnonzero(unsure | (not rod.is_smooth))
-    small = small[np.isfinite(tips[small, 0])]
+    share = _NEARLY_ALL if rod.supports_unstable else 1.0  # |det J| grows toward instability
+    largest = float(np.quantile(np.abs(determinants[used]), share)) if used.any() else 0.0
+    unsure = np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
+    small = np.flatnonzero((unsure | (not rod.is_smooth)) & used)
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
     determinants[small] = _stretch(rod, rod.box.from_free_cube(places))
     determinants[~np.isfinite(determinants)] = 0.0
     return determinants
 
 
-def _largest(rod: TipMap, stretch: Array) -> float:
-    """The largest |det J|; nearly so where it has no bound, as it grows toward instability."""
-    if rod.supports_unstable and len(stretch):
-        return float(np.quantile(stretch, _NEARLY_ALL))
-    return float(stretch.max(initial=0.0))
-
-
-def cube_grid(cells: int) -> Array:
-    """Vertices of a grid of cells³ boxes over the unit cube, in C order, shape (n, 3)."""
-    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
+def cube_grid(cells: int, m: int = 3) -> Array:
+    """Vertices of a grid of cells^m boxes over the unit cube, in C order, shape (n, m)."""
+    return np.indices((cells + 1,) * m).reshape(m, -1).T / cells
 
 
 def corners_of(cells: Mask) -> Mask:
@@ -109,13 +102,6 @@ def corners_of(cells: Mask) -> Mask:
         none = np.zeros_like(np.take(cells, [0], axis))
         cells = np.concatenate([cells, none], axis) | np.concatenate([none, cells], axis)
     return cells
-
-
-def every_second(values: Array, cells: int, m: int) -> Array:
-    """Values at the vertices of the grid of half as many cells."""
-    fields = values.shape[1:]
-    every = values.reshape(*(cells + 1,) * m, *fields)[(slice(None, None, 2),) * m]
-    return np.ascontiguousarray(every).reshape(-1, *fields)
 
 
 def image_measure(rod: TipMap, nodes: int) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.geometry.surface import Surface, compact_surface
+from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
 from softreach.kernels.image import contour, raster
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
@@ -280,52 +281,64 @@ def image_of(
     lattice: Lattice,
     progress: Progress = silent,
     *,
-    left_out: Mask | None = None,
+    is_lifted: Mask | None = None,
+    lifted: Index | None = None,
 ) -> Image:
     """The image of a grid of boxes whose vertices go to `points`.
 
     Args:
-        points: Mapped vertices [m] in the C order of the grid, shape (prod(cells + 1), 3).
+        points: Mapped vertices [m] in the C order of the grid, then others, shape (v, 3).
         stretches: det J at the vertices up to a positive factor, shape (prod(cells + 1),).
         cells: Number of boxes along each of the three axes.
         lattice: Cells to rasterize on.
         progress: Called with the number of vertices done since its last call.
-        left_out: Boxes that have no image, shape `cells`; points that are corners of no other box
+        is_lifted: Boxes in whose place others are, shape `cells`; points that are corners of no box
             may be NaN. None by default.
+        lifted: Vertices at the corners of the others, in the order of their bits, shape (k, 8).
     """
     scaled = lattice.coordinates(points)
-    gaps = np.zeros(cells, bool) if left_out is None else left_out
-    grid = scaled.reshape(*(n + 1 for n in cells), 3)
-    longest = max(float(np.sum([_longest_edge(grid, gaps, axis) for axis in range(3)])), 1.0)
+    gaps = np.zeros(cells, bool) if is_lifted is None else is_lifted
+    others = np.empty((0, 8), np.int64) if lifted is None else lifted
+    grid = scaled[: len(stretches)].reshape(*(n + 1 for n in cells), 3)
+    steps = [np.nanmax(np.abs(np.diff(grid, axis=axis))) for axis in range(3)]
+    longest = max(float(np.sum(steps)), 1.0)
+    longest = max(longest, float(np.ptp(scaled[others], axis=1).sum(axis=1).max(initial=0.0)))
     # Determinants of the kernels are then exact, as rounding adds no more than 1 unit.
     unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
     vertices = np.rint(scaled * unit)
     vertices[np.isnan(vertices)] = 0.0
-    return Image(
-        lattice=lattice,
-        unit=unit,
-        vertices=vertices,
-        triangles=_critical_triangles(vertices, stretches, gaps, progress),
-    )
+    triangles = _critical_triangles(vertices[: len(stretches)], stretches, gaps, progress)
+    if len(others):
+        triangles = np.concatenate([triangles, _lifted_triangles(vertices, others)])
+    return Image(lattice=lattice, unit=unit, vertices=vertices, triangles=triangles)
 
 
-def _longest_edge(grid: Array, left_out: Mask, axis: int) -> float:
-    """The largest change of a coordinate along edges of the boxes that have an image."""
-    steps = np.abs(np.diff(grid, axis=axis))
-    if not left_out.any():
-        return float(steps.max())
-    used = np.pad(~left_out, [(int(other != axis),) * 2 for other in range(3)])
-    for other in {0, 1, 2} - {axis}:
-        rows = np.moveaxis(used, other, 0)
-        used = np.moveaxis(rows[:-1] | rows[1:], 0, other)
-    return float(steps[used].max(initial=0.0))
+def _lifted_triangles(vertices: Array, cells: Index) -> Index:
+    """Critical triangles of cells by themselves; those that they share with equals cancel."""
+    parts, simplices = list[Index](), kuhn_simplices(3)
+    boxes = np.linalg.det(np.diff(corner_bits(3)[simplices], axis=1))
+    for simplex, box in zip(simplices, np.rint(boxes).astype(int), strict=True):
+        for apex in range(4):
+            faces = np.sort(cells[:, np.delete(simplex, apex)], axis=1)
+            a, b, c = np.moveaxis(vertices[faces], 1, 0)
+            away = vertices[cells[:, simplex[apex]]] - a
+            side = np.sign(np.einsum("ni,ni->n", np.cross(b - a, c - a), away)).astype(int)
+            a, b, c = np.moveaxis(vertices[cells[:, simplex[1:]]], 1, 0) - vertices[cells[:, 0]]
+            turn = np.sign(np.einsum("ni,ni->n", np.cross(a, b), c)).astype(int) * box
+            parts.append(np.column_stack([faces, side, side * turn]))
+    rows = np.concatenate(parts)
+    faces, number = np.unique(rows[:, :3], axis=0, return_inverse=True)
+    sums = [np.bincount(number.ravel(), column) for column in rows[:, 3:].T]
+    balance = np.stack(sums, axis=1).astype(np.int64)
+    kept = balance.any(axis=1)
+    return np.concatenate([faces[kept], balance[kept]], axis=1)
 
 
 def _critical_triangles(
-    vertices: Array, stretches: Array, left_out: Mask, progress: Progress
+    vertices: Array, stretches: Array, is_lifted: Mask, progress: Progress
 ) -> Index:
-    star, axes = contour.stars(left_out.shape), np.array(left_out.shape)
-    gaps = np.pad(left_out, [(0, 1)] * 3).ravel()  # of the cells whose least vertex this is
+    star, axes = contour.stars(is_lifted.shape), np.array(is_lifted.shape)
+    gaps = np.pad(is_lifted, [(0, 1)] * 3).ravel()  # of the cells whose least vertex this is
     largest = np.abs(stretches).max() or 1.0
     stretches = np.rint(stretches / largest * 2.0**_STRETCH_BITS)
     blocks = parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles)))

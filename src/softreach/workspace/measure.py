@@ -59,31 +59,26 @@ def solid_volume(
     return Estimate(value, signed.error + abs(removed) + at_fine.error)
 
 
-def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) -> Estimate:
-    """Volume of the image of a part of a box [m³], where no integral over all of it is known.
+def torn_volume(fine: Image, half: Image, third: Image) -> Estimate:
+    """Volume of the images of several sheets [m³], where no integral over the box is known.
 
     As `solid_volume`, with the signed volume of the mapped tetrahedra for the integral of det J.
-    What that errs by, O(1/n²), is removed as far as the cells tell that both grids hold. All that
-    is removed is part of the error, and so is half of what cells at the edge of the part are taken
-    to reach.
+    Inside of sheets these err by O(1/n²), and at their edges by O(1/n), more or less by how the
+    edges meet the grid. Half of what the finer grid changes is added, and all of it is the error.
 
     Args:
-        fine: Image of the cells of the grid that are not left out.
-        common: Image of those of them that the coarse grid holds too.
-        coarse: The same from a grid of half as many cells.
-        remainder: Volume that cells at the edge reach beside [m³].
+        fine: Image of the grid of n cells.
+        half: Of half as many cells.
+        third: Of a third of them, whose change counts by half.
     """
     sense = 1 if _signed_volume(fine) >= 0 else -1
-    at_fine, at_common, at_coarse = (_covered(image, sense) for image in (fine, common, coarse))
-    removed = (at_common.value - at_coarse.value) / 3.0
-    unknown = 0.0 if at_coarse.value > 0.0 else at_fine.value  # nothing to compare with
-    error = abs(removed) + at_fine.error + 0.5 * remainder + unknown
-    return Estimate(at_fine.value + removed + remainder, error)
+    value, *rough = (_covered(image, sense) for image in (fine, half, third))
+    changes = [(value.value - each.value) / k for k, each in enumerate(rough, 1)]
+    change = max(changes, key=abs)
+    return Estimate(value.value + 0.5 * change, abs(change) + value.error)
 
 
-def multiply_covered(
-    fine: Image, coarse: Image, common: Image | None = None
-) -> tuple[dict[int, float], float]:
+def multiply_covered(fine: Image, coarse: Image) -> tuple[dict[int, float], float]:
     """Volume of the places that a given number of activations, 2 or more, reach [m³].
 
     A number whose volume is below the error, or changes by more than itself on half as fine a
@@ -92,7 +87,6 @@ def multiply_covered(
     Args:
         fine: Of n cells along each axis.
         coarse: Of half as many.
-        common: Image of the fine cells that the coarse grid holds too, if not all of them are.
 
     Returns:
         The volumes, and by how much their sum changes on half as fine a grid.
@@ -101,12 +95,11 @@ def multiply_covered(
     def by_cover(spans: Spans) -> ArrayLike:
         return np.bincount(spans.cover, spans.length)
 
-    images = (fine, fine if common is None else common, coarse)
-    covers = [_mean(image, by_cover) for image in images]
+    covers = [_mean(image, by_cover) for image in (fine, coarse)]
     size = max(*(len(cover) for cover in covers), 3)
-    volumes, same, rough = (np.pad(v, (0, size - len(v)))[2:] for v in covers)
-    error = float(abs(same.sum() - rough.sum()))
-    sure = np.maximum(np.abs(same - rough), error) < volumes
+    volumes, rough = (np.pad(v, (0, size - len(v)))[2:] for v in covers)
+    error = float(abs(volumes.sum() - rough.sum()))
+    sure = np.maximum(np.abs(volumes - rough), error) < volumes
     sure[0] = True
     measures, unsure = {}, 0.0
     for number in range(size - 1, 1, -1):
@@ -123,7 +116,7 @@ def fold_volume(image: Image) -> float:
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
     """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
-    return extrapolated_hull(outer_places(fine), outer_places(coarse))
+    return extrapolated_hull(*(image.places[outer_vertices(image)] for image in (fine, coarse)))
 
 
 def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
@@ -134,22 +127,6 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
     fine, coarse = convex_hull(points).volume, convex_hull(fewer).volume
     removed = (fine - coarse) / 3.0
     return Estimate(fine + removed, _LEFT * abs(removed))
-
-
-def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:
-    """The same of a part of a box, and of some tips beside it [m], shape (n, 3)."""
-    corners = outer_places(fine)
-    value = convex_hull(np.concatenate([corners, tips])).volume
-    removed = (
-        convex_hull(outer_places(common)).volume - convex_hull(outer_places(coarse)).volume
-    ) / 3.0
-    error = abs(removed) + value - convex_hull(corners).volume
-    return Estimate(value + removed, error)
-
-
-def outer_places(image: Image) -> Array:
-    """Places [m] of `outer_vertices`, shape (n, 3)."""
-    return image.places[outer_vertices(image)]
 
 
 def outer_vertices(image: Image) -> Index:

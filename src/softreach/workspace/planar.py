@@ -140,7 +140,7 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
         convex_area=convex.value,
         convex_area_error=convex.error,
         lost_share=lost_share(rod),
-        outline=threads(plane.places(found.tips), found.edges[:, 0]),
+        outline=threads(plane.places(found.tips), found.edges),
         mapped_grid=_mesh(found, plane),
     )
 

@@ -8,17 +8,17 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import effective, tip_map
-from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
+from softreach.rod.tip_map import Frame, TipMap
 from softreach.support.arguments import POSITIVE, as_number
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.abstract_set import ReachableSet
-from softreach.workspace.discontinuities import coarser, finer, left_out_cells, remainder
 from softreach.workspace.flux import grid_faces, signed_volume
-from softreach.workspace.grid import corners_of, every_second, grid_stretches, grid_tips
+from softreach.workspace.grid import grid_stretches
 from softreach.workspace.image import Image, Lattice, image_of
+from softreach.workspace.lifted_grid import LiftedGrid
 from softreach.workspace.planar import planar_set, plane_of_tips
 from softreach.workspace.redundant import lost_share, searched_set
 from softreach.workspace.solid import ReachableSolid
@@ -26,6 +26,8 @@ from softreach.workspace.thin import thin_set
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26
+_QUICK = 24  # cells, up to which sheets take no time
+_TORN = 2.0  # times the error asked for, with which they are left then
 
 ACCURACIES = Range(1e-6, 0.2)
 """Relative errors of a volume that can be asked for."""
@@ -66,9 +68,9 @@ def reachable_set(
     activation that reaches it; parts that no search meets may be missing, gaps below 1.5 h are
     filled. The convex volume lies between the hull of tips and the planes that none goes beyond.
 
-    Under loads only stable equilibria count as reached. Where the activation box has none, or the
-    arm snaps from one to another, cells are left out and never bridged: `lost_share` tells their
-    share of the box. What they still reach at the edge is estimated, and is part of the error.
+    Under loads all postures count that are held without a snap from rest, on all their sheets and
+    up to the edges of these: `hysteresis_share` tells where two are held, `lost_share` where none
+    is. Of more bundles than three, and in one plane, only the posture of each activation does.
 
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
@@ -147,7 +149,7 @@ def rasterized_set(
         progress: Called with the number of grid vertices done since its last call.
 
     Raises:
-        InvalidInput: All cells of the grid are left out, or memory does not hold those in space.
+        InvalidInput: No activation has a stable equilibrium, or memory does not hold the cells.
     """
     grid = _Grid.of(rod, cells, progress)
     return _by_raster(rod, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
@@ -156,16 +158,15 @@ def rasterized_set(
 def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
     """True if the volume errs by more than asked, and grids that memory holds may be fine enough.
 
-    Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
+    Of several sheets the error falls as 1/n and no faster: twice what is asked has to do for them,
+    but on grids that take no time.
     """
-    if solid.volume_error <= accuracy * solid.volume:
-        return False
-    cells = 2 * solid.cells
-    while solid.lost_share > 0.0 and solid.volume_error > accuracy * solid.volume * (
-        cells / solid.cells
-    ):
-        cells *= 2
-    return (cells + 1) ** 3 <= _MOST_VERTICES
+    cells, wanted = 2 * solid.cells, accuracy * solid.volume
+    if solid.is_torn and solid.cells > _QUICK:
+        wanted *= _TORN
+    return solid.volume_error > wanted and (cells + 1) ** 3 <= _MOST_VERTICES / (
+        4.0 if solid.is_torn else 1.0
+    )
 
 
 def _of_three(
@@ -186,9 +187,9 @@ def _of_three(
 
 def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
     """The solid of an image that is one to one, by what flows through the faces of the box."""
-    cells, flux = len(grid.left_out), signed_volume(rod)
+    cells, flux = grid.cells, signed_volume(rod)
     faces = np.rint(grid_faces(cells) * cells).astype(int)
-    tips = grid.tips[np.ravel_multi_index(tuple(faces.T), (cells + 1,) * 3)]
+    tips = grid.lifted.tips[np.ravel_multi_index(tuple(faces.T), (cells + 1,) * 3)]
     convex = measure.extrapolated_hull(tips, tips[(faces % 2 == 0).all(axis=1)])
     return ReachableSolid(
         tip_map=rod,
@@ -196,6 +197,7 @@ def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
         volume=abs(flux.value),
         volume_error=flux.error,
         multiplicity={1: abs(flux.value)},
+        multiplicity_error=0.0,
         fold_volume=0.0,
         route="flux",
         convex_volume=convex.value,
@@ -205,26 +207,28 @@ def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
 
 
 def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> ReachableSolid:
-    """The solid of any image; without the integral over the box where parts of it are left out."""
-    coarse, common = grid.every_second().image(fine.lattice), None
-    volume = convex = measure.Estimate(np.nan, np.nan)
-    if not grid.left_out.any():
+    """The solid of any image; without the integral over the box where it has several sheets."""
+    coarse = grid.coarser(rod).image(fine.lattice)
+    volume, convex = measure.Estimate(np.nan, np.nan), measure.convex_volume(fine, coarse)
+    if not grid.lifted.is_torn:
         volume = measure.solid_volume(rod, fine, coarse, accuracy)
-        convex = measure.convex_volume(fine, coarse)
+    several, change = measure.multiply_covered(fine, coarse)
     if np.isnan(volume.value):
-        common = grid.in_common().image(fine.lattice)
-        rest, tips = remainder(rod, fine, grid.stretches, grid.left_out)
-        volume = measure.partial_volume(fine, common, coarse, rest)
-        convex = measure.partial_convex_volume(fine, common, coarse, tips)
-    several, change = measure.multiply_covered(fine, coarse, common)
+        third = _Grid.of(rod, grid.cells // 3).image(fine.lattice)
+        volume = measure.torn_volume(fine, coarse, third)
+    else:  # a fold out of place errs by as much in both
+        volume = volume._replace(error=volume.error + change)
     return ReachableSolid(
         tip_map=rod,
-        cells=len(grid.left_out),
+        cells=grid.cells,
         volume=volume.value,
-        volume_error=volume.error + change,  # a fold out of place errs by as much in both
+        volume_error=volume.error,
         multiplicity={1: volume.value - sum(several.values()), **several},
+        multiplicity_error=max(volume.error, change),
         fold_volume=measure.fold_volume(fine),
-        lost_share=float(grid.left_out.mean()),
+        lost_share=grid.lifted.lost_share,
+        hysteresis_share=grid.lifted.hysteresis_share,
+        is_torn=grid.lifted.is_torn,
         route="raster",
         convex_volume=convex.value,
         convex_volume_error=convex.error,
@@ -236,32 +240,29 @@ def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> Reacha
 class _Grid(NamedTuple):
     """The mapped vertices of a grid of three bundles."""
 
-    tips: Array
-    """[m], shape ((n + 1)³, 3)."""
+    lifted: LiftedGrid
     stretches: Array
     """det J, shape ((n + 1)³,)."""
-    left_out: Mask
-    """Cells without an image, shape (n, n, n)."""
 
     @classmethod
-    def of(cls, rod: TipMap, cells: int, progress: Progress) -> _Grid:
+    def of(cls, rod: TipMap, cells: int, progress: Progress = silent) -> _Grid:
         """The grid of cells³ boxes over the activation box."""
-        tips = grid_tips(rod, cells, progress)
-        left_out = left_out_cells(rod, tips, cells)
-        return cls(tips, grid_stretches(rod, tips, cells, left_out), left_out)
+        lifted = LiftedGrid.of(rod, cells, progress)
+        tips = lifted.tips[: (cells + 1) ** 3]
+        return cls(lifted, grid_stretches(rod, tips, cells, lifted.is_lifted))
+
+    @property
+    def cells(self) -> int:
+        """Along each axis."""
+        return len(self.lifted.is_lifted)
 
     def lattice(self, cell: float | None, accuracy: float) -> Lattice:
         """Cells in space around the image, of an edge by the rule for h if `cell` is None [m].
 
         Raises:
-            InvalidInput: All cells of the grid are left out, or memory does not hold those in
-                space.
+            InvalidInput: Memory does not hold the cells in space.
         """
-        used = corners_of(~self.left_out).ravel()
-        if not used.any():
-            fault = f"no cell of an activation grid of {len(self.left_out)}³ has a stable, untorn "
-            raise loads_too_heavy(fault + "image")
-        tips = self.tips[used]
+        tips = self.lifted.tips[np.isfinite(self.lifted.tips[:, 0])]
         sides = np.ptp(tips, axis=0)
         if cell is None:
             edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
@@ -274,7 +275,7 @@ class _Grid(NamedTuple):
         return Lattice.around(tips, float(cell))
 
     def is_one_to_one(self, image: Image) -> bool:
-        """True if no place of the image is found to be reached twice; none may be left out.
+        """True if no place of the image is found to be reached twice.
 
         det J keeps its sign at the vertices, and no line of sight meets a second layer, or one that
         both orientations cover. Pieces that none covers may have a degree: walls thinner than the
@@ -286,17 +287,15 @@ class _Grid(NamedTuple):
         )
 
     def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
-        """Image of the cells that are not left out."""
-        n = len(self.left_out)
-        tips, stretches, left_out = self
-        return image_of(tips, stretches, (n, n, n), lattice, progress, left_out=left_out)
+        """Image of all cells."""
+        n, (grid, stretches) = self.cells, self
+        lifted = {"is_lifted": grid.is_lifted, "lifted": grid.lifted}
+        return image_of(grid.tips, stretches, (n, n, n), lattice, progress, **lifted)
 
-    def every_second(self) -> _Grid:
-        """The grid of half as many cells, without those of which a part is left out."""
-        n = len(self.left_out)
-        tips, stretches = (every_second(values, n, 3) for values in (self.tips, self.stretches))
-        return _Grid(tips, stretches, coarser(self.left_out))
-
-    def in_common(self) -> _Grid:
-        """The grid without all cells that `every_second` leaves out."""
-        return self._replace(left_out=finer(coarser(self.left_out)))
+    def coarser(self, rod: TipMap) -> _Grid:
+        """The grid of half as many cells."""
+        n = self.cells
+        if self.lifted.is_torn:
+            return _Grid.of(rod, n // 2)
+        every_second = self.stretches.reshape((n + 1,) * 3)[::2, ::2, ::2]
+        return _Grid(self.lifted.coarser(rod), every_second.ravel())

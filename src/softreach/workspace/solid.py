@@ -16,7 +16,7 @@ from softreach.support.errors import MissingExtra
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
-from softreach.workspace.boundary import boundary_surface
+from softreach.workspace.boundary import boundary_surface, wrapped_surface
 from softreach.workspace.cells import ReachedCells
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import DIAGONAL, Image
@@ -65,6 +65,9 @@ class ReachableSolid(ReachableSet):
     multiplicity: Mapping[int, float] = field(default_factory=dict)
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""
+    multiplicity_error: float = np.nan
+    """Error of the volume reached more than once [m³]; 0 for the route "flux", NaN for more than
+    three free bundles."""
     fold_volume: float = np.nan
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     NaN for more than three free bundles."""
@@ -73,18 +76,12 @@ class ReachableSolid(ReachableSet):
     flows through the images of the six faces of the activation box. "raster": the image folds or
     overlaps, or may do so under loads and at kinks; a signed volume by flux makes it exact
     elsewhere. "search": more than three free bundles."""
+    is_torn: bool = False
+    """True if the set is the image of several sheets of postures."""
     image: Image | ReachedCells = field(repr=False)
     """The mapped activation grid, rasterized; of more than three bundles what was found."""
     coarse_image: Image | None = field(default=None, repr=False)
     """The image of half as fine a grid, for the route "raster"."""
-
-    @property
-    def multiplicity_error(self) -> float:
-        """Error of the volume reached more than once [m³]; NaN for more than three free bundles.
-
-        The same as that of the volume itself, and 0 for the route "flux".
-        """
-        return {"flux": 0.0, "raster": self.volume_error, "search": np.nan}[self.route]
 
     @property
     def fold_volume_error(self) -> float:
@@ -238,9 +235,9 @@ class ReachableSolid(ReachableSet):
     def _boundary(self) -> Surface:
         if isinstance(self._covering, ReachedCells):
             return self._covering.wrap
+        if self.tip_map.supports_unstable:
+            return wrapped_surface(self._covering, self.volume)
         surface, cell = boundary_surface(self._covering, self.volume), self.image.lattice.cell
-        if self.lost_share or self.tip_map.supports_unstable:
-            return surface
         corners = self.tip_map.tips(self.tip_map.box.corners())
         outer = corners[~self._covering.are_deep(corners)]
         if (surface.distance(outer) > DIAGONAL * cell).any():  # a spike that no center is in
@@ -251,7 +248,7 @@ class ReachableSolid(ReachableSet):
     def _covering(self) -> Image | ReachedCells:
         """What tells inside from outside: of sets that are thin to the raster, a search instead."""
         cell, length = self.image.lattice.cell, self.tip_map.length
-        may_be = not self.lost_share and self.volume <= _NEVER_THIN * length**3
+        may_be = not self.is_torn and self.volume <= _NEVER_THIN * length**3
         if may_be and isinstance(self.image, Image):
             least = max(_SEEN * cell, _CHORDS * length / self.cells**2)
             if 2.0 * self.volume <= least * self._boundary_area().value:  # not of NaN

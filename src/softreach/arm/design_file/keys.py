@@ -6,7 +6,6 @@ is lost either way.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -35,7 +34,7 @@ from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Measured, Ring, Section
 from softreach.arm.stations import Marker, RigidPiece
 from softreach.support import plugins
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean, warn
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
 __all__ = [
     "ACTUATORS",
@@ -50,16 +49,12 @@ __all__ = [
     "field_keys",
     "in_file_terms",
     "in_file_units",
-    "inline_table",
-    "key_text",
     "keys_of",
     "known_kinds",
     "one_a_path",
     "own_kind",
     "own_kinds",
     "radians",
-    "unknown_key",
-    "value_text",
 ]
 
 PROFILES: Mapping[str, type[Profile]] = MappingProxyType(
@@ -133,17 +128,6 @@ def keys_of(kind: type) -> Mapping[str, Key]:
 def field_keys(kind: type) -> dict[str, str]:
     """Field -> key."""
     return {key.field: name for name, key in keys_of(kind).items()}
-
-
-def unknown_key(name: str, keys: Mapping[str, str]) -> str:
-    """Message for a key that a table does not have.
-
-    Args:
-        name: The key.
-        keys: Field -> key of the table.
-    """
-    hint = did_you_mean(keys.get(name, name), keys.values())
-    return f"unknown key; {hint or 'known keys: ' + ', '.join(keys.values())}"
 
 
 def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
@@ -317,32 +301,3 @@ def _decimal_text(number: str) -> str:
     plain = -6 < Decimal(number).adjusted() < 16
     text = f"{Decimal(number):f}" if plain else number
     return text if "." in text or "e" in text else f"{text}.0"
-
-
-def value_text(value: Any) -> str:
-    """Text, numbers, truth values and sequences of them as JSON, which is TOML but for a character.
-
-    Raises:
-        TypeError: Another kind of value.
-        ValueError: A number that is not finite.
-    """
-    if not _is_plain(value):
-        raise TypeError(f"{type(value).__name__} has no text in TOML")
-    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
-
-
-def _is_plain(value: Any) -> bool:
-    if isinstance(value, list | tuple):
-        return all(_is_plain(item) for item in value)
-    return isinstance(value, str | int | float)
-
-
-def key_text(name: str) -> str:
-    """A key, in quotes where it needs them."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else value_text(name)
-
-
-def inline_table(pairs: Iterable[tuple[str, str]]) -> str:
-    """A table on one line from keys and texts of values."""
-    inside = ", ".join(f"{key} = {text}" for key, text in pairs)
-    return f"{{ {inside} }}" if inside else "{}"

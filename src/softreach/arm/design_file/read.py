@@ -25,13 +25,11 @@ from softreach.arm.design_file.keys import (
     WrittenFloat,
     field_keys,
     in_file_terms,
-    key_text,
     keys_of,
     known_kinds,
     one_a_path,
     own_kind,
     radians,
-    unknown_key,
 )
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
@@ -43,7 +41,9 @@ from softreach.arm.rest_shape import RestShape
 from softreach.arm.section import Measured, Ring, Section
 from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
-from softreach.support.files.text import read_text, tables_of
+from softreach.support.files import toml
+from softreach.support.files.text import read_text
+from softreach.support.files.toml import WRONG, FaultReader, key_text, unknown_key
 
 __all__ = ["LONGEST", "document_of", "read", "text_of"]
 
@@ -71,9 +71,6 @@ LAYOUT: Mapping[str, tuple[type, Any, bool]] = {
 
 Arm = TypeVar("Arm")
 
-_WRONG: Any = object()
-"""In place of a value that has faults."""
-
 
 def text_of(path: str | PathLike[str]) -> str:
     """The text of a design file.
@@ -97,13 +94,7 @@ def document_of(
     Raises:
         InvalidDesign: Text that is no TOML, or too long to be a design.
     """
-    if len(text) > LONGEST:
-        allowed = f"must be at most {LONGEST:,} characters long, and has {len(text):,}"
-        raise InvalidDesign([Fault("TOML", None, allowed)], source)
-    try:
-        return tables_of(text, number)
-    except ValueError as error:
-        raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
+    return toml.document_of(text, LONGEST, source, number)
 
 
 def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
@@ -134,11 +125,11 @@ def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     return arm
 
 
-class _Reader:
+class _Reader(FaultReader):
     """Makes the parts of an arm of tables, and gathers the faults."""
 
     def __init__(self, document: dict[str, Any]) -> None:
-        self.faults: list[Fault] = []
+        super().__init__()
         self.places: dict[str, Place] = {}
         self._document = document
         self._materials: dict[str, Material | None] = {}
@@ -151,11 +142,11 @@ class _Reader:
             self._refuse("actuators", f"{len(listed):,} tables", f"must be at most {MOST_BUNDLES}")
             return {}
         fields: dict[str, Any] = {"profile": self._alone("profile", Profile)}
-        for name, raw in self._table("materials").items():
+        for name, raw in self._at_top("materials").items():
             path = f"materials.{key_text(name)}"
             self._materials[name] = self._part(Material, raw, path, ("name",), name=name)
         fields["section"] = self._section()
-        places = {"places": self._table("stations")}
+        places = {"places": self._at_top("stations")}
         fields["stations"] = self._made(Stations, Place("stations"), places)
         for name in ("actuators", "rigid_pieces", "drives", "markers"):
             fields[name] = self._several(name, LAYOUT[name][1])
@@ -169,11 +160,11 @@ class _Reader:
     def _alone(self, name: str, kind: type[Part]) -> Any:
         """The part of a table at the top, if there is one."""
         is_there = isinstance(self._document.get(name), dict)
-        return self._any(kind, self._table(name), name) if is_there else None
+        return self._any(kind, self._at_top(name), name) if is_there else None
 
     def _several(self, name: str, kind: type[Part]) -> tuple[Any, ...]:
         """The sound parts of a list of tables, and where they stand by their paths in the arm."""
-        paths = [(f"{name}[{k}]", raw) for k, raw in self._tables(name)]
+        paths = [(f"{name}[{k}]", raw) for k, raw in self._listed(name)]
         each = [(path, self._any(kind, raw, path)) for path, raw in paths]
         sound = [(self.places[path], part) for path, part in each if part is not None]
         parts = [part for _, part in sound]
@@ -229,7 +220,7 @@ class _Reader:
         for name, key in keys.items():
             if name in raw and key.field in values:
                 allowed = f"give exactly one of {key.field} (a name) and {name}"
-                values[key.field] = self._refuse(f"{path}.{name}", raw[name], allowed) or _WRONG
+                values[key.field] = self._refuse(f"{path}.{name}", raw[name], allowed) or WRONG
             elif name in raw:
                 values[key.field] = self._value(kind, key, raw[name], f"{path}.{name}")
             elif key.required and key.field not in values:
@@ -238,7 +229,7 @@ class _Reader:
         allowed = {*keys, "kind"} if issubclass(kind, tuple(KINDS)) else {*keys}
         for name in (name for name in raw if name not in allowed):
             self._refuse(f"{path}.{name}", raw[name], unknown_key(name, known))
-        wrong = {field for field, value in values.items() if value is _WRONG}
+        wrong = {field for field, value in values.items() if value is WRONG}
         return {field: value for field, value in values.items() if field not in wrong}, wrong
 
     def _made(
@@ -281,7 +272,7 @@ class _Reader:
             made = None if None in each else tuple(each)
         else:
             return raw
-        return _WRONG if made is None else made
+        return WRONG if made is None else made
 
     def _number(self, number: Number, raw: Any, path: str) -> Any:
         if isinstance(raw, str) and number.named:  # which for the part is the name of a station
@@ -309,7 +300,7 @@ class _Reader:
         if isinstance(values.get("values"), list):
             values["values"] = self._number(number, values["values"], f"{path}.values")
         made = self._made(kind, Place(path, field_keys(kind), raw), values, wrong)
-        return _WRONG if made is None else made
+        return WRONG if made is None else made
 
     def _material(self, raw: Any, path: str, of: str) -> Material | None:
         """A material by its name or its values, of the core or of a ring."""
@@ -329,19 +320,19 @@ class _Reader:
         return self._refuse(path, raw, _materials_text(raw, [*self._materials]), None)
 
     def _section(self) -> Section | None:
-        rings = [self._part(Ring, raw, f"rings[{k}]") for k, raw in self._tables("rings")]
+        rings = [self._part(Ring, raw, f"rings[{k}]") for k, raw in self._listed("rings")]
         for k in range(len(rings)):
             path = f"rings[{k}].material"
             self.places.setdefault(path, Place(path, field_keys(Material)))
-        values, wrong = self._values(Section, self._table("section"), "section")
+        values, wrong = self._values(Section, self._at_top("section"), "section")
         if not rings or None in rings:
             return None
-        place = Place("section", field_keys(Section), self._table("section"))
+        place = Place("section", field_keys(Section), self._at_top("section"))
         return self._made(Section, place, values | {"rings": tuple(rings)}, wrong)
 
     def _display_unit(self) -> Any:
         """The unit that the arm is to be shown in; whether there is such a one the arm judges."""
-        raw = self._table("display")
+        raw = self._at_top("display")
         for key in (key for key in raw if key != "unit"):
             self._refuse(f"display.{key_text(key)}", raw[key], unknown_key(key, {"unit": "unit"}))
         self.places["display_unit"] = Place("display.unit")
@@ -363,12 +354,12 @@ class _Reader:
             said = f"unknown key; {home}" if home else unknown_key(key, known)
             self._refuse(key_text(key), self._document[key], said)
 
-    def _table(self, key: str) -> dict[str, Any]:
+    def _at_top(self, key: str) -> dict[str, Any]:
         """A table at the top; an empty one if there is none, or something else."""
         value = self._document.get(key)
         return value if isinstance(value, dict) else {}
 
-    def _tables(self, key: str) -> list[tuple[int, dict[str, Any]]]:
+    def _listed(self, key: str) -> list[tuple[int, dict[str, Any]]]:
         raw = self._document.get(key)
         tables = [*enumerate(raw)] if isinstance(raw, list) else []
         for k, table in tables:
@@ -381,14 +372,10 @@ class _Reader:
         if isinstance(value, dict):
             anything = Number(symbol="", meaning="", allowed=Range(), along=AlongArm)
             made = self._along(anything, value, path)
-            return None if made is _WRONG else made
+            return None if made is WRONG else made
         if isinstance(value, list):
             return tuple(self._plain(item, path) for item in value)
         return float(value) if isinstance(value, WrittenFloat) else value
-
-    def _refuse(self, path: str, value: Any, allowed: str, instead: Any = _WRONG) -> Any:
-        self.faults.append(Fault(path, value, allowed))
-        return instead
 
 
 def _home(key: str) -> str:

@@ -7,20 +7,14 @@ from dataclasses import fields
 from typing import Any
 
 from softreach.arm.along import AlongArm, Samples
-from softreach.arm.design_file.keys import (
-    KINDS,
-    degrees_text,
-    inline_table,
-    key_text,
-    keys_of,
-    value_text,
-)
+from softreach.arm.design_file.keys import KINDS, degrees_text, keys_of
 from softreach.arm.drives import BundleNumbers
 from softreach.arm.material import Material
 from softreach.arm.number import Station
 from softreach.arm.part import Part
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
+from softreach.support.files.toml import inline_table, key_text, value_text
 
 __all__ = ["display_text", "render"]
 

@@ -25,8 +25,6 @@ from softreach.support.files.formats import FileFormat, Formats
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CLOUD_PAIR", "gamma_path", "read_cloud", "write_cloud"]
-
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
 _ENDING = "_gamma"

@@ -18,8 +18,6 @@ from softreach.arm.section import Ring, Section
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
-__all__ = ["Angle", "Filament", "FilamentRing", "arm_of", "filament_of", "is_from_inside_out"]
-
 Angle = float | Pieces
 
 _SMALLEST_TAPER = 1e-4  # rad; below it their Θ(Z) is unstable, as their own source warns

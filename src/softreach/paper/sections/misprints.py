@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from softreach.arm.actuators.ring_integrals import ring_integrals
@@ -22,9 +20,8 @@ _TAPERS = tuple(np.radians([0.5, 1.0, 2.0, 3.0]))
 _ANGLES = tuple(np.radians([-20.0, 5.0, 10.0, 40.0]))
 
 
-def misprints(settings: Settings, folder: Path, notes: Notebook) -> None:
+def misprints(settings: Settings, notes: Notebook) -> None:
     """Appendix A against its integrals, the inner radius, and what α is measured from."""
-    del folder
     arm, (taper, ratio, angle) = minimal_trunk(), _of_minimal_trunk()
     pairs = [(taper, angle) for taper in _TAPERS for angle in _ANGLES]
     errors = np.array([_errors(ratio, *pair) for pair in pairs])
@@ -46,7 +43,6 @@ def misprints(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def radius(n: Numbers) -> Finding:
-    """The inner radius: refused as printed, and what the ratio does to the volume."""
     volumes = ", ".join(f"{r}: {v:.3f}" for r, v in n["volumes"].items())
     words = (
         f"such a design is {n['refusal']}. R2(0) is right, as it gives the 6.2-fold taper; we "
@@ -56,13 +52,11 @@ def radius(n: Numbers) -> Finding:
 
 
 def deltas(n: Numbers) -> Finding:
-    """δ0 and δ1 as printed."""
     worst = max(n["delta0"], n["delta1"])
     return judged(f"equal to the integrals to {worst:.0e}", worst < 1e-9)
 
 
 def rotation(n: Numbers) -> Finding:
-    """The fiber rotation as printed."""
     words = (
         f"equals the integral to {n['rotation']:.0e}, and at φ = 1e-5 the printed limit to "
         f"{n['rotation_limit']:.0e}"
@@ -71,7 +65,6 @@ def rotation(n: Numbers) -> Finding:
 
 
 def delta3(n: Numbers) -> Finding:
-    """δ3 as printed, and with its 3 in another place."""
     words = (
         f"as printed it is {1 + n['delta3']:.3g} times the integral at this design's α = "
         f"{n['helical_angle_deg']:.2g}°; with the 3 before the T terms alone it equals the "
@@ -81,7 +74,6 @@ def delta3(n: Numbers) -> Finding:
 
 
 def angle(n: Numbers) -> Finding:
-    """From which direction α is measured."""
     words = (
         f"a fiber of α = {n['helical_angle_deg']:.3g}° rises at {n['from_axis_deg']:.3g}° to the "
         f"axis and {n['from_circle_deg']:.3g}° to e_Θ; α = 0 is longitudinal, as section 2 has it"

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
 from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
+from softreach.plot import DesignPanel, plot_designs
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.summary import describe
 
 
-def model(settings: Settings, folder: Path, notes: Notebook) -> None:
+def model(settings: Settings, notes: Notebook) -> None:
     """The design, its angles, its symmetry."""
-    del folder
     arm = minimal_trunk(taper=np.radians(3))
     facts = describe(arm)
     corners = [minimal_trunk(np.radians(o), np.radians(p)) for o in (0, 108) for p in (0, 3)]
@@ -30,18 +28,15 @@ def model(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def meeting(n: Numbers) -> Finding:
-    """Places of the fibers at the tip."""
     words = f"at Z = L the edges of the sectors are {abs(n['gap_deg']):.2g}° apart"
     return judged(words, abs(n["gap_deg"]) < 1.0)
 
 
 def narrowing(n: Numbers) -> Finding:
-    """Shrinking of the radius."""
     return judged(f"{n['narrowing']:.2f}-fold", round(n["narrowing"], 1) == 6.2)
 
 
 def symmetry(n: Numbers) -> Finding:
-    """Mirror images."""
     words = f"exchanging the helical activations mirrors the tip to within {n['asymmetry']:.1e} L"
     return judged(words, n["asymmetry"] < 1e-9)
 
@@ -62,8 +57,6 @@ def _asymmetry(arm: Manipulator, seed: int) -> float:
 
 
 def _draw(arm: Manipulator, notes: Notebook) -> None:
-    from softreach.plot import DesignPanel, plot_designs
-
     helix = [DesignPanel("back", arm, "back", [1])]
     words = "A helical fiber of the tapered arm, and its cross-section at the base and halfway."
     figure = plot_designs(helix, stations_over_length=(0.0, 0.5), width=1.8)

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from softreach.arm import designs
+from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.dexterity import solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
 from softreach.paper.claims import Finding, Numbers, Verdict, judged
 from softreach.paper.notebook import Notebook, Settings
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from softreach.arm.manipulator import Manipulator
-
+from softreach.plot import DesignPanel, plot_designs, plot_distance_histograms, plot_redundancy
 
 _RADIUS = 1 / 60  # L, figure 4d
 
 
-def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
+def redundancy(settings: Settings, notes: Notebook) -> None:
     """Clouds, activation distances, density, and how many activations reach each place."""
-    del folder
     arms = {"minimal": designs.minimal_trunk(), "redundant": designs.redundant_trunk()}
     clouds = {name: _cloud(name, arm, settings, notes) for name, arm in arms.items()}
     distances = {
@@ -45,14 +40,12 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def cost(n: Numbers) -> Finding:
-    """Time of the larger cloud."""
     seconds = max(n["minimal_seconds"], n["redundant_seconds"])
     words = f"{n['samples']:,} points in {seconds:.2g} s on this machine"
     return judged(words, n["samples"] >= 2_000_000 and seconds < 600, seconds < 600)
 
 
 def split(n: Numbers) -> Finding:
-    """Places of the two longitudinal fibers."""
     first, second = n["offsets_deg"]
     words = (
         "neither their places nor their extents are printed. We keep the extent of "
@@ -62,7 +55,6 @@ def split(n: Numbers) -> Finding:
 
 
 def families(n: Numbers) -> Finding:
-    """Number of activations that reach a place."""
     three, four = n["minimal"], n["redundant"]
     words = (
         f"three fibers: {three['solution_median']:.2f} activations reach a place (median over "
@@ -74,14 +66,12 @@ def families(n: Numbers) -> Finding:
 
 
 def uneven(n: Numbers) -> Finding:
-    """Heterogeneity of the density."""
     three, four = n["minimal"]["heterogeneity"], n["redundant"]["heterogeneity"]
     words = f"the density varies by {four:.0%} of its mean, against {three:.0%}, beyond chance"
     return judged(words, four > three)
 
 
 def front(n: Numbers) -> Finding:
-    """Density and D̄ in front and behind."""
     data = n["redundant"]
     words = (
         f"{data['density_front']:.3g} points/m³ in front against {data['density_behind']:.3g} "
@@ -92,14 +82,12 @@ def front(n: Numbers) -> Finding:
 
 
 def small(n: Numbers) -> Finding:
-    """D̄ of three fibers."""
     data = n["minimal"]
     words = f"median {data['median']:.3f}, 95 % below {data['quantiles']['0.95']:.3f}"
     return judged(words, data["quantiles"]["0.95"] < 0.5)
 
 
 def large(n: Numbers) -> Finding:
-    """D̄ of four."""
     data = n["redundant"]
     words = (
         f"median {data['median']:.3f}, 95 % below {data['quantiles']['0.95']:.3f}; above "
@@ -151,8 +139,6 @@ def _draw(
     distances: dict[str, xr.DataArray],
     notes: Notebook,
 ) -> None:
-    from softreach.plot import DesignPanel, plot_designs, plot_distance_histograms, plot_redundancy
-
     panels = [DesignPanel(name, arm) for name, arm in arms.items()]
     words = "The minimal and the redundant design, above their cross-sections at the base."
     notes.draw("4a", "figure_4a_designs", words, plot_designs(panels))

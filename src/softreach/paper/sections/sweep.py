@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from softreach.arm.designs import minimal_trunk
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
@@ -18,10 +18,6 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, reachable_set
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-
 ASIDE = 0.3
 """Distance at which a place begins to lie far from the plane of symmetry [L]."""
 
@@ -29,14 +25,8 @@ _ACCURACY = 1e-2  # finer is not needed for what is shown
 _RATIOS = (0.7, 0.75, 0.8, 0.85)
 _STORE = "atlas.zarr"
 _SCALARS = (
-    "volume",
-    "unreachability",
-    "convex_volume",
-    "exact_volume",
-    "exact_volume_error",
-    "exact_unreachability",
-    "multiple_volume",
-    "fold_volume",
+    *("volume", "unreachability", "convex_volume", "exact_volume", "exact_volume_error"),
+    *("exact_unreachability", "multiple_volume", "fold_volume"),
 )
 _CAPTIONS = {
     "clouds": ("2a", "Reachability clouds, colored by the activations of the three bundles."),
@@ -50,15 +40,9 @@ _CAPTIONS = {
 }
 
 
-class Shape(NamedTuple):
-    """Of one design, in L."""
-
-    aside: float
-    """Volume farther than `ASIDE` from the plane of symmetry [L³]."""
-    behind: float
-    """Volume on the helical fibers' side, y > 0 [L³]."""
-    thickness: float
-    """Mean thickness 2 V / A [L]."""
+_SHAPE = ("aside", "behind", "thickness")
+"""Volumes farther than `ASIDE` from the plane of symmetry and on the helical fibers' side, y > 0
+[L³]; mean thickness 2 V / A [L]."""
 
 
 def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list[list[float]]]:
@@ -67,27 +51,27 @@ def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list
     pairs = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
     return {
         name + of: pairs[..., row, k].tolist()
-        for k, name in enumerate(Shape._fields)
+        for k, name in enumerate(_SHAPE)
         for row, of in enumerate(("", "_error"))
     }
 
 
-def swept_atlas(folder: Path) -> xr.Dataset:
-    """The atlas that the sweep left in the folder of all results.
+def swept_atlas(figures: Path) -> xr.Dataset:
+    """The atlas that the sweep left beside the folder of figures.
 
     Raises:
         InvalidInput: It was removed.
     """
     try:
-        return open_atlas(folder / _STORE)
+        return open_atlas(figures.parent / _STORE)
     except InvalidInput as error:
-        notes = folder / "figures" / "sweep.json"
-        raise InvalidInput("atlas", error.value, error.allowed, f"remove {notes} too") from None
+        hint = f"remove {figures / 'sweep.json'} too"
+        raise InvalidInput("atlas", error.value, error.allowed, hint) from None
 
 
-def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
+def sweep(settings: Settings, notes: Notebook) -> None:
     """Volumes, unreachability, widths and curvatures of every design."""
-    atlas = _swept(settings, folder)
+    atlas = _swept(settings, notes.folder.parent / _STORE)
     curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
     notes.note(
         designs=int(atlas["volume"].notnull().sum()),
@@ -109,13 +93,11 @@ def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def size(n: Numbers) -> Finding:
-    """Number of designs and points."""
     words = f"{n['designs']} clouds of {n['samples']:,} points, and the volume of each"
     return judged(words, n["designs"] == 256 and n["samples"] == 400_000)
 
 
 def widening(n: Numbers) -> Finding:
-    """Volume far from the plane of symmetry."""
     sweep = _Sweep(n)
     aside = sweep["aside"]
     best = sweep.taper[int(aside[-1].argmax())]
@@ -131,7 +113,6 @@ def widening(n: Numbers) -> Finding:
 
 
 def thickness(n: Numbers) -> Finding:
-    """Mean thickness of the reachable sets."""
     sweep = _Sweep(n)
     thick = sweep["thickness"]
     words = (
@@ -146,7 +127,6 @@ def thickness(n: Numbers) -> Finding:
 
 
 def behind(n: Numbers) -> Finding:
-    """Volume on the helical side."""
     sweep = _Sweep(n)
     volume = sweep["behind"]
     best = sweep.taper[int(volume[-1].argmax())]
@@ -160,7 +140,6 @@ def behind(n: Numbers) -> Finding:
 
 
 def hulls(n: Numbers) -> Finding:
-    """α-shapes against exact volumes."""
     sweep = _Sweep(n)
     off = sweep["volume"] / sweep["exact_volume"] - 1
     words = f"α-shapes are {off.min():+.1%} to {off.max():+.1%} off the exact volume"
@@ -168,7 +147,6 @@ def hulls(n: Numbers) -> Finding:
 
 
 def growth(n: Numbers) -> Finding:
-    """Volume over Ω."""
     sweep = _Sweep(n)
     cloud = sweep["volume"]
     words = (
@@ -179,7 +157,6 @@ def growth(n: Numbers) -> Finding:
 
 
 def maximum(n: Numbers) -> Finding:
-    """The largest volume and its place."""
     sweep = _Sweep(n)
     cloud, exact = sweep["volume"], sweep["exact_volume"]
     at_two = np.interp(2.0, sweep.taper, exact[-1])
@@ -197,7 +174,6 @@ def maximum(n: Numbers) -> Finding:
 
 
 def optimum(n: Numbers) -> Finding:
-    """The best φ for each Ω."""
     sweep = _Sweep(n)
     best = np.array(sweep.taper)[sweep["volume"].argmax(axis=1)]
     exact = np.array(sweep.taper)[sweep["exact_volume"].argmax(axis=1)]
@@ -209,7 +185,6 @@ def optimum(n: Numbers) -> Finding:
 
 
 def overtapered(n: Numbers) -> Finding:
-    """Volume beyond the best φ."""
     sweep = _Sweep(n)
     lost = [1 - sweep[name][:, -1] / sweep[name].max(axis=1) for name in ("volume", "exact_volume")]
     words = (
@@ -220,7 +195,6 @@ def overtapered(n: Numbers) -> Finding:
 
 
 def decline(n: Numbers) -> Finding:
-    """UNR over Ω and φ."""
     sweep = _Sweep(n)
     exact = sweep["exact_unreachability"]
     rise = max(0.0, *(float(np.diff(exact, axis=k).max()) for k in (0, 1)))
@@ -235,7 +209,6 @@ def decline(n: Numbers) -> Finding:
 
 
 def curling(n: Numbers) -> Finding:
-    """Curvature toward the tip."""
     plain, tapered, at = _curvatures(n)
     ratio = tapered[:, at[0.5]] / plain[:, at[0.5]]
     words = (
@@ -247,7 +220,6 @@ def curling(n: Numbers) -> Finding:
 
 
 def spread(n: Numbers) -> Finding:
-    """Range of curvature."""
     plain, tapered, at = _curvatures(n)
     plain_range, tapered_range = (c[:, at[0.95]] - c[:, at[0.05]] for c in (plain, tapered))
     ratio = tapered_range / plain_range
@@ -259,7 +231,6 @@ def spread(n: Numbers) -> Finding:
 
 
 def cover(n: Numbers) -> Finding:
-    """Whose curvatures hold the other's."""
     plain, tapered, at = _curvatures(n)
     most_plain, most = plain[:, at[1.0]], tapered[:, at[1.0]]
     beyond = [q for q in at if tapered[-1, at[q]] > most_plain[-1]]
@@ -272,8 +243,8 @@ def cover(n: Numbers) -> Finding:
     return judged(words, bool((most >= most_plain).all() and beyond))
 
 
-def _shape(revolution: float, taper: float, accuracy: float) -> tuple[Shape, Shape]:
-    """The shape of a set and its errors.
+def _shape(revolution: float, taper: float, accuracy: float) -> tuple[list[float], list[float]]:
+    """`_SHAPE` of a set, and its errors.
 
     Errors of volumes are three times the change from half the accuracy. The area is that of the
     smooth boundary, as that of the raster still grows with its cells; its error is what the volume
@@ -283,18 +254,18 @@ def _shape(revolution: float, taper: float, accuracy: float) -> tuple[Shape, Sha
     reached, coarse = (reachable_set(arm, accuracy=scale * accuracy) for scale in (1.0, 2.0))
     assert isinstance(reached, ReachableSolid)
     assert isinstance(coarse, ReachableSolid)
-    sheets, fine = coarse.sheets(), _beyond(reached)
+    sheets, volumes = coarse.sheets(), _beyond(reached)
     thickness = 2 * reached.volume / sheets.area / arm.length
-    aside, behind = (3 * abs(a - b) for a, b in zip(fine, _beyond(coarse), strict=True))
+    errors = [3 * abs(a - b) for a, b in zip(volumes, _beyond(coarse), strict=True)]
     off = abs(sheets.volume / reached.volume - 1) * thickness
-    return Shape(*fine, thickness), Shape(aside, behind, off)
+    return [*volumes, thickness], [*errors, off]
 
 
-def _beyond(reached: ReachableSolid) -> tuple[float, float]:
+def _beyond(reached: ReachableSolid) -> list[float]:
     """Volumes aside and behind [L³]."""
     surface, length = reached.surface(), reached.arm.length
     aside = (volume_beyond(surface, 0, side * ASIDE * length, side) for side in (-1, 1))
-    return sum(aside) / length**3, volume_beyond(surface, 1, 0.0) / length**3
+    return [sum(aside) / length**3, volume_beyond(surface, 1, 0.0) / length**3]
 
 
 def _best_tapers(atlas: xr.Dataset, accuracy: float) -> dict[str, float]:
@@ -309,14 +280,14 @@ def _best_tapers(atlas: xr.Dataset, accuracy: float) -> dict[str, float]:
     return {str(ratio): round(float(np.degrees(taper)), 6) for ratio, taper in best.items()}
 
 
-def _swept(settings: Settings, folder: Path) -> xr.Dataset:
+def _swept(settings: Settings, store: Path) -> xr.Dataset:
     """The atlas of section 3, computed or continued: revolution from 0 to 108°, taper to 3°."""
     turns = np.radians(np.linspace(0, 108, settings.designs))
     tapers = np.radians(np.linspace(0, 3, settings.designs))
     space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
     return build_atlas(
         space,
-        folder / _STORE,
+        store,
         settings.samples,
         settings.seed,
         alpha_over_length=settings.alpha,

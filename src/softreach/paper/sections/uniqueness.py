@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
@@ -13,13 +13,10 @@ from softreach.inverse import solve_inverse
 from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
 from softreach.paper.sections.sweep import swept_atlas
+from softreach.plot import plot_arm, plot_metric_map
 from softreach.rod.kinematics import configuration
 from softreach.support.arrays import Array
 from softreach.workspace import ReachableCurve, ReachableSolid, ReachableSurface, reachable_set
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 _TARGETS = 2_000
 _LABEL = "reached more than once / %"
@@ -32,9 +29,9 @@ class Pair(NamedTuple):
     activations: Array
 
 
-def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
+def uniqueness(settings: Settings, notes: Notebook) -> None:
     """The share of the volume that several activations reach, and the clearest example."""
-    atlas = swept_atlas(folder)
+    atlas = swept_atlas(notes.folder)
     share = atlas["multiple_volume"] / atlas["exact_volume"]
     worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
     turn, taper = float(worst["revolution"]), float(worst["taper"])
@@ -59,7 +56,6 @@ def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def unique(n: Numbers) -> Finding:
-    """The share of the volume that several activations reach, and an example."""
     share = np.array(n["share"], float)
     words = (
         f"{n['paper_share']:.2%} of the volume is reached by more than one activation at Ω = 108°, "
@@ -72,7 +68,6 @@ def unique(n: Numbers) -> Finding:
 
 
 def dimension(n: Numbers) -> Finding:
-    """Sets that two fibers and one reach."""
     words = (
         f"two fibers sweep a surface of {n['area']:.3f} L², one fiber a curve of "
         f"{n['curve']:.3f} L (of the minimal design, in the order of its fibers)"
@@ -107,8 +102,6 @@ def _fewer_fibers() -> dict[str, float]:
 
 
 def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:
-    from softreach.plot import plot_arm, plot_metric_map
-
     ax = plot_metric_map(atlas, _LABEL)
     words = (
         "Share of the reachable volume that more than one activation reaches, over revolution and "

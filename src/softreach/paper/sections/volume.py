@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from softreach.arm.designs import minimal_trunk
@@ -11,15 +9,15 @@ from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import volume_curve
 from softreach.paper.claims import Finding, Numbers, Verdict
 from softreach.paper.notebook import Notebook, Settings
+from softreach.plot import plot_volume_curve
 from softreach.workspace import reachable_set
 
 _RADII = (0.02, 0.03, 0.04, 0.05, 0.07, 0.1)
 _CURVE = np.geomspace(0.008, 1.0, 120)
 
 
-def volume(settings: Settings, folder: Path, notes: Notebook) -> None:
+def volume(settings: Settings, notes: Notebook) -> None:
     """V(α) of the paper's design for two sizes of clouds, and the exact volume."""
-    del folder
     arm = minimal_trunk()
     reached = reachable_set(arm, accuracy=settings.accuracy)
     sizes = (settings.samples // 16, settings.samples)
@@ -32,11 +30,17 @@ def volume(settings: Settings, folder: Path, notes: Notebook) -> None:
         volumes={str(n): volume_curve(t, np.array(_RADII)).tolist() for n, t in clouds.items()},
     )
     curves = {f"{n:,} tips": volume_curve(tips, _CURVE) for n, tips in clouds.items()}
-    _draw(curves, notes)
+    ax = plot_volume_curve(
+        curves, _CURVE, length=arm.length, exact=reached.volume, convex=reached.convex_volume
+    )
+    words = (
+        "Volume of the α-shape of the paper's design against its radius, which the paper does not "
+        "state, beside the exact volume of the reachable set and of its convex hull."
+    )
+    notes.draw("", "alpha_dependence", words, ax)
 
 
 def dependence(n: Numbers) -> Finding:
-    """Volume over the radius of the α-shape."""
     many = list(n["volumes"])[-1]
     pairs = zip(n["radii"], n["volumes"][many], strict=True)
     values = ", ".join(f"{v:.3f} at {r:g} L" for r, v in pairs)
@@ -45,15 +49,3 @@ def dependence(n: Numbers) -> Finding:
         f"{n['exact_error']:.0e} L³"
     )
     return Finding(words, Verdict.OPEN)
-
-
-def _draw(curves: dict[str, np.ndarray], notes: Notebook) -> None:
-    from softreach.plot import plot_volume_curve
-
-    lines = {"exact": notes.numbers["exact"], "convex": notes.numbers["convex"]}
-    ax = plot_volume_curve(curves, _CURVE, length=minimal_trunk().length, **lines)
-    words = (
-        "Volume of the α-shape of the paper's design against its radius, which the paper does not "
-        "state, beside the exact volume of the reachable set and of its convex hull."
-    )
-    notes.draw("", "alpha_dependence", words, ax)

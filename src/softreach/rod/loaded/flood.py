@@ -19,7 +19,7 @@ from softreach.rod.loaded.shooting import Shots, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.support.lazy import lazy
 
-__all__ = ["Flood", "grid_sizes"]
+__all__ = ["Flood", "are_same", "grid_sizes", "smooth_edges"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,7 +27,7 @@ Index = NDArray[np.intp]
 
 _NODES = {1: 33, 2: 33, 3: 17}
 """Nodes per free bundle: at most a few thousand postures."""
-_SAME_FRAME, _SAME_TIP = 0.02, 0.02  # [rad], [L]
+_SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
 _UNEVEN = 1e3  # roughness of whole cells beside others
 PARTS = 64  # of a line, at which it is asked for cuts
@@ -76,7 +76,7 @@ class Flood:
         sizes = np.pad(sizes, (fill, 0), constant_values=1)
         frames = np.empty((len(gamma), of_nodes.shape[1]))
         interpolate(of_nodes, rough.ravel() < _UNEVEN, places, sizes, frames)
-        rough = rough[self._cells_at(gamma)]
+        rough = rough[self.cells_at(gamma)]
         frames[np.isinf(rough)] = of_nodes[self.held.is_found.argmax()]
         return frames, rough
 
@@ -107,7 +107,7 @@ class Flood:
 
     def is_uncut(self, gamma: Array) -> Mask:
         """Mask of activations in cells whose edges are all on one branch."""
-        return self.is_whole[self._cells_at(gamma)]
+        return self.is_whole[self.cells_at(gamma)]
 
     def clear(self, rest: Array, gamma: Array) -> Array:
         """Shares of the lines from rest up to which they meet no cut, shape (n,)."""
@@ -119,7 +119,8 @@ class Flood:
     def _in_cells(self, gamma: Array) -> Array:
         return (gamma - self.box.low) * ((np.array(self.sizes) - 1) / self.box.scales)
 
-    def _cells_at(self, gamma: Array) -> tuple[Index, ...]:
+    def cells_at(self, gamma: Array) -> tuple[Index, ...]:
+        """Indices of the cells that activations are in."""
         cells = np.floor(self._in_cells(gamma)).astype(np.intp)
         return tuple(np.clip(cells, 0, np.maximum(np.array(self.sizes) - 2, 0)).T)
 
@@ -215,34 +216,15 @@ class _Flooding:
                 continue
             low = np.delete(self.numbers, -1, axis).ravel()
             both = (np.delete(known, -1, axis) & np.delete(known, 0, axis)).ravel()
-            smooth = self._is_smooth(frames, tips, axis).ravel()
+            smooth = smooth_edges(frames, tips, axis).ravel()
             low, smooth = low[both], smooth[both]
             self.linked[axis, low[smooth]] = True
             doubtful = low[~self.linked[axis, low]]
             high, _ = self._neighbors(doubtful, axis, 1)
             ends = self.gamma[doubtful], self.gamma[high]
             found = follow(self.solver, *ends, self._shots(doubtful)).shots
-            apart = turn_between(found.frame, self.states.frame[high])
-            moved = np.linalg.norm(found.tips - self.states.tips[high], axis=1)
-            same = found.is_found & (apart < _SAME_FRAME)
-            same &= moved < _SAME_TIP * self.solver.tables.arm.length
+            same = are_same(found, self._shots(high), self.solver.tables.arm.length)
             self.linked[axis, doubtful[same]] = True
-
-    def _is_smooth(self, frames: Array, tips: Array, axis: int) -> Mask:
-        """Edges along an axis that go on as an edge beside them does."""
-        smooth = np.zeros(np.delete(self.numbers, -1, axis).shape, bool)
-        if self.sizes[axis] < 3:
-            return smooth
-        bend = np.diff(frames, 2, axis)
-        bend = np.sqrt((bend.reshape(*bend.shape[:-1], -1, 3) ** 2).sum(axis=-1)).max(axis=-1)
-        jerk = np.sqrt((np.diff(tips, 2, axis) ** 2).sum(axis=-1))
-        with np.errstate(invalid="ignore"):
-            calm = (bend < _SMOOTH_FRAME) & (jerk < _SMOOTH_TIP)
-        ends = np.moveaxis(smooth, axis, 0)
-        of_calm = np.moveaxis(calm, axis, 0)
-        ends[1:] |= of_calm
-        ends[:-1] |= of_calm
-        return smooth
 
     def _whole_cells(self) -> Mask:
         whole = self.is_known.reshape(self.sizes)
@@ -258,3 +240,34 @@ class _Flooding:
                     edges = np.delete(edges, -1, other) & np.delete(edges, 0, other)
             whole &= edges
         return whole
+
+
+def are_same(shots: Shots, others: Shots, length: float, within: float = _SAME) -> Mask:
+    """Mask of those that are the same posture of an arm of a length [m], to so much [rad, L]."""
+    with np.errstate(invalid="ignore"):  # of what is not found
+        moved = np.linalg.norm(shots.tips - others.tips, axis=1)
+        apart = turn_between(shots.frame, others.frame)
+    near = (apart < within) & (moved < within * length)
+    return np.asarray(near & shots.is_found & others.is_found)
+
+
+def smooth_edges(frames: Array, tips: Array, axis: int) -> Mask:
+    """Edges of a grid along an axis that go on as an edge beside them does.
+
+    Args:
+        frames: At the nodes, shape (*nodes, components); NaN where none is known.
+        tips: The same of the tips [L].
+        axis: The axis.
+    """
+    smooth = np.zeros(np.delete(tips[..., 0], -1, axis).shape, bool)
+    if tips.shape[axis] < 3:
+        return smooth
+    bend = np.diff(frames, 2, axis)
+    bend = np.sqrt((bend.reshape(*bend.shape[:-1], -1, 3) ** 2).sum(axis=-1)).max(axis=-1)
+    jerk = np.sqrt((np.diff(tips, 2, axis) ** 2).sum(axis=-1))
+    with np.errstate(invalid="ignore"):
+        calm = (bend < _SMOOTH_FRAME) & (jerk < _SMOOTH_TIP)
+    ends, of_calm = np.moveaxis(smooth, axis, 0), np.moveaxis(calm, axis, 0)
+    ends[1:] |= of_calm
+    ends[:-1] |= of_calm
+    return smooth

@@ -24,7 +24,7 @@ Mask = NDArray[np.bool_]
 
 _CORRECTION, _CORRECTION_OF_NODES = 0.12, 0.03  # [rad], of one segment and of several
 _TIP = 3.0  # weight of the correction of a tip [rad/L]
-_SHORTEST = 2.0**-20  # of the path, below which the branch has ended
+_SHORTEST = 2.0**-20  # of a path, below which its branch has ended
 _MOST_STEPS = 3000
 
 
@@ -35,6 +35,8 @@ class Followed(NamedTuple):
     """The last equilibrium; found where it is that of the end of the way."""
     has_ended: Mask
     """Mask of branches that end before the way does, shape (n,)."""
+    share: Array
+    """Of the way that was followed, shape (n,)."""
 
 
 def follow(
@@ -45,6 +47,7 @@ def follow(
     slope: Array | None = None,
     *,
     hangs: bool = True,
+    shortest: float = _SHORTEST,
 ) -> Followed:
     """Branches of stable equilibria along straight ways between activations, each by itself.
 
@@ -55,6 +58,7 @@ def follow(
         start: Equilibria at the beginning.
         slope: Change of the frame along the way, if it is known, shape (n, component).
         hangs: Whether the loads are on; if not, they are put on along the way.
+        shortest: Step, over the length of the way, below which a branch has ended.
     """
     n, length = len(begin), solver.tables.arm.length
     allowed = _CORRECTION if solver.tables.segments == 1 else _CORRECTION_OF_NODES
@@ -91,6 +95,6 @@ def follow(
         step[rows] = h * np.where(
             good, np.clip(wanted, 0.5, 4.0), np.where(wanted > 0.1, 0.4, 0.25)
         )
-        ended[rows] = ~good & (step[rows] < _SHORTEST)
+        ended[rows] = ~good & (step[rows] < shortest)
     shots = Shots(tips, frame, margin, start.is_found & (place >= 1.0))
-    return Followed(shots, ended)
+    return Followed(shots, ended, place)

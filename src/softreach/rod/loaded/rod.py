@@ -18,9 +18,10 @@ from softreach.rod.free import (
     per_length,
     tables_at,
 )
+from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shapes import LoadedShapes
-from softreach.rod.loaded.shooting import Equilibria, turn_between
+from softreach.rod.loaded.shooting import Equilibria, Shots, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.steps import (
     UNJUDGED,
@@ -43,6 +44,7 @@ from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
+    Held,
     Shapes,
     Status,
     Strains,
@@ -187,9 +189,20 @@ class LoadedRod(ArmRod):
     ) -> None:
         """Put tips, and what else is asked for, into place; each equilibrium is found once."""
         known = self.postures.find(gamma)
-        is_moving = slopes is not None or twists is not None
         if status is not None:
             status[:] = known.status
+        self._fill(gamma, known, tips, slopes, twists, directions)
+
+    def _fill(
+        self,
+        gamma: Array,
+        known: Equilibria,
+        tips: Array,
+        slopes: Array | None = None,
+        twists: Array | None = None,
+        directions: Array | None = None,
+    ) -> None:
+        is_moving = slopes is not None or twists is not None
         if self.end < self.length:
             shapes = self._shape_solver.shapes(gamma, np.array([self.end]), known)
             tips[:], directors = shapes.frames.position[:, 0], shapes.frames.directors[:, 0]
@@ -222,6 +235,18 @@ class LoadedRod(ArmRod):
         z = np.array([self.end])
         grid = step_grid(self.arm, z, max(_RESPONSE_STEPS, self.steps))
         return node_tables(self.arm, z, grid)
+
+    def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held:
+        self.prepare()
+        return held_over(self.postures, self._mirrored, gamma, sizes, self._points)
+
+    def _points(self, gamma: Array, shots: Shots) -> Array:
+        """Places of the point that stands for the tip [m], shape (n, 3)."""
+        stable, points = np.zeros(len(gamma), np.int8), np.empty((len(gamma), 3))
+        for rows in parallel.blocks(len(gamma), _BLOCK):
+            some = Equilibria(shots.tips[rows], stable[rows], shots.margin[rows], shots.frame[rows])
+            self._fill(gamma[rows], some, points[rows])
+        return points
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.calibration.calibration import Calibration, calibrate
+from softreach.calibration import Calibration, calibrate
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import MarkerModel

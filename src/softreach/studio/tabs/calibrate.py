@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.calibration.calibration import Calibration
+from softreach.calibration import Calibration
 from softreach.calibration.measurements import read_measurements, read_table
 from softreach.studio import markup
 from softreach.studio.fields import attempt, bind_button
@@ -126,7 +126,7 @@ def _summary(result: Calibration) -> str:
     report = result.report()
     parts, lines = [], []
     for part in report.sections:
-        if part.rows and part.is_printed:
+        if part.rows and part.printed:
             parts.append(markup.table(part.head, [[(cell,) for cell in row] for row in part.rows]))
         lines += part.points
     lines.append(report.verdict)

@@ -27,19 +27,6 @@ from typing import Any
 
 from softreach.support.errors import InvalidInput, NotWritten, warn
 
-__all__ = [
-    "MARK",
-    "Foreign",
-    "StrPath",
-    "check_place",
-    "mend",
-    "place_to_read",
-    "replacing",
-    "replacing_folder",
-    "sync",
-    "writing",
-]
-
 MARK = ".softreach-"
 """Beginning of the names of what is being written, and of its two names at the end."""
 
@@ -238,7 +225,7 @@ def _rename_what_is_whole(place: Path) -> Path | None:
 
 
 def _discard(whole: Path) -> None:
-    """Remove what is there, under a name at which nobody takes its half for the whole."""
+    """Remove what is there, renamed first: no reader may take half of it for the whole."""
     if os.path.lexists(whole):
         trash = _beside(whole)
         os.rename(whole, trash)
@@ -260,7 +247,7 @@ def _one_line(path: StrPath) -> Iterator[None]:
 
 
 class _WatchedFile(io.BufferedWriter):
-    """A file that remembers the first error of writing, whatever the library did about it.
+    """A file that remembers the first error of writing, also one that a library ignores.
 
     Libraries that take the descriptor of a file lose what a full disk takes only a part of.
     """

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 from softreach.support.errors import InvalidInput, MissingExtra
 from softreach.support.files.atomic import Foreign
 
-__all__ = ["PAGES", "PICTURES", "TABLES", "FileFormat", "Formats", "check_installed", "format_of"]
-
 _PACKAGES = {"skimage": "scikit-image"}
 """Packages by the name of their module, where that is another."""
 

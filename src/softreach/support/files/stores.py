@@ -109,7 +109,7 @@ class Watch:
     _noted: dict[Chunk, DamagedStore] | None = None
 
     def report(self, chunk: Chunk, found: str) -> None:
-        """Raise damage, or note it where that is asked for."""
+        """Raise damage, or note it within `noting`."""
         error = DamagedStore(self.location, chunk, found, _REMEDY[self.kind])
         if self._noted is None:
             raise error

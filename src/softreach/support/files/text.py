@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import os
-import re
 import stat
-import tomllib
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import InvalidInput
@@ -18,13 +15,11 @@ from softreach.support.files.formats import TABLES, format_of
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["MEGABYTE", "read_text", "tables_of", "text_of", "write_table", "write_text"]
-
 MEGABYTE = 1_000_000
 
 
 def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
-    """The text of a file in UTF-8, its lines ended by line feeds whatever ended them.
+    """The text of a file in UTF-8, with a line feed at the end of each line.
 
     Args:
         name: What errors call the file.
@@ -79,39 +74,3 @@ def write_table(path: str | os.PathLike[str], table: pd.DataFrame, *, overwrite:
     format_of(as_path("path", path), TABLES)
     text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
     write_text(path, text, overwrite=overwrite)
-
-
-_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
-_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{64}}")
-"""A key of so many parts with dots, which takes the parser as many steps as the square of them."""
-
-
-def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
-    """The tables of TOML text.
-
-    Args:
-        text: TOML.
-        number: Maker of the value of a number with a point or an exponent.
-
-    Raises:
-        ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
-    """
-    if _LONG_KEY.search(text):
-        raise ValueError("a key has more than 64 parts with dots")
-    try:
-        tables = tomllib.loads(text, parse_float=number)
-        if not _fit_64_bits(tables):
-            raise OverflowError
-    except tomllib.TOMLDecodeError:
-        raise
-    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
-        raise ValueError("a whole number has more than 64 bits") from None
-    except RecursionError:
-        raise ValueError("lists or tables are nested too deep") from None
-    return tables
-
-
-def _fit_64_bits(value: Any) -> bool:
-    if isinstance(value, dict | list):
-        return all(map(_fit_64_bits, value.values() if isinstance(value, dict) else value))
-    return not isinstance(value, int) or -(2**63) <= value < 2**63

@@ -11,7 +11,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
-from softreach.optimization.first_order import TOL, FirstOrder, region_places
+from softreach.optimization.deviations import TOL, FirstOrder, region_places
 from softreach.requirements.requirements import Requirements, Target, with_payload
 from softreach.rod.rods import tip_map
 from softreach.sampling import sample_cube
@@ -22,8 +22,6 @@ from softreach.support.progress import Progress
 from softreach.workspace.reach import reachable_set
 from softreach.workspace.search import nearest_tips
 from softreach.workspace.solid import ReachableSolid
-
-__all__ = ["ArmsMade", "arms_made", "tried", "with_places", "with_region"]
 
 _POOL = 1 << 17  # places of space among which those are that are followed
 _FOLLOWED = 1 << 13  # near the boundary, and as many away from it

@@ -1,0 +1,420 @@
+"""Result of a calibration: numbers with their errors, beside those of other laws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.number import unit_suffix
+from softreach.calibration.errors import (
+    PlacementErrors,
+    Repeatability,
+    Verdict,
+    judged,
+    misses,
+    repeatability,
+)
+from softreach.calibration.fit import Fit, robust_width, started
+from softreach.calibration.free_numbers import POSE, free_numbers
+from softreach.calibration.measurements import Measurements, read_measurements
+from softreach.calibration.model import MarkerModel
+from softreach.calibration.uncertainty import Uncertainty
+from softreach.support.arguments import as_integer
+from softreach.support.arrays import Array, Index, Mask, as_rows
+from softreach.support.errors import counted
+from softreach.support.files.text import write_text
+from softreach.support.quantity import quantity
+from softreach.support.report import Report, Section
+from softreach.support.units import LengthUnit, as_unit, readable_unit
+from softreach.support.versions import versions
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+_OUTLIER = 5.0  # robust widths from which a sample is listed
+_CORRELATED = 0.95
+_MOST_ROWS = 10
+_ERRORS = ("rms", "median", "95 % below", "rms / L")
+_PICTURE = (
+    "Measured places and the lines to the predicted ones; errors by marker, in the order in which "
+    "samples were taken, and against each input."
+)
+_WORDS = {"softreach_version": "softreach", "data_sha256": "SHA-256 of the data"}
+
+
+class Rival(NamedTuple):
+    """Another law, fitted to the same samples."""
+
+    name: str
+    numbers: int
+    """Number of fitted parameters."""
+    train: PlacementErrors
+    held_out: PlacementErrors
+
+
+class ErrorRow(NamedTuple):
+    """Errors of one law on some samples."""
+
+    law: str
+    samples: str
+    """Those of which the errors are."""
+    errors: PlacementErrors
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration:
+    """A calibrated arm, the numbers that were fitted, and all that the data says of them."""
+
+    arm: Manipulator
+    """The calibrated arm."""
+    start: Manipulator
+    """The design before."""
+    data: Measurements
+    """All samples."""
+    held: Mask
+    """Samples that the fit did not see, shape (n,)."""
+    fit: Fit
+    uncertainty: Uncertainty
+    rivals: tuple[Rival, ...]
+    """Other laws on the same samples."""
+    exchange: tuple[str, float] | None
+    """Columns by whose exchange the same numbers would fit far better, and the error then [m]."""
+    seconds: float
+    date: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the fitted numbers."""
+        return self.fit.free.names
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted numbers by name, in their units."""
+        return dict(zip(self.names, self.fit.values.tolist(), strict=True))
+
+    @property
+    def sigma(self) -> dict[str, float]:
+        """Their standard deviations."""
+        return dict(zip(self.names, self.uncertainty.sigma.tolist(), strict=True))
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Predicted minus measured places of all samples [m], (n, marker, 3)."""
+        return self._model(self.data).of_arm(self.arm).places - self.data.places
+
+    @property
+    def train(self) -> PlacementErrors:
+        """Errors of the samples of the fit."""
+        return misses(self.residuals[~self.held])
+
+    @property
+    def held_out(self) -> PlacementErrors:
+        """Errors of the samples that it did not see."""
+        return misses(self.residuals[self.held])
+
+    @property
+    def by_marker(self) -> dict[str, PlacementErrors]:
+        """Errors of each marker: of held-out samples, or of all if none is held out."""
+        rows = self.held if self.held.any() else ~self.held
+        each = enumerate(self.data.marker_names)
+        return {name: misses(self.residuals[rows, k]) for k, name in each}
+
+    @cached_property
+    def before(self) -> PlacementErrors:
+        """Errors of the design before, moved onto the fitted samples as it is.
+
+        Of samples held out, or of all if none is.
+        """
+        train = self.data.of(~self.held)
+        free = started(MarkerModel.of(free_numbers(self.start, ["pose"]), train), train.places)
+        judged = self.data.of(self.held) if self.held.any() else train
+        model = MarkerModel.of(free, judged)
+        return misses(model.of_arm(free.made(free.start)).places - judged.places)
+
+    @cached_property
+    def repeatability(self) -> Repeatability:
+        """By how much the data repeats itself."""
+        return repeatability(self.data, self.residuals)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Limitation of the fit; samples far off are left out if they are few."""
+        if self.exchange is not None:
+            columns, less = self.exchange
+            said = f"{columns}: the same numbers then fit to {1e3 * less:.3g} mm rms instead of "
+            return Verdict("columns", f"{said}{1e3 * self.train.rms:.3g} mm")
+        far = np.isin(self.data.rows, self.outliers)
+        return judged(self.data, self.residuals, self.repeatability, self.held, far)
+
+    @property
+    def outliers(self) -> Index:
+        """Rows of the data whose markers are more than five robust widths off."""
+        distance = np.linalg.norm(self.residuals, axis=2)
+        widths = [robust_width(self.residuals[:, k]) for k in range(self.data.markers)]
+        far = np.nanmax(distance / widths, axis=1, initial=0.0) > _OUTLIER * 1.7
+        return self.data.rows[far]
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """Fitted numbers over those of the design, of all that cannot be below 0 and are not."""
+        numbers = zip(self.fit.free.numbers, self.fit.values.tolist(), strict=True)
+        return {n.name: v / n.start for n, v in numbers if n.range.low >= 0 and n.start > 0}
+
+    @property
+    def correlated(self) -> list[tuple[str, str, float]]:
+        """Pairs of numbers that the data hardly tells apart, with their correlation."""
+        matrix, names = self.uncertainty.correlation, self.names
+        pairs = np.argwhere(np.triu(np.abs(matrix) > _CORRELATED, 1)).tolist()
+        return [(names[a], names[b], float(matrix[a, b])) for a, b in pairs]
+
+    def errors_on(self, data: Any, **columns: Any) -> PlacementErrors:
+        """Errors of the calibrated arm on other measurements."""
+        return misses(self.residuals_on(data, **columns))
+
+    def residuals_on(self, data: Any, **columns: Any) -> Array:
+        """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
+        table = read_measurements(self.start, data, **columns)
+        return self._model(table).of_arm(self.arm).places - table.places
+
+    def predict(self, inputs: ArrayLike) -> tuple[Array, Array]:
+        """Places of the markers and the standard deviations that calibration leaves.
+
+        Args:
+            inputs: Of the arm, in their units, shape (n, input).
+
+        Returns:
+            Places in the world [m] and their standard deviations [m], (n, marker, 3) each.
+        """
+        allowed = f"shape (n, {self.arm.inputs})"
+        x = as_rows("inputs", inputs, self.arm.inputs, allowed)
+        prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
+        assert prediction.slopes is not None
+        covariance = self.uncertainty.covariance
+        square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
+        return prediction.places, np.sqrt(np.maximum(square, 0.0))
+
+    def draws(self, count: int = 32, seed: int = 0) -> list[Manipulator]:
+        """Arms as likely as the data leaves them, for bands of any quantity of an arm.
+
+        Numbers that the data does not determine stay as they are.
+        """
+        rng = np.random.default_rng(as_integer("seed", seed))
+        root = np.linalg.svd(self.uncertainty.covariance, hermitian=True)
+        factor = root[0] * np.sqrt(root[1])
+        low, high = self.fit.free.bounds
+        arms = []
+        for _ in range(as_integer("count", count, 2, 10_000)):
+            shift = factor @ rng.standard_normal(len(self.names))
+            arms.append(self.fit.free.made(np.clip(self.fit.values + shift, low, high)))
+        return arms
+
+    def band(
+        self, quantity: Callable[[Manipulator], ArrayLike], count: int = 32, seed: int = 0
+    ) -> tuple[Array, Array]:
+        """A quantity of the calibrated arm and the standard deviation that calibration leaves.
+
+        Both have the shape and unit of the quantity.
+
+        Args:
+            quantity: Function of an arm, such as `lambda arm: sr.reachable_set(arm).volume`.
+            count: Arms that it is computed of.
+            seed: Of the draws.
+        """
+        best = np.asarray(quantity(self.arm), float)
+        others = [np.asarray(quantity(arm), float) for arm in self.draws(count, seed)]
+        return best, np.sqrt(np.mean([(other - best) ** 2 for other in others], axis=0))
+
+    def _model(self, data: Measurements) -> MarkerModel:
+        return MarkerModel.of(self.fit.free, data)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Numbers with their errors over `number`, residuals over `sample`, `marker`, `axis`."""
+        import xarray as xr
+
+        free = self.fit.free
+        place = ("sample", "marker", "axis")
+        values = {
+            "value": ("number", self.fit.values),
+            "sigma": ("number", self.uncertainty.sigma),
+            "start": ("number", np.array([number.start for number in free.numbers])),
+            "at_bound": ("number", self.fit.at_bound),
+            "correlation": (("number", "other"), self.uncertainty.correlation),
+            "measured": (place, self.data.places, {"units": "m"}),
+            "residual": (place, self.residuals, {"units": "m"}),
+            "held_out": ("sample", self.held),
+            "run": ("sample", self.data.runs),
+            "rank": ("sample", np.argsort(self.data.order)),
+            "input_value": (("sample", "input"), self.data.inputs),
+        }
+        names = {
+            "number": list(self.names),
+            "other": list(self.names),
+            "unit": ("number", [number.unit for number in free.numbers]),
+            "marker": list(self.data.marker_names),
+            "axis": ["x", "y", "z"],
+            "input": list(self.arm.input_names),
+            "input_unit": ("input", list(self.arm.input_units)),
+        }
+        return xr.Dataset(values, names, {**self.provenance, "length": self.arm.length})
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Version, date and data behind the result."""
+        return {
+            "softreach_version": str(versions()["softreach_version"]),
+            "date": self.date,
+            "data": self.data.source,
+            "data_sha256": self.data.digest,
+            "samples": f"{len(self.data)}, of which {int(self.held.sum())} held out",
+            "free": ", ".join(self.names),
+            "error": (self.held_out if self.held.any() else self.train).text(self.arm.length),
+            "verdict": self.verdict.sentence,
+        }
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the calibrated arm as a design file whose first lines say where it comes from.
+
+        Raises:
+            InvalidInput: Something is there, and `overwrite` is not given.
+            NotWritten: It cannot be written.
+        """
+        free, sigma = self.fit.free.numbers, self.sigma
+        pairs = zip(free, self.fit.values.tolist(), strict=True)
+        lines = [
+            "# Calibrated from measured poses.",
+            *(f"# {key}: {value}" for key, value in self.provenance.items()),
+            *(f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs),
+        ]
+        write_text(path, "\n".join(lines) + f"\n\n{self.arm.file_text}", overwrite=overwrite)
+
+    @property
+    def errors(self) -> tuple[ErrorRow, ...]:
+        """Errors of the calibrated arm, of the design, and of rivals on the same samples."""
+        held = int(self.held.sum())
+        fitted = f"{len(self.data) - held} fitted"
+        on = f"{held} held out" if held else fitted
+        rows = [ErrorRow("calibrated", fitted, self.train)]
+        rows += [ErrorRow("calibrated", on, self.held_out)] if held else []
+        rows.append(ErrorRow("design, base fitted", on, self.before))
+        for rival in self.rivals:
+            law = f"{rival.name}, {counted(rival.numbers, 'number')}"
+            rows.append(ErrorRow(law, on, rival.held_out if held else rival.train))
+        return tuple(rows)
+
+    def table(self, unit: str = "m") -> pd.DataFrame:
+        """Inputs, measured and predicted places and their distances, a row for each sample.
+
+        Args:
+            unit: Of lengths: m, cm, mm or L.
+        """
+        import pandas as pd
+
+        data, arm, shown = self.data, self.arm, as_unit(unit, self.arm.length)
+        table: dict[str, Any] = {
+            "row": data.rows,
+            "run": np.array(data.run_names)[data.runs],
+            "held_out": self.held.astype(int),
+        }
+        for k, (name, own) in enumerate(zip(arm.input_names, arm.input_units, strict=True)):
+            table[f"{name}{unit_suffix(own)}"] = data.inputs[:, k]
+        distance = np.linalg.norm(self.residuals, axis=2)
+        for m, marker in enumerate(data.marker_names):
+            for words, places in (("", data.places), ("predicted_", data.places + self.residuals)):
+                for k, axis in enumerate("xyz"):
+                    table[f"{marker}_{words}{axis}_{shown.name}"] = shown.of(places[:, m, k])
+            table[f"{marker}_error_{shown.name}"] = shown.of(distance[:, m])
+        return pd.DataFrame(table)
+
+    def report(self, unit: str | None = None) -> Report:
+        """Numbers, errors, verdict and pictures, to be printed, or saved as an .html file.
+
+        Args:
+            unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
+        """
+        from softreach.plot.results import plot_calibration
+
+        arm, data = self.arm, self.data
+        shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
+        fitted = counted(len(data) - int(self.held.sum()), "sample")
+        origin = [(_WORDS.get(key, key), text) for key, text in self.provenance.items()]
+        for name, column in zip(arm.input_names, data.input_names, strict=True):
+            origin.append((f"input {name}", f"column {column}" if column else "stays at 0"))
+        return Report(
+            title=f"Calibration from {data.source}",
+            verdict=self.verdict.sentence,
+            state=self.verdict.limit,
+            facts=[
+                f"{counted(len(self.names), 'number')} from {fitted} of "
+                f"{', '.join(data.marker_names)}, {self.seconds:.1f} s"
+            ],
+            sections=[
+                Section(
+                    title="Numbers",
+                    head=("number", "calibrated", "design"),
+                    rows=list(_number_rows(self, shown)),
+                    note="Each ± its standard deviation.",
+                ),
+                Section(
+                    title="Errors",
+                    head=(shown.label("error of places"), "samples", *_ERRORS),
+                    rows=[_error_cells(row, shown, arm.length) for row in self.errors],
+                    note="Distances between measured and predicted places of the markers. Samples "
+                    "that are held out were not seen by any fit.",
+                    points=list(_remarks(self, shown)),
+                ),
+                Section(
+                    title="Pictures",
+                    figures=lambda: [(plot_calibration(self, unit=shown), _PICTURE)],
+                ),
+                Section(title="Provenance", rows=origin, printed=0),
+                Section(title="The calibrated design", text=arm.to_toml()),
+            ],
+        )
+
+    def __repr__(self) -> str:
+        return str(self.report())
+
+
+def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
+    fit, widths = result.fit, result.uncertainty.sigma.tolist()
+    pairs = zip(fit.free.numbers, fit.values.tolist(), widths, fit.at_bound, strict=True)
+    # The pose starts from the data and not from the design.
+    pose: dict[str, float] = dict(
+        zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True)
+    )
+    for number, value, sigma, at_bound in pairs:
+        name, size = readable_unit(number.unit, value, unit)
+        text = quantity(value / size, name, sigma / size, digits=2)
+        text += ", at its bound" if at_bound else ", with its prior" if number.prior else ""
+        text += ", which the data does not tell" if sigma == math.inf else ""
+        yield number.name, text, f"{pose.get(number.name, number.start) / size:.4g}"
+
+
+def _error_cells(row: ErrorRow, unit: LengthUnit, length: float) -> tuple[str, ...]:
+    law, samples, errors = row
+    values = (errors.rms, errors.median, errors.most)
+    texts = [f"{value / unit.size:.3g}" for value in values] + [
+        f"{100 * errors.rms / length:.2g} %"
+    ]
+    return law, samples, *(texts if errors.number else "----")
+
+
+def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
+    if len(result.data.marker_names) > 1:
+        each = ((name, errors.rms / unit.size) for name, errors in result.by_marker.items())
+        listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)
+        yield f"{unit.label('rms')} of each marker: {listed}"
+    for one, other, share in result.correlated[:3]:
+        yield f"hardly told apart: {one} and {other} (correlation {share:+.3f})"
+    if len(far := result.outliers):
+        rows = ", ".join(map(str, far[:_MOST_ROWS])) + ", ..." * (len(far) > _MOST_ROWS)
+        yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"
