@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import threading
 
-import pytest
 from hypothesis import given
 from numba import njit
 
@@ -32,7 +29,7 @@ from softreach.studio.plots import PLOTS
 from softreach.studio.session import what_follows
 from softreach.studio.settings import PlotSettings
 from softreach.studio.state import Camera, Slice, StudioState
-from softreach.studio.work import CompilationWatch, IdleCompiler, Latest
+from softreach.studio.work import CompilationWatch, Latest
 from tests.studio.test_state import states
 
 _PLOT = {plot.name: job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True)}
@@ -193,19 +190,3 @@ def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
     watch.close()
     outer(1.5)
     assert told == [True, False]
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="priorities are others")
-def test_what_is_compiled_ahead_waits_for_all_others_and_ends_with_the_studio():
-    compiler = IdleCompiler()
-    compiler.close()
-    compiler.start()
-    assert compiler._process is None
-    compiler = IdleCompiler()
-    compiler.start()
-    process = compiler._process
-    compiler.start()
-    assert compiler._process is process
-    assert os.getpriority(os.PRIO_PROCESS, process.pid) == 19
-    compiler.close()
-    assert process.returncode is not None

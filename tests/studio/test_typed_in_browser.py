@@ -71,31 +71,6 @@ def test_every_control_has_a_tooltip_with_its_meaning(tab):
     assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")
 
 
-def test_keys_choose_tabs_and_show_their_table_but_not_while_one_types(tab):
-    def chosen() -> str:
-        return tab.page.locator("[role=tab][aria-selected=true]").first.inner_text()
-
-    names = [one.inner_text() for one in tab.page.get_by_role("tab").all()]
-    tab.page.locator("canvas").first.focus()
-    for number in (3, 1):
-        tab.page.keyboard.press(str(number))
-        tab.wait(lambda number=number: chosen() == names[number - 1], "the key chooses a tab")
-    table = tab.page.locator("dialog.keys")
-    for closing in ("?", "Escape"):
-        tab.page.keyboard.press("?")
-        table.get_by_text("choose a tab").wait_for()
-        tab.page.keyboard.press(closing)
-        table.wait_for(state="hidden")
-    fields = tab.slider("taper φ [deg]"), tab.page.locator("form input:visible").first
-    for typed in fields:
-        typed.focus()
-        tab.page.keyboard.press("2")
-        tab.page.keyboard.press("?")
-        assert chosen() == names[0]
-        assert not table.is_visible()
-    tab.page.keyboard.press("Escape")  # restores what was in the field
-
-
 @pytest.mark.large
 def test_an_arm_is_read_and_aimed_in_the_unit_of_its_design(tab):
     arm = designs.lce_arm().replace(display_unit="mm")

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softreach.studio.jobs.reach import SweepReach
 from softreach.studio.scene.camera import VIEWS, framing
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
-from tests.studio.tab import SIZE, unit
+from tests.studio.tab import unit
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
 BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
@@ -152,53 +151,6 @@ def test_a_scale_bar_is_as_long_as_that_length_at_the_depth_of_the_target(tab):
 
     assert tab.session.camera.pixels_per_length == pytest.approx(length(0.0), rel=1e-9)
     assert length(0.3) < 0.95 * length(0.0)
-
-
-@pytest.mark.large
-def test_f_leaves_the_scene_with_large_numbers_and_escape_brings_the_panel_back(tab):
-    page, numbers = tab.page, tab.page.locator("[data-history] b").first
-    canvas, small = page.locator("canvas").first, numbers.bounding_box()["height"]
-    field = page.get_by_role("textbox", name="taper φ [deg]")
-    field.focus()
-    page.keyboard.press("f")
-    assert page.get_by_role("tab", name="Design").is_visible()  # who types an f wants one
-    page.keyboard.press("Escape")
-    page.get_by_role("tab", name="Design").focus()
-    for leave in ("Escape", "f"):
-        page.keyboard.press("f")
-        tab.wait(lambda: canvas.bounding_box()["width"] == SIZE[0], "the scene is as wide")
-        assert not page.get_by_role("tab", name="Design").is_visible()
-        assert numbers.bounding_box()["height"] > 1.3 * small
-        page.keyboard.press(leave)
-        tab.wait(lambda: canvas.bounding_box()["width"] < SIZE[0], "the panel is back")
-        assert page.get_by_role("tab", name="Design").is_visible()
-
-
-def sweep(tab, motion: str) -> None:
-    tab.page.evaluate(f"localStorage.setItem('viser-user:softreach-motion', '{motion}')")
-    tab.session.job(SweepReach).ask()
-
-
-@pytest.mark.large
-def test_the_arm_sweeps_until_a_key_and_leaves_nothing_behind(tab, monkeypatch):
-    show(tab)
-    session, moved = tab.session, []
-    monkeypatch.setattr(session, "is_touched", False)
-    draw = session.scene.draw_arm
-    monkeypatch.setattr(
-        session.scene,
-        "draw_arm",
-        lambda arm, at, *more, **held: moved.append(at) or draw(arm, at, *more, **held),
-    )
-    before, tip = (session.state, session.history), session.tip
-    sweep(tab, "welcome")
-    tab.wait(lambda: len(moved) > 3, "the arm moves")
-    tab.page.keyboard.press("x")
-    tab.settle()
-    assert moved[-1] == before[0].activation
-    assert (session.state, session.history) == before
-    np.testing.assert_array_equal(session.tip, tip)
-    assert not session.is_touched
 
 
 def test_a_view_that_was_kept_on_a_phone_is_framed_anew_from_its_side(tab):

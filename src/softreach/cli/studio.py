@@ -89,7 +89,7 @@ def studio(
     with_token = not is_local(host) if token is None else token
     start = _start(source)
     secret, work = new_token() if with_token else "", _work(start, source, fresh=fresh)
-    with Studio(start, host, port, secret, work=work, compile_ahead=True, sweeps=True) as running:
+    with Studio(start, host, port, secret, work=work) as running:
         console.line(f"{running.url}  (Ctrl-C ends it)")
         for url in running.urls_for_others:
             console.line(f"{url}  (for other machines)")

@@ -27,7 +27,6 @@ from softreach.studio.jobs.reach import (
     DrawCloud,
     DrawSurface,
     FollowCamera,
-    SweepReach,
 )
 from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
 from softreach.studio.serve.messages import LARGEST_UPLOAD
@@ -37,7 +36,7 @@ from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import CompilationWatch, IdleCompiler, Latest, StaleCheck
+from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import InvalidInput, SoftreachError
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
 __all__ = ["JOBS", "Studio"]
 
 JOBS: tuple[type[Job], ...] = (
-    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurface, FollowCamera, SweepReach,
+    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurface, FollowCamera,
     DrawFree, DrawReference, DrawReferenceArm,
     SolveInverse, DragTip,
     FollowPath, PlayPath,
@@ -60,7 +59,6 @@ JOBS: tuple[type[Job], ...] = (
 """Every kind of work that a tab has done for it."""
 
 _CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
-_PATIENCE = 0.5  # [s]
 _MOST_LEFT = 20  # closed tabs whose work is remembered
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
@@ -76,8 +74,6 @@ class Studio:
         token: str = "",
         *,
         work: KeptWork | None = None,
-        compile_ahead: bool = False,
-        sweeps: bool = False,
     ) -> None:
         """Start serving.
 
@@ -87,16 +83,12 @@ class Studio:
             port: None for a free one.
             token: What every page has to know; "" for nothing.
             work: Where the work is kept when tabs and server end; nowhere by default.
-            compile_ahead: Whether to compile what may be needed, such as for loads, once the first
-                picture is complete.
-            sweeps: Whether the arm of a fresh tab sweeps its reach once.
 
         Raises:
             InvalidInput: The address cannot be used.
             MissingExtra: viser is not installed.
         """
         self.start, self._token, self.work = start, token, work
-        self._sweeps = sweeps and start.state.camera is None
         self.snapshots = Snapshots(work)
         # On a thread of its own: two tabs that show each other's changes would wait for each other.
         self._retold = Latest(_ignored)
@@ -106,8 +98,6 @@ class Studio:
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
-        self._compiler = IdleCompiler() if compile_ahead else None
-        self._rested = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
         self._libraries = threading.Thread(target=_load_libraries, daemon=True)
         self._libraries.start()
@@ -134,9 +124,6 @@ class Studio:
         """Stop serving."""
         self._compilation.close()
         self._retold.close()
-        self._rested.close()
-        if self._compiler is not None:
-            self._compiler.close()
         for session in list(self.sessions.values()):
             session.close()
         self._disconnect_tabs()
@@ -182,7 +169,6 @@ class Studio:
             session.take_up(*left)
         _furnish(session)
         session.camera.on_move(lambda: session.follow(FollowCamera))
-        session.job(SweepReach).is_due = self._sweeps and left is None
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)
@@ -192,15 +178,8 @@ class Studio:
             session.say(self.work.complaint)
         elif left is not None and not left[1].past:
             session.say(_GOES_ON)
-        self._rested.submit(partial(self._compile_ahead, session))
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)
-
-    def _compile_ahead(self, session: Session, check: StaleCheck) -> None:
-        while self._compiler is not None and not session.settle(_PATIENCE):
-            check()
-        if self._compiler is not None:
-            self._compiler.start()
 
     def _disconnected(self, client: ClientHandle) -> None:
         with self._lock:

@@ -15,9 +15,9 @@ from softreach.studio.reach import Reach, shown_rows, stages
 from softreach.studio.scene.camera import Viewpoint, is_behind
 from softreach.studio.scene.clouds import shown_color
 from softreach.studio.scene.scene import shows_cloud
-from softreach.studio.session import AskedJob, Job, Session
+from softreach.studio.session import Job, Session
 from softreach.studio.slopes import volume_slopes
-from softreach.studio.state import StudioState, rod_of, solvable_rod
+from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck
 from softreach.support.errors import InvalidInput
 
@@ -25,9 +25,6 @@ Array = NDArray[np.float64]
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _MOST_PLACES = 40  # that a view is cut free to
-_SWEEP, _FRAME, _TURNS = 4.0, 0.04, 2.0  # [s] of a sweep, [s] between its pictures, turns
-_MOTION = "softreach-motion"  # what `serve/page.js` keeps: "welcome" until a key or a click
-_ANSWER = 2.0  # [s] in which a page tells that
 _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 
 
@@ -118,8 +115,6 @@ class DrawSurface(Job):
         if key is not None:
             self.session.key = key
         self.session.show()
-        if reach.fine:
-            self.session.job(SweepReach).offer()
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:
@@ -222,65 +217,6 @@ class DrawArm(Job):
                 session.tip is None and status <= TipStatus.UNSTABLE
             )  # its shape was not found again
             session.posture = TipStatus.UNDECIDED if lost else status
-
-
-class SweepReach(AskedJob):
-    """The arm sweeps its reach once, after the first picture of a fresh tab."""
-
-    is_due = False
-    """True for a fresh tab whose arm has not swept yet."""
-
-    def offer(self) -> None:
-        """Sweep if that is due: there is a surface to sweep under."""
-        if self.is_due:
-            self.is_due = False
-            self.ask()
-
-    def do(self, check: StaleCheck) -> None:
-        session, state = self.session, self.session.state
-        if session.is_touched or session.tip is None or not state.appearance.arm:
-            return
-        start, begun = np.array(state.activation), None
-        bounds = np.array(rod_of(state.design).box.bounds)
-        try:
-            while session.state is state and _motion_is_welcome(session):
-                check()
-                begun = begun or time.monotonic()
-                share = (time.monotonic() - begun) / _SWEEP
-                if share >= 1.0:
-                    break
-                with session.client.atomic():
-                    at = swept_activation(start, bounds, share)
-                    tip = session.scene.draw_arm(state.design, at.tolist())
-                session.tip = tip if np.isfinite(tip).all() else None
-                session.show()
-                time.sleep(_FRAME)
-        finally:
-            session.follow(DrawArm)
-
-
-def swept_activation(start: Array, bounds: Array, share: float) -> Array:
-    """Activation on a smooth closed loop through the box.
-
-    Args:
-        start: Where it begins and ends, inside the box, shape (bundles,).
-        bounds: The lowest and the highest of each bundle, shape (bundles, 2).
-        share: Of the loop, 0 to 1.
-    """
-    low, high = bounds.T
-    phase = 2 * np.pi * (_TURNS * share + np.arange(len(start)) / len(start))
-    around = (low + high) / 2 + (high - low) / 2 * np.cos(phase)
-    weight = 1.0 - np.cos(np.pi * share) ** 8  # leaves and comes back at rest
-    return np.clip(start + weight * (around - start), low, high)
-
-
-def _motion_is_welcome(session: Session) -> bool:
-    """True until a person does anything in the page, unless the system asks for less motion."""
-    try:
-        said = session.client.local_storage.get_item(_MOTION, timeout=_ANSWER)
-    except (RuntimeError, TimeoutError):  # the page is gone or busy, or keeps nothing
-        return False
-    return said == "welcome"
 
 
 # The camera: the points that hide the arm from it, and the edges with numbers.

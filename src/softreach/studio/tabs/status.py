@@ -41,16 +41,14 @@ class StatusPanel:
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
-        check, history = session.check, session.history
+        check = session.check
         lines = [_numbers_text(session), [verdict_text(check)] if check is not None else []]
         marks = [markup.paragraph(*line) for line in _marks(session)]
-        steps = {"undo": history.past, "redo": history.future}
         self._known.show(
             markup.status(
                 *(markup.paragraph(*line) for line in lines),
                 key_html(session.key),
                 *marks,
-                available=[name for name, states in steps.items() if states],
             )
         )
         self._tell(session)
