@@ -91,7 +91,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
             DrawSurface,
             SECTION,
         },
-        full.showing(color="rgb"): {DrawCloud, DrawReference, DrawSurface},
+        full.showing(color="rgb"): {DrawCloud, DrawSurface},
         full.showing(surface=False): {DrawCloud, DrawSurface},
         full.showing(plots=PlotSettings()): {SWEEP, SECTION},
         full.replace(target=None): {SolveInverse, FollowCamera},

@@ -41,7 +41,7 @@ STATES = {
     "level": state_with(look__level=STRIKE),
     "color": state_with(look__color=STRIKE),
     "design": state_with(design=STRIKE),
-    "reference": state_with(design=RING, reference=NAMED, side_by_side=True),
+    "reference": state_with(design=RING, reference=NAMED),
 }
 NAMELESS = f"{STRIKE.replace('/', '')}.toml"
 FILES = {f"{name}.json": text for name, text in STATES.items()} | {

@@ -65,7 +65,7 @@ def studio(
     """Open the design desk in the browser.
 
     Move sliders, and see at once what the design can reach. The work on a design
-    and its snapshots are kept in a folder of your own, and found again.
+    is kept in a folder of your own, and found again.
 
     Example: softreach studio redundant_trunk --no-open
     """

@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
+from softreach.studio.jobs.beside import DrawFree, DrawReference
 from softreach.studio.jobs.calibration import DrawSample, FitArm
 from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.jobs.needs import CheckNeeds, ConfirmNeeds
@@ -33,9 +33,8 @@ from softreach.studio.serve.messages import LARGEST_UPLOAD
 from softreach.studio.serve.server import page_url, start_server, stop_server
 from softreach.studio.serve.viser_fixes import close_sockets, guard_inputs
 from softreach.studio.session import Job, Session
-from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
-from softreach.studio.state import Camera, History, StudioState, vector
+from softreach.studio.state import Camera, vector
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import InvalidInput, SoftreachError
 
@@ -48,7 +47,7 @@ __all__ = ["JOBS", "Studio"]
 
 JOBS: tuple[type[Job], ...] = (
     ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurface, FollowCamera,
-    DrawFree, DrawReference, DrawReferenceArm,
+    DrawFree, DrawReference,
     SolveInverse, DragTip,
     FollowPath, PlayPath,
     DrawSample, FitArm,
@@ -59,7 +58,6 @@ JOBS: tuple[type[Job], ...] = (
 """Every kind of work that a tab has done for it."""
 
 _CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
-_MOST_LEFT = 20  # closed tabs whose work is remembered
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
 
@@ -89,12 +87,6 @@ class Studio:
             MissingExtra: viser is not installed.
         """
         self.start, self._token, self.work = start, token, work
-        self.snapshots = Snapshots(work)
-        # On a thread of its own: two tabs that show each other's changes would wait for each other.
-        self._retold = Latest(_ignored)
-        self.snapshots.changed = lambda: self._retold.submit(lambda _: self._show_all())
-        self._left: list[tuple[StudioState, History]] = []
-        """The work of tabs that are closed: a page that is reloaded takes up the latest."""
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
@@ -123,7 +115,6 @@ class Studio:
     def stop(self) -> None:
         """Stop serving."""
         self._compilation.close()
-        self._retold.close()
         for session in list(self.sessions.values()):
             session.close()
         self._disconnect_tabs()
@@ -157,26 +148,26 @@ class Studio:
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start, JOBS, work=self.work, snapshots=self.snapshots)
+        session = Session(client, self.start, JOBS, work=self.work)
         guard_inputs(client, partial(_refuse_file, session))
         session.compiling = self._compilation.running
         session.compiled = self._compilation.done
         self._libraries.join()
+        left = None if self.work is None else self.work.latest
         with self._lock:
-            left = self._work_left()
             self.sessions[client.client_id] = session
         if left is not None:
-            session.take_up(*left)
+            session.take_up(left)
         _furnish(session)
         session.camera.on_move(lambda: session.follow(FollowCamera))
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)
-        elif session.camera.is_upright and (left is None or left[0].camera is None):
+        elif session.camera.is_upright and (left is None or left.camera is None):
             session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
-        elif left is not None and not left[1].past:
+        elif left is not None:
             session.say(_GOES_ON)
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)
@@ -188,23 +179,7 @@ class Studio:
             session.close()
             if not self.sessions:
                 forget_prepared()
-            if self.work is not None:
-                session.keep()
-                self._left.append((session.state_now(), session.history))
-                del self._left[:-_MOST_LEFT]
-
-    def _work_left(self) -> tuple[StudioState, History] | None:
-        """State and history that a new tab goes on with: those of tabs that are open are theirs."""
-        if self.work is None:
-            return None
-        if self._left:
-            return self._left.pop()
-        latest = None if self.sessions else self.work.latest
-        return None if latest is None else (latest, History())
-
-    def _show_all(self) -> None:
-        for session in list(self.sessions.values()):
-            session.show()
+            session.keep()
 
 
 def _load_libraries() -> None:

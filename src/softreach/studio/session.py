@@ -19,7 +19,6 @@ from softreach.studio.reach import Reach, cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene, shows_cloud
-from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState
 from softreach.studio.work import Latest, StaleCheck, return_memory_soon
@@ -132,7 +131,6 @@ class Session:
         jobs: Iterable[type[Job]] = (),
         *,
         work: KeptWork | None = None,
-        snapshots: Snapshots | None = None,
     ) -> None:
         """Begin a session; `panels` are added by the app before the first `update`.
 
@@ -141,12 +139,10 @@ class Session:
             start: What it begins with.
             jobs: Kinds of work that follow from its state.
             work: Where its state is kept, if anywhere.
-            snapshots: Those of all tabs.
         """
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
-        self.snapshots = snapshots or Snapshots()
         self.history = History()
         self.is_touched = False
         """True once there is anything to keep."""
@@ -173,6 +169,7 @@ class Session:
         self.free: Reach | None = None
         """Reach of a loaded design without its loads."""
         self.reference: Reach | None = None
+        """Reach of the design that is kept."""
         self.key: BundleKey | ScalarKey | None = None
         """To the colors of the cloud."""
         self.tip: Array | None = None
@@ -313,9 +310,9 @@ class Session:
         first = self.start.state
         self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
 
-    def take_up(self, state: StudioState, history: History) -> None:
+    def take_up(self, state: StudioState) -> None:
         """Go on where a tab left off, before anything is shown."""
-        self.state, self.history, self.is_touched = state, history, True
+        self.state, self.is_touched = state, True
         if state.design != self.start.state.design:
             self.reach = None
         if state.camera is not None:

@@ -77,7 +77,7 @@ def _is_solvable(arm: Manipulator) -> bool:
         return False
 
 
-VERSION = 2
+VERSION = 3
 LEVELS = range(12, 22)
 """The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
 
@@ -191,9 +191,7 @@ class StudioState:
     target: Vector | None = None
     """Place where the tip should go [m]."""
     reference: Manipulator | None = None
-    """The design of a snapshot that is drawn around this one."""
-    side_by_side: bool = False
-    """It is drawn beside this one instead."""
+    """A design that is kept, to be compared with this one."""
     camera: Camera | None = None
     path: TipPath | None = None
     """Path that the tip follows."""
@@ -247,7 +245,7 @@ class StudioState:
             raise InvalidInput("state file", str(error), "one that the studio saved") from None
 
 
-_PLAIN = ("activation", "target", "side_by_side", "needs")
+_PLAIN = ("activation", "target", "needs")
 
 
 def _parsed(text: str | bytes) -> dict[str, Any]:
@@ -273,7 +271,6 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "appearance": Appearance(**look),
         "target": values["target"] and vector(values["target"]),
         "reference": reference and design_of_text(reference, "state file"),
-        "side_by_side": bool(values["side_by_side"]),
         "camera": camera and _camera(**camera),
         "path": path and TipPath.from_fields(path),
         "needs": str(values["needs"]),
@@ -312,7 +309,7 @@ def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...
 
 _LONGEST = 200  # steps back
 _PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
-_SETTINGS = ("design", "reference", "side_by_side", "needs")
+_SETTINGS = ("design", "reference", "needs")
 _POSE = ("activation", "target")
 
 

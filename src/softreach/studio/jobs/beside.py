@@ -1,14 +1,12 @@
-"""Jobs of other designs in the scene: the arm without its loads, and that of a snapshot."""
+"""Jobs of other designs in the scene: the arm without its loads, and the one that is kept."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.jobs.reach import draw_axes
-from softreach.studio.reach import Reach, beside, stages
+from softreach.studio.reach import Reach, stages
 from softreach.studio.session import Job
 from softreach.studio.work import StaleCheck
 
@@ -47,12 +45,9 @@ class DrawFree(Job):
 
 
 class DrawReference(Job):
-    """The reach of the design of a snapshot, around this one's or beside it."""
+    """The boundary of the design that is kept."""
 
-    depends_on = (
-        "reference", "side_by_side",
-        "appearance.level", "appearance.color", "appearance.slice",
-    )  # fmt: skip
+    depends_on = "reference", "appearance.slice"
     only_with = "reference"
 
     def run(self, check: StaleCheck) -> None:
@@ -65,11 +60,8 @@ class DrawReference(Job):
         elif session.reference is None or session.reference.arm != reference:
             session.reference = self._reach_of(reference, check)
         if session.reference is not None:
-            shift = beside(session.reference) if session.state.side_by_side else np.zeros(3)
-            name = session.snapshots.name_of(session.reference.arm)
             with session.drawing, session.client.atomic():
-                session.scene.draw_reference(session.reference, state.appearance, shift, name)
-            session.follow(DrawReferenceArm)
+                session.scene.draw_reference(session.reference, state.appearance.slice)
         session.show()
 
     def _reach_of(self, reference: Manipulator, check: StaleCheck) -> Reach:
@@ -78,21 +70,3 @@ class DrawReference(Job):
             return known
         *_, fine = stages(reference, _LEVEL, self.session.quality, check)
         return fine
-
-
-class DrawReferenceArm(Job):
-    """The arm of that design beside this one, in the same activation."""
-
-    depends_on = "reference", "activation", "appearance.arm"
-    only_with = "side_by_side"
-
-    def run(self, check: StaleCheck) -> None:
-        check()
-        session, state = self.session, self.session.state
-        reference = session.reference
-        with session.drawing:
-            if reference is not None and state.side_by_side and state.appearance.arm:
-                same = state.replace(design=reference.arm).activation
-                session.scene.draw_reference_arm(reference.arm, same, beside(reference))
-            else:
-                session.scene.remove("/reference/arm")

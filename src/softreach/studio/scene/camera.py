@@ -29,7 +29,6 @@ VIEWS: dict[str, Array] = {
 }
 """Directions from the middle to the camera."""
 
-_STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _PATIENCE = 30.0  # [s] for a picture
 _LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
@@ -154,20 +153,6 @@ class TabCamera:
         except TimeoutError:
             allowed = "in the foreground"
             raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
-
-    def step_back(self, shift: Array) -> None:
-        """Make room for a second cloud that stands `shift` [L] beside the first."""
-        self._step(shift, _STEP_BACK)
-
-    def step_forth(self, shift: Array) -> None:
-        """The inverse of `step_back`."""
-        self._step(-shift, 1 / _STEP_BACK)
-
-    def _step(self, shift: Array, ratio: float) -> None:
-        now = self.actual()
-        look_at = np.asarray(now.look_at) + shift / 2
-        position = (np.asarray(now.position) - now.look_at) * ratio + look_at
-        self.look_from(Camera(position=vector(position), look_at=vector(look_at)))
 
 
 # Points between the camera and what is to be seen: the arm and the target.

@@ -16,7 +16,7 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, rest_configuration
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
-from softreach.studio.scene.axes import NumberedBox, add_label
+from softreach.studio.scene.axes import NumberedBox
 from softreach.studio.scene.camera import Viewpoint, way_to
 from softreach.studio.scene.clouds import (
     FAINT,
@@ -319,43 +319,15 @@ class Scene:
             precision="float32",
         )
 
-    def draw_reference(self, reach: Reach, look: Appearance, shift: Array, name: str) -> None:
-        """Another design: its boundary in gray around this one's cloud, or its cloud beside it.
-
-        Args:
-            reach: Its reach.
-            look: How this design is drawn.
-            shift: How far beside it stands [L]; zero for around.
-            name: Of the other design.
-        """
+    def draw_reference(self, reach: Reach, cut: Slice) -> None:
+        """The boundary of another design in gray; its points, where it has none."""
         self.remove("/reference")
-        if np.any(shift):
-            self._draw_beside(reach, look, shift, name)
-        elif isinstance(reach.exact, ReachableSolid):
-            self._surface("/reference", reach.sheets, reach, look.slice, _REFERENCE, 0.3)
+        if isinstance(reach.exact, ReachableSolid):
+            self._surface("/reference", reach.sheets, reach, cut, _REFERENCE, 0.3)
         else:
-            points = cloud_points(reach, min(look.level, 16))
+            points = cloud_points(reach, _FREE_LEVEL)
             gray = np.array(_REFERENCE, np.uint8)
             self._points("/reference", points, gray, point_size(len(points)))
-
-    def _draw_beside(self, reach: Reach, look: Appearance, shift: Array, name: str) -> None:
-        level = min(look.level, 16)
-        points, coloring = cloud_points(reach, level), sample_colors(reach, level, look.color)
-        kept = in_slice(points, look.slice)
-        size = point_size(len(points))
-        self._points("/reference/cloud", points[kept] + shift, coloring.rgb[kept], size)
-        above = np.array([0, 0, points[:, 2].max(initial=0.0) + 0.12])
-        add_label(self._api, "/reference/name", name, above + shift)
-        add_label(self._api, "/reference/other", "this design", above)
-
-    def draw_reference_arm(
-        self, arm: Manipulator, activation: Sequence[float], shift: Array
-    ) -> None:
-        """The arm of the design beside this one."""
-        path = "/reference/arm"
-        self.draw_arm(arm, activation, path)
-        for handle in self._arms.get(path, (arm, []))[1]:
-            handle.position = shift
 
     def remove(self, *paths: str) -> None:
         """Take nodes and everything under them out of the scene."""
