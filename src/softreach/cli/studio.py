@@ -81,7 +81,8 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.serve.access import check_address, is_local, new_token
+    from softreach.studio.serve.guard import new_token
+    from softreach.studio.serve.server import check_address, is_local
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)

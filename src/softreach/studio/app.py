@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import suppress
-from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -28,15 +27,21 @@ from softreach.studio.jobs.reach import (
     DrawSurface,
     FollowCamera,
 )
-from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
-from softreach.studio.serve.messages import LARGEST_UPLOAD
-from softreach.studio.serve.server import page_url, start_server, stop_server
-from softreach.studio.serve.viser_fixes import close_sockets, guard_inputs
+from softreach.studio.serve.guard import close_sockets
+from softreach.studio.serve.server import (
+    LOOPBACK,
+    page_address,
+    page_url,
+    reachable_hosts,
+    start_server,
+    stop_server,
+    with_token,
+)
 from softreach.studio.session import Job, Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, vector
 from softreach.studio.work import CompilationWatch, Latest
-from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -149,7 +154,6 @@ class Studio:
 
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start, JOBS, work=self.work)
-        guard_inputs(client, partial(_refuse_file, session))
         session.compiling = self._compilation.running
         session.compiled = self._compilation.done
         self._libraries.join()
@@ -199,11 +203,6 @@ def _camera_beside(arm: Manipulator) -> Camera:
     look_at = arm.base.to_world(arm.length * np.array(_CAMERA.look_at)) / arm.length
     position = look_at + np.subtract(_CAMERA.position, _CAMERA.look_at)
     return Camera(position=vector(position), look_at=vector(look_at))
-
-
-def _refuse_file(session: Session, name: str, size: int) -> None:
-    most = f"at most {LARGEST_UPLOAD / 1e6:g} MB"
-    session.say(str(InvalidInput(name, f"{size / 1e6:.3g} MB", most)))
 
 
 def _furnish(session: Session) -> None:

@@ -166,7 +166,8 @@ def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
         rows.append(Row(title, values[0], values[1], (errors[0], errors[1])))
     shares = [_finite(100 * reach.unreachability) if reach else None for _, reach in (kept, now)]
     if any(share is not None for share in shares):
-        rows.append(Row("UNR [%]", *(None if s is None else round(s, 2) for s in shares)))
+        before, after = (None if share is None else round(share, 2) for share in shares)
+        rows.append(Row("UNR [%]", before, after))
     return rows
 
 
@@ -188,7 +189,7 @@ def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) ->
         label = (both[1].get(name) or both[0][name]).label
         values = [_finite(each[name].shown) if name in each else None for each in both]
         if not _same(*values):
-            rows[name] = Row(label, *values)
+            rows[name] = Row(label, values[0], values[1])
     return rows
 
 

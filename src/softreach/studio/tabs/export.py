@@ -10,8 +10,14 @@ from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
 from softreach.studio.captions import scale_bar
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
-from softreach.studio.page import picture_file, static_page
+from softreach.studio.files import (
+    cloud_file,
+    figure_file,
+    page_file,
+    picture_file,
+    state_from,
+    surface_file,
+)
 from softreach.studio.scene.camera import FINER
 from softreach.support.errors import InvalidInput
 
@@ -92,7 +98,7 @@ class ExportPanel:
         return figure_file(reach, self._session.state)
 
     def _page(self, reach: Reach) -> bytes:
-        return static_page(self._session.state_now(), reach).encode()
+        return page_file(reach, self._session.state)
 
     def _button(self, label: str, action: Callable[[], None], **looks: Any) -> None:
         button = self._session.client.gui.add_button(label, hint=_ABOUT[label], **looks)
