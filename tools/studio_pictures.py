@@ -46,7 +46,7 @@ def studio_handle(tab: Tab) -> None:
     tab.session.update(lambda state: state.replace(design=FOLDED))
     tab.settle()
     place = tuple(round(float(x), 5) for x in pose(tab, TWICE))
-    tab.session.update(lambda state: state.replace(target=place).showing(cut="half"))
+    tab.session.update(lambda state: state.replace(target=place))
     tab.session.look_from("side")
     tab.wait(lambda: tab.session.answer is not None, "the inverse answers")
     assert len(tab.session.answer or ()) > 1, "there is no ghost to see"

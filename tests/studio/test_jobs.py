@@ -52,10 +52,10 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
         state.showing(slice=Slice(axis="x")): {DrawCloud, DrawSurface},
         state.showing(surface=False): {DrawCloud, DrawSurface},
         state.showing(cloud=True): {DrawCloud, DrawSurface},
-        state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowCamera},
-        state.showing(cut="half"): {FollowCamera},
+        state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse},
+        state.showing(half=False): {FollowCamera},
         state.showing(dark=True): {SetTheme, DrawSurface},
-        state.replace(needs=NEEDS): {CheckNeeds, FollowCamera},
+        state.replace(needs=NEEDS): {CheckNeeds},
         state.replace(reference=trunk): {DrawReference},
         state.replace(design=other): {
             ComputeReach,
@@ -94,9 +94,9 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
         full.showing(color="rgb"): {DrawCloud, DrawSurface},
         full.showing(surface=False): {DrawCloud, DrawSurface},
         full.showing(plots=PlotSettings()): {SWEEP, SECTION},
-        full.replace(target=None): {SolveInverse, FollowCamera},
+        full.replace(target=None): {SolveInverse},
         full.replace(reference=None): {DrawReference},
-        full.replace(needs=""): {CheckNeeds, FollowCamera},
+        full.replace(needs=""): {CheckNeeds},
     }
     for new, jobs in moves.items():
         assert what_follows(JOBS, full, new) == jobs | {KeepState}

@@ -22,7 +22,7 @@ from tests.studio.conftest import SMALL
 @pytest.fixture
 def loads_tab(tab):
     """An arm of a known stiffness."""
-    state = StudioState(design=designs.lce_arm()).showing(level=12, cut="none")
+    state = StudioState(design=designs.lce_arm()).showing(level=12, half=False)
     tab.session.update(lambda _: state)
     tab.settle()
     tab.open("Parts")

@@ -171,7 +171,7 @@ def test_files_and_numbers_of_no_needs_are_refused_and_the_needs_before_stay(ope
 
 
 def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session):
-    session.update(lambda state: state.showing(cut="none", cloud=True))
+    session.update(lambda state: state.showing(half=False, cloud=True))
     assert session.settle()
     tip = session.reach.cloud.tip.values[3]
     point = tip / ARM.length

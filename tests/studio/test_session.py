@@ -41,7 +41,7 @@ def clicked_path(session: Session, origin, direction) -> np.ndarray | None:
 
 
 def test_a_click_for_a_path_hits_no_point_that_is_cut_away(session):
-    session.update(lambda state: state.showing(cut="half"))
+    session.update(lambda state: state.showing(cloud=True))
     assert session.settle()
     points = cloud_points(session.reach, session.state.appearance.level)
     hidden = session.scene.clouds.hidden(points)

@@ -52,7 +52,7 @@ def like(image: np.ndarray, color) -> int:
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     show(tab, mouse="none")  # the handle has a blue arrow
     seen = like(pixels(tab), BLUE)
-    show(tab, cut="none")
+    show(tab, half=False)
     hidden = like(pixels(tab), BLUE)
     show(tab, cloud=False)
     alone = like(pixels(tab), BLUE)

@@ -79,7 +79,7 @@ def figure_file(reach: Reach, state: StudioState) -> bytes:
 
 
 def page_file(reach: Reach, state: StudioState) -> bytes:
-    """A web page of the boundary or the points that are shown, with the arm as it is, to be turned."""
+    """A web page to be turned: the boundary or the points that are shown, and the arm as it is."""
     from softreach import plot
 
     look, shape = state.appearance, configuration(state.design, np.asarray(state.activation))

@@ -81,13 +81,6 @@ VERSION = 3
 LEVELS = range(12, 22)
 """The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
 
-CUTS = {
-    "window": "a window to the arm",
-    "half": "the half in front of the arm",
-    "none": "nothing",
-}
-"""Parts of a cloud that are cut away in front of the arm: name -> what the menu says."""
-
 MOUSE = {
     "tip": "drags the tip",
     "target": "sets the target",
@@ -129,8 +122,8 @@ class Appearance:
     color: str = "effort"
     """One of `colors.color_names`."""
     slice: Slice = field(default_factory=Slice)
-    cut: str = "window"
-    """Part of the cloud that is cut away in front of the arm: one of `CUTS`."""
+    half: bool = True
+    """The half of the cloud in front of the arm is cut away."""
     dark: bool = False
     """The page is dark."""
     cloud: bool = False
@@ -149,8 +142,6 @@ class Appearance:
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
             raise InvalidInput("level", self.level, f"{LEVELS[0]} to {LEVELS[-1]}")
-        if self.cut not in CUTS:
-            raise InvalidInput("cut", self.cut, f"one of {', '.join(CUTS)}")
         if self.mouse not in MOUSE:
             raise InvalidInput("mouse", self.mouse, f"one of {', '.join(MOUSE)}")
         for each in fields(self):  # in a state that came from elsewhere too

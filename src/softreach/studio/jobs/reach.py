@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.jobs.plots import REACH_JOBS
 from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.needs import requirements_of
 from softreach.studio.reach import Reach, shown_rows, stages
-from softreach.studio.scene.camera import Viewpoint, is_behind
+from softreach.studio.scene.camera import is_behind
 from softreach.studio.scene.clouds import shown_color
 from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.session import Job, Session
@@ -24,7 +23,6 @@ from softreach.support.errors import InvalidInput
 Array = NDArray[np.float64]
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_MOST_PLACES = 40  # that a view is cut free to
 _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 
 
@@ -223,11 +221,9 @@ class DrawArm(Job):
 
 
 class FollowCamera(Job):
-    """Cuts away what hides the arm and places to reach, and turns the axes to the camera."""
+    """Cuts away the half of a cloud that hides the arm, and turns the axes to the camera."""
 
-    depends_on = (
-        "appearance.cut", "appearance.arm", "appearance.handle", "target", "needs",
-    )  # fmt: skip
+    depends_on = "appearance.half", "appearance.arm", "appearance.handle"
 
     def run(self, check: StaleCheck) -> None:
         time.sleep(_PAUSE)
@@ -235,11 +231,14 @@ class FollowCamera(Job):
         if session.camera.keep_width():
             session.follow(FollowCamera)
         with session.drawing, session.client.atomic():
-            viewpoint = self._viewpoint()
+            state, camera = session.state, session.camera.actual()
+            position = np.array(camera.position)
+            ahead = (camera.look_at - position) * (1.0, 1.0, 0.0)
+            base = np.array(state.design.base.position) / state.design.length
             most = _DRAGGED if session.is_dragged else None
-            session.scene.clouds.look(viewpoint, session.state.appearance.cut, most)
-            session.scene.axes.turn(viewpoint.position, session.camera.focal)
-            hides = session.shows_sample or self._hides_handle(viewpoint.position)
+            session.scene.clouds.look(ahead if state.appearance.half else None, base, most)
+            session.scene.axes.turn(position, session.camera.focal)
+            hides = session.shows_sample or self._hides_handle(position)
             session.scene.see_through_arm(hides)
 
     def _hides_handle(self, camera: Array) -> bool:
@@ -248,10 +247,3 @@ class FollowCamera(Job):
         tip, look = session.tip, session.state.appearance
         shown = look.handle and look.arm
         return shown and tip is not None and is_behind(tip, camera, *session.scene.spine)
-
-    def _viewpoint(self) -> Viewpoint:
-        session, state = self.session, self.session.state
-        places = requirements_of(state.needs).places[:_MOST_PLACES]
-        if state.target is not None:
-            places = np.vstack([places, state.target])
-        return session.scene.viewpoint(session.camera.actual(), state, places / state.design.length)

@@ -17,7 +17,7 @@ from softreach.rod.arm_shape import arm_surface, bundle_skins, marker_points, re
 from softreach.rod.kinematics import configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.scene.axes import NumberedBox
-from softreach.studio.scene.camera import Viewpoint, way_to
+from softreach.studio.scene.camera import way_to
 from softreach.studio.scene.clouds import (
     FAINT,
     Clouds,
@@ -29,7 +29,7 @@ from softreach.studio.scene.clouds import (
     shaded,
 )
 from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
-from softreach.studio.state import Appearance, Camera, Slice, StudioState, solvable_rod
+from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support.palette import bundle_color
 from softreach.workspace import ReachableSolid
 
@@ -67,7 +67,6 @@ _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
 _AROUND_TIP = 0.06  # [L], where a click means no ghost: all shapes meet there
-_AROUND_PLACE = 0.02  # [L] that should be seen
 _AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
 """Corners around most clouds, seen from the base [L]."""
 _NOTHING = np.empty((0, 3)), np.empty(0)
@@ -191,22 +190,6 @@ class Scene:
                 ],
             )
         return shape["position"].values[-1] / length
-
-    def viewpoint(
-        self, camera: Camera, state: StudioState, places: Array | None = None
-    ) -> Viewpoint:
-        """Viewpoint of a camera that should see the arm as it is drawn, and places [L]."""
-        centers, radii = self.spine if state.appearance.arm else _NOTHING
-        if places is not None:
-            centers = np.vstack([centers, places])
-            radii = np.append(radii, np.full(len(places), _AROUND_PLACE))
-        return Viewpoint(
-            position=np.asarray(camera.position),
-            look_at=np.asarray(camera.look_at),
-            base=np.array(state.design.base.position) / state.design.length,
-            centers=centers,
-            radii=radii,
-        )
 
     def see_through_arm(self, clear: bool) -> None:
         """Let what is behind the arm be seen through it, or not."""

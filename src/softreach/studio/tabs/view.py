@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from softreach.studio.fields import Attribute, Fields, attribute, bind_button
 from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.clouds import color_names
-from softreach.studio.state import CUTS, StudioState
+from softreach.studio.state import StudioState
 from softreach.studio.widgets import show_where
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, from the map itself"),
     "cloud": ("cloud", "Tips of sampled activations"),
+    "half": ("half of the cloud", "Cuts away the half in front of the arm, so that it is seen"),
     "dark": ("dark page", "Light on dark"),
 }
 
@@ -35,12 +36,6 @@ class ViewPanel:
                 lambda state: color_names(state.design),
                 Attribute(_color, lambda state, name: state.showing(color=name)),
                 "What the color of a point says; the key is above the tabs",
-            )
-            fields.dropdown(
-                "cut away",
-                CUTS,
-                attribute("appearance.cut"),
-                "What of the cloud is taken away, so that arm and target are seen",
             )
             with gui.add_folder("show"):
                 for name, (label, hint) in _TOGGLES.items():
