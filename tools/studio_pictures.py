@@ -48,8 +48,8 @@ def studio_handle(tab: Tab) -> None:
     place = tuple(round(float(x), 5) for x in pose(tab, TWICE))
     tab.session.update(lambda state: state.replace(target=place))
     tab.session.look_from("side")
-    tab.wait(lambda: tab.session.answer is not None, "the inverse answers")
-    assert len(tab.session.answer or ()) > 1, "there is no ghost to see"
+    tab.wait(lambda: tab.session.found.answer is not None, "the inverse answers")
+    assert len(tab.session.found.answer or ()) > 1, "there is no ghost to see"
 
 
 def studio_plots(tab: Tab) -> None:

@@ -47,7 +47,7 @@ def opened(studio: Studio) -> Iterator[Session]:
 def session(opened) -> Session:
     opened.update(lambda state: state.replace(design=ARM, activation=()))
     opened.end_step()
-    opened.bench = None
+    opened.learn({"bench": None})
     opened.settle()
     return opened
 
@@ -70,7 +70,8 @@ def moved(panel, session, sample) -> None:
 
 
 def fitted(panel, session, free) -> None:
-    panel._free.value = free
+    for name, box in panel._free.items():
+        box.value = name in free
     panel._ask()
     session.settle()
 
@@ -102,7 +103,7 @@ def test_a_sample_is_shown_only_while_the_arm_has_its_inputs(session):
     session.update(lambda state: state.replace(activation=()))
     session.settle()
     assert drawn(session, "/sample/measured") is None
-    assert "not at a sample" in panel._residuals._widget.content
+    assert "not at a measured pose" in panel._residuals._widget.content
     session.step(back=True)
     session.settle()
     assert drawn(session, "/sample/measured") is not None
@@ -120,16 +121,16 @@ def test_inputs_beyond_the_bounds_are_said_and_their_markers_predicted_as_they_a
 
 def test_a_fit_finds_the_numbers_of_the_arm_and_applying_it_can_be_undone(session):
     panel = loaded(session)
-    fitted(panel, session, "pose.position, taper")
+    fitted(panel, session, ("pose", "taper"))
     summary = panel._summary._widget.content
     for words in ("pose.x", "taper", "±", "20 fitted", "constant curvature", "limited by"):
         assert words in summary
-    assert np.nanmax(session.bench.distances) < 2e-3
+    assert np.nanmax(session.found.sample.distances) < 2e-3
     assert drawn(session, "/sample/arm/0") is not None
     panel._applied()
     session.settle()
     design = session.state.design
-    assert design == session.bench.result.arm
+    assert design == session.found.bench.result.arm
     assert design.base.position == pytest.approx(REAL.base.position, abs=2e-4)
     assert design.profile.taper == pytest.approx(REAL.profile.taper, abs=2e-4)
     assert drawn(session, "/sample/arm/0") is None
@@ -141,7 +142,7 @@ def test_a_fit_finds_the_numbers_of_the_arm_and_applying_it_can_be_undone(sessio
 @pytest.mark.large
 def test_a_design_that_was_changed_since_the_fit_is_not_replaced(session):
     panel = loaded(session)
-    fitted(panel, session, "pose.position")
+    fitted(panel, session, ("pose",))
     assert panel._apply.visible
     other = changed(ARM, {"taper": 0.02})
     session.update(lambda state: state.replace(design=other))
@@ -158,4 +159,4 @@ def test_data_of_another_arm_is_no_longer_shown(session):
     session.settle()
     assert drawn(session, "/sample/measured") is None
     with pytest.raises(sr.InvalidInput, match="load the data again"):
-        panel._pose(session.bench)
+        panel._pose(session.found.bench)

@@ -9,7 +9,6 @@ import pytest
 
 import softreach as sr
 from softreach.rod import tip_map
-from softreach.studio.jobs.inverse import SolveInverse
 
 
 @pytest.fixture
@@ -97,15 +96,6 @@ def test_a_tip_inside_the_exact_surface_is_dragged(inverse_tab):
     np.testing.assert_allclose(tip_of(tab)[:2], tip[:2], atol=2e-5)
 
 
-MOVES = """async ([x, y]) => {
-    for (let step = 1; step <= 8; step++) {
-        const place = {clientX: x + step, clientY: y, pointerId: 1, buttons: 1, bubbles: true};
-        document.querySelector("canvas").dispatchEvent(new PointerEvent("pointermove", place));
-        await null;
-    }
-}"""
-
-
 def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(full_tab):
     tab = full_tab
     begin = pose(tab, START)
@@ -113,7 +103,7 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghos
     drag_tip(tab, begin, end)
     tab.page.wait_for_timeout(300)
     tab.settle()
-    middle = tab.session.drag
+    middle = tab.session.found.lag
     assert middle.dragged.gap == 0.0
     tab.wait(lambda: len(tab.drawn("/cloud").points) <= 1 << 13, "the cloud is thin")
     assert np.linalg.norm(tip_of(tab) - middle.wanted) < 1e-5
@@ -129,7 +119,7 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghos
     path = sr.track_path(state.design, [begin, state.target], START)
     np.testing.assert_allclose(path.activation.values[-1], state.activation, atol=1e-3)
 
-    answer = tab.session.answer
+    answer = tab.session.found.answer
     held = np.abs(answer.activations - tab.session.state.activation).max(axis=1)
     assert held.min() < 1e-3
     assert all(tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer)))
@@ -138,9 +128,9 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghos
 def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
     tab = inverse_tab
     arm, scene = tab.session.state.design, tab.session.scene
-    tab.session.job(SolveInverse).aim(np.array([0.2932, 0.0739, 0.0088]))
+    tab.session.aim(np.array([0.2932, 0.0739, 0.0088]))
     tab.settle()
-    shapes, eye = tab.session.answer.activations, tab.session.client.camera.position
+    shapes, eye = tab.session.found.answer.activations, tab.session.client.camera.position
     changes = np.abs(shapes - tab.session.state.activation).max(axis=1)
     here, other = changes.argmin(), changes.argmax()
     assert here != other
@@ -159,9 +149,9 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
     tab = inverse_tab
     begin = pose(tab, (-0.2, -0.1, -0.1))
     drag_tip(tab, begin, begin + [0.0, 0.0, 0.35])
-    tab.wait(lambda: tab.session.drag and tab.session.drag.dragged.gap > 0.02, "a gap")
+    tab.wait(lambda: tab.session.found.lag and tab.session.found.lag.dragged.gap > 0.02, "a gap")
     tab.settle()
-    pull = tab.session.drag
+    pull = tab.session.found.lag
     assert tab.drawn("/lag").visible
     assert tab.drawn("/lag label").text == f"{pull.dragged.gap:.3g} m short"
     tab.page.get_by_text(f"This branch ends {pull.dragged.gap:.3g} m short").wait_for()
@@ -184,7 +174,7 @@ def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_t
     tab.wait(lambda: tab.drawn("/arm/0").opacity == 0.6, "an arm before its tip is not")
     tab.wait(lambda: around(tab, begin).min() < 0.45, "the ball is seen")  # the body is lighter
     drag_tip(tab, begin, begin + [0.0, 0.0, 0.02])
-    tab.wait(lambda: tab.session.drag, "the arm follows")
+    tab.wait(lambda: tab.session.found.lag, "the arm follows")
     tab.page.mouse.up()
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
     tab.settle()

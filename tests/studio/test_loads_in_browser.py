@@ -71,10 +71,10 @@ def mirrored_unstable(arm):
 
 @pytest.mark.large
 def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path):
-    tab, free = loads_tab, loads_tab.session.reach
+    tab, free = loads_tab, loads_tab.session.found.reach
     tab.choose("gravity", "up")
     become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
-    loaded = tab.session.reach
+    loaded = tab.session.found.reach
     assert loaded.arm == tab.session.state.design
     share = loaded.volume / free.volume
     assert 0.7 < share < 0.85
@@ -109,7 +109,7 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     tab.wait(lambda: loads(tab) is None, "nothing acts")
     tab.settle()
     assert not tab.drawn("/free")
-    assert tab.session.reach.arm == designs.lce_arm()
+    assert tab.session.found.reach.arm == designs.lce_arm()
     tab.wait(lambda: tab.field("gravity").input_value() == "none", "the fields are empty")
     told = tab.page.get_by_text("equilibrium")
     tab.wait(lambda: told.count() == 0, "nothing is said of equilibria")
@@ -127,19 +127,19 @@ def test_postures_under_loads_are_told(loads_tab):
         lambda one: one.payload == pytest.approx(0.03),
         "the payload hangs",
     )
-    reach = tab.session.reach
+    reach = tab.session.found.reach
     assert reach.arm == tab.session.state.design
     share = f"{100 * reach.share(TipStatus.NO_EQUILIBRIUM):.2g}"
     tab.page.get_by_text(f"no equilibrium, not shown: {share} %").wait_for()
 
     tab.open("Move")  # it tells the posture
     tab.page.get_by_text("a stable equilibrium").locator("visible=true").wait_for()
-    arm, cloud = tab.session.state.design, tab.session.reach.cloud
+    arm, cloud = tab.session.state.design, tab.session.found.reach.cloud
     pulled = cloud.activation.values[5]
     tab.session.update(lambda s: s.replace(activation=tuple(pulled)))
     tab.settle()
     np.testing.assert_allclose(
-        tab.session.tip, sr.tip_positions(arm, [pulled])[0] / arm.length, atol=5e-5
+        tab.session.found.tip, sr.tip_positions(arm, [pulled])[0] / arm.length, atol=5e-5
     )
     folded = cloud.activation.values[reach.status == TipStatus.NO_EQUILIBRIUM][0]
     for lost, status, words in (
@@ -148,7 +148,7 @@ def test_postures_under_loads_are_told(loads_tab):
     ):
         tab.session.update(lambda s, lost=lost: s.replace(activation=tuple(lost)))
         tab.settle()
-        assert tab.session.posture == status
+        assert tab.session.found.posture == status
         tab.page.get_by_text(words).locator("visible=true").wait_for()
     assert not tab.drawn("/arm/0")
     tab.session.update(lambda s: s.replace(activation=()))
@@ -193,7 +193,7 @@ def test_the_section_is_that_of_the_exact_set(tab):
     tab.page.get_by_text("y = 0 m: ").wait_for()
     picture = tab.page.locator("img").first
     assert picture.evaluate("image => image.naturalWidth") > 600
-    reach = tab.session.reach
+    reach = tab.session.found.reach
     curves = section_curves(reach, Slice())
     points = np.concatenate(curves)
     assert np.ptp(points[:, 1]) == 0.0
@@ -211,13 +211,13 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     tab.session.update(lambda s: s.showing(slice=cut))
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
     assert tab.page.locator("img").first.get_attribute("src") != before
-    area = enclosed_area(section_curves(tab.session.reach, cut), 2)
+    area = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
     tab.page.get_by_text(f"{area:.4g} m²").wait_for()
     tab.open("Design")
     tab.drag("revolution Ω [deg]", 40)
     tab.settle()
-    assert tab.session.figures.plots["section"].arm == tab.session.state.design
-    changed = enclosed_area(section_curves(tab.session.reach, cut), 2)
+    assert tab.session.found.section.arm == tab.session.state.design
+    changed = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
     assert changed != area
     tab.page.get_by_text(f"{changed:.4g} m²").wait_for()
 
@@ -240,7 +240,7 @@ def test_the_numbers_in_the_plane_are_those_of_the_inverse():
 
 @pytest.mark.large
 def test_the_areas_of_sections_sum_up_to_the_volume(tab):
-    reach = tab.session.reach
+    reach = tab.session.found.reach
     surface, length = reach.exact.surface(), reach.arm.length
     low, high = surface.vertices[:, 2].min(), surface.vertices[:, 2].max()
     edges = np.linspace(low, high, 41)

@@ -79,7 +79,7 @@ def test_of_tabs_that_were_closed_nothing_stays(studio):
     gone = []
     for _ in range(2):
         with page(studio) as session:
-            gone.append(weakref.ref(session.reach.cloud))
+            gone.append(weakref.ref(session.found.reach.cloud))
             del session
     until(lambda: not studio.sessions)
     until(lambda: own_threads() <= before)
@@ -117,8 +117,8 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
         threads = own_threads()
         shake(session, 40, 0.01)
         assert session.settle(PATIENCE)
-        assert session.reach is not None
-        assert session.reach.arm == session.state.design
+        assert session.found.reach is not None
+        assert session.found.reach.arm == session.state.design
         assert computed[-1] == session.state.design
         assert len(computed) < 60  # each in two or three stages, of which the later are dropped
         assert len(session.history.past) < 50

@@ -18,7 +18,7 @@ from softreach.picture.axes_box import axes_box, seen_from
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import TipStatus, has_tip
-from softreach.studio.captions import legend_text, scale_bar, size_text
+from softreach.studio.captions import legend_text, size_text
 from softreach.studio.reach import (
     Quality,
     Reach,
@@ -240,18 +240,6 @@ def test_the_name_of_an_axis_keeps_its_distance_from_the_number_beside_it(eye, f
             number = focal * ways @ (at - eye) / (forward @ (at - eye))
             beside, above = np.abs(seen[name] - number)
             assert beside > 19 or above > 11
-
-
-@pytest.mark.parametrize("focal", [37.0, 100.0, 862.0, 1e4])
-def test_a_scale_bar_is_round_as_long_as_it_says_and_nearly_as_long_as_there_is_room(focal):
-    bar = scale_bar(focal, 180.0, 0.25)
-    named, unit, _, meters, metric = bar.text.split()
-    assert unit == "L"
-    assert bar.pixels == pytest.approx(float(named) * focal)
-    assert 180 / 2.5 < bar.pixels <= 180 * (1 + 1e-9)
-    assert float(f"{float(named):e}"[0]) in (1, 2, 5)
-    size = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}[metric]
-    assert float(meters) * size == pytest.approx(0.25 * float(named), rel=5e-3)
 
 
 # Loads as they are typed, and what is computed of a loaded arm

@@ -149,6 +149,6 @@ def guarded():
 @pytest.mark.large
 def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, guarded):
     tab = Tab(browser, guarded)
-    assert tab.session.reach is not None
+    assert tab.session.found.reach is not None
     assert tab.errors == []
     tab.close()

@@ -43,7 +43,7 @@ def clicked_path(session: Session, origin, direction) -> np.ndarray | None:
 def test_a_click_for_a_path_hits_no_point_that_is_cut_away(session):
     session.update(lambda state: state.showing(cloud=True))
     assert session.settle()
-    points = cloud_points(session.reach, session.state.appearance.level)
+    points = cloud_points(session.found.reach, session.state.appearance.level)
     hidden = session.scene.clouds.hidden(points)
     eye = np.asarray(session.client.camera.position)
     distance = np.linalg.norm(points - eye, axis=1)

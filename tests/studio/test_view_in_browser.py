@@ -12,7 +12,6 @@ from softreach.studio.scene.camera import VIEWS, framing
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
-from tests.studio.tab import unit
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
 BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
@@ -108,9 +107,8 @@ def test_numbers_stand_outside_of_what_they_number_from_every_side(tab):
     low, high = tab.session.scene.axes.corners
     middle = (low + high) / 2
     for toward in ((2, -4, 1.5), (-3, 3, 1), (3, 2, -2), (-4, -1, -2)):
-        with tab.session.drawing:  # the eye's own job turns them too
-            tab.session.scene.axes.turn(middle + np.array(toward))
-            labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
+        tab.session.scene.axes.turn(middle + np.array(toward))
+        labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
         places = np.array([label.position for label in labels if label is not None])
         assert ((places < low) | (places > high)).any(axis=1).all()
 
@@ -137,20 +135,6 @@ def test_a_saved_picture_is_drawn_anew_over_key_numbers_and_design(tab, tmp_path
     monkeypatch.setattr("softreach.studio.scene.camera._LONGEST", 100)
     with pytest.raises(InvalidInput, match="make the window smaller"):
         tab.session.picture()
-
-
-def test_a_scale_bar_is_as_long_as_that_length_at_the_depth_of_the_target(tab):
-    def length(depth: float) -> float:
-        """Pixels of 1 L across the sight, so much [L] behind the target."""
-        camera = tab.session.client.camera
-        forward = unit(camera.look_at - camera.position)
-        right = 0.05 * unit(np.cross(forward, camera.up_direction))
-        middle = camera.look_at + depth * forward
-        ends = [tab.projected(middle + side * right)[0] for side in (-1, 1)]
-        return (ends[1] - ends[0]) * camera.image_width / 0.1
-
-    assert tab.session.camera.pixels_per_length == pytest.approx(length(0.0), rel=1e-9)
-    assert length(0.3) < 0.95 * length(0.0)
 
 
 def test_a_view_that_was_kept_on_a_phone_is_framed_anew_from_its_side(tab):

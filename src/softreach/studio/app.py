@@ -12,20 +12,18 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.jobs.beside import DrawFree, DrawReference
-from softreach.studio.jobs.calibration import DrawSample, FitArm
-from softreach.studio.jobs.inverse import DragTip, SolveInverse
-from softreach.studio.jobs.needs import CheckNeeds, ConfirmNeeds
-from softreach.studio.jobs.page import KeepState, SetTheme
-from softreach.studio.jobs.path import FollowPath, PlayPath
-from softreach.studio.jobs.plots import PLOT_JOBS
+from softreach.studio.jobs.arm import DRAW_ARM, FOLLOW_CAMERA, SET_THEME
+from softreach.studio.jobs.beside import DRAW_FREE, DRAW_REFERENCE
+from softreach.studio.jobs.calibration import DRAW_SAMPLE, FIT_ARM
+from softreach.studio.jobs.inverse import DRAG_TIP, SOLVE_INVERSE
+from softreach.studio.jobs.needs import CHECK_NEEDS
+from softreach.studio.jobs.path import FOLLOW_PATH, PLAY_PATH
+from softreach.studio.jobs.plots import DRAW_SECTION, SWEEP_VOLUME
 from softreach.studio.jobs.reach import (
-    ComputeReach,
-    DifferentiateVolume,
-    DrawArm,
-    DrawCloud,
-    DrawSurface,
-    FollowCamera,
+    COMPUTE_REACH,
+    DIFFERENTIATE_VOLUME,
+    DRAW_CLOUD,
+    DRAW_SURFACE,
 )
 from softreach.studio.serve.guard import close_sockets
 from softreach.studio.serve.server import (
@@ -37,7 +35,7 @@ from softreach.studio.serve.server import (
     stop_server,
     with_token,
 )
-from softreach.studio.session import Job, Session
+from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, vector
 from softreach.studio.work import CompilationWatch, Latest
@@ -50,15 +48,15 @@ if TYPE_CHECKING:
 
 __all__ = ["JOBS", "Studio"]
 
-JOBS: tuple[type[Job], ...] = (
-    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurface, FollowCamera,
-    DrawFree, DrawReference,
-    SolveInverse, DragTip,
-    FollowPath, PlayPath,
-    DrawSample, FitArm,
-    CheckNeeds, ConfirmNeeds,
-    *PLOT_JOBS,
-    SetTheme, KeepState,
+JOBS = (
+    COMPUTE_REACH, DIFFERENTIATE_VOLUME, DRAW_CLOUD, DRAW_SURFACE,
+    DRAW_ARM, FOLLOW_CAMERA, SET_THEME,
+    DRAW_FREE, DRAW_REFERENCE,
+    SOLVE_INVERSE, DRAG_TIP,
+    FOLLOW_PATH, PLAY_PATH,
+    DRAW_SAMPLE, FIT_ARM,
+    CHECK_NEEDS,
+    DRAW_SECTION, SWEEP_VOLUME,
 )  # fmt: skip
 """Every kind of work that a tab has done for it."""
 
@@ -163,7 +161,7 @@ class Studio:
         if left is not None:
             session.take_up(left)
         _furnish(session)
-        session.camera.on_move(lambda: session.follow(FollowCamera))
+        session.camera.on_move(lambda: session.follow("camera"))
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)

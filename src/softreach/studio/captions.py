@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,14 +11,13 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.clouds import FAINT
-from softreach.support.quantity import round_below
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from softreach.arm.manipulator import Manipulator
+    from softreach.studio.found import Found
     from softreach.studio.reach import Reach, Size
-    from softreach.studio.session import Session
 
 UNREACHABILITY = (
     "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
@@ -100,10 +99,10 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 
 
-def loaded_share(session: Session) -> str:
+def loaded_share(found: Found, design: Manipulator) -> str:
     """Share of the reach without loads that is left; nothing for an arm without loads."""
-    reach, free = session.reach, session.free
-    if reach is None or reach.arm.loads is None or reach.arm != session.state.design:
+    reach, free = found.reach, found.free
+    if reach is None or reach.arm.loads is None or reach.arm != design:
         return ""
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
@@ -112,42 +111,16 @@ def loaded_share(session: Session) -> str:
     return f" under loads, {share} of {whole} without"
 
 
-def tip_text(session: Session) -> list[Part]:
+def tip_text(found: Found, design: Manipulator) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
     parts: list[Part] = []
-    if session.tip is not None:
-        place = place_text(session.tip, session.state.design, 6)
-        pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(session.scene.pointing, 3))
+    if found.tip is not None:
+        place = place_text(found.tip, design, 6)
+        pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(found.pointing, 3))
         parts.append(f"tip at {place}, pointing along ({pointing})")
-    if session.posture is not None:
-        parts.append(f"{' · ' if parts else ''}{_POSTURES[session.posture]}")
+    if found.posture is not None:
+        parts.append(f"{' · ' if parts else ''}{_POSTURES[found.posture]}")
     return parts
-
-
-class ScaleBar(NamedTuple):
-    """Line of a round length, and how long that is in words."""
-
-    pixels: float
-    text: str
-
-
-def scale_bar(pixels_per_length: float, room: float, length: float) -> ScaleBar:
-    """The longest bar of 1, 2 or 5 times a power of ten of L that there is room for.
-
-    Args:
-        pixels_per_length: Pixels of 1 L.
-        room: Pixels that the bar may take.
-        length: L [m].
-    """
-    bar = round_below(room / pixels_per_length)
-    return ScaleBar(bar * pixels_per_length, f"{bar:.12g} L = {_meters(bar * length)}")
-
-
-def _meters(length: float) -> str:
-    for unit, size in (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)):
-        if length >= size * (1 - 1e-9):
-            return f"{length / size:.3g} {unit}"
-    return f"{length / 1e-6:.3g} µm"
 
 
 def _percent(share: float) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softreach.export import export_cloud, export_mesh
 from softreach.rod.kinematics import configuration
-from softreach.studio.captions import ScaleBar, legend_text, reach_text
+from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.clouds import in_slice, sample_values
@@ -131,7 +131,6 @@ def picture_file(
     state: StudioState,
     reach: Reach,
     key: BundleKey | ScalarKey | None,
-    bar: ScaleBar,
 ) -> bytes:
     """The picture as PNG.
 
@@ -140,7 +139,6 @@ def picture_file(
         state: What it shows.
         reach: Of its design.
         key: To its colors.
-        bar: In the lower left of the scene, in pixels of the page.
     """
     from matplotlib.figure import Figure
 
@@ -152,7 +150,6 @@ def picture_file(
     paper, ink = _PAPER_AND_INK[state.appearance.dark]
     figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=dpi, facecolor=paper)
     figure.figimage(scene, 0, below * FINER)
-    _draw_bar(figure, bar, (_EDGE / width, (below + _EDGE) / total), (width, total), ink)
     if key is not None:
         _draw_key(figure, key, (1 - (height + 0.35 * _KEY) / total, _KEY / total), ink)
     for k, line in enumerate(reversed(lines)):
@@ -161,23 +158,6 @@ def picture_file(
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=dpi, facecolor=paper)
     return file.getvalue()
-
-
-def _draw_bar(
-    figure: Figure, bar: ScaleBar, at: tuple[float, float], size: tuple[float, float], ink: str
-) -> None:
-    from matplotlib.lines import Line2D
-
-    (left, low), (width, height) = at, size
-    right, tick = left + bar.pixels / width, 4 / height
-    for x, y in (
-        ((left, right), (low, low)),
-        ((left, left), (low - tick, low + tick)),
-        ((right, right), (low - tick, low + tick)),
-    ):
-        figure.add_artist(Line2D(x, y, color=ink, linewidth=1.2, solid_capstyle="butt"))
-    middle, above = (left + right) / 2, low + 6 / height
-    figure.text(middle, above, bar.text, fontsize=8.5, color=ink, ha="center", va="bottom")
 
 
 def design_text(state: StudioState) -> str:

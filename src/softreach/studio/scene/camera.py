@@ -128,12 +128,6 @@ class TabCamera:
             self.look_from(Camera(position=position, look_at=camera.look_at))
         return False
 
-    @property
-    def pixels_per_length(self) -> float:
-        """Pixels of what is 1 L long across the sight, at the depth of what it looks at."""
-        camera = self._client.camera
-        return self.focal / float(np.linalg.norm(camera.look_at - camera.position))
-
     def picture(self) -> NDArray[np.uint8]:
         """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
 

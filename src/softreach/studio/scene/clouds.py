@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -53,7 +54,7 @@ class Clouds:
     """Draws clouds, and draws those again whose hidden points change as camera or arm move."""
 
     def __init__(self, api: SceneApi) -> None:
-        self._api = api
+        self._api, self._lock = api, threading.RLock()
         self._known: dict[str, tuple[Dots, NDArray[np.bool_]]] = {}
         self._ahead: Array | None = None
         self._base = np.zeros(3)
@@ -61,9 +62,10 @@ class Clouds:
 
     def draw(self, path: str, dots: Dots) -> None:
         """All but the points in the way of what the last `look` wanted to see."""
-        kept = self._kept(dots)
-        self._known[path] = dots, kept
-        self._send(path, dots.where(kept))
+        with self._lock:
+            kept = self._kept(dots)
+            self._known[path] = dots, kept
+            self._send(path, dots.where(kept))
 
     def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
         """Cut away the half in front of the arm; nothing is sent of a cloud that keeps its points.
@@ -78,11 +80,12 @@ class Clouds:
         self._ahead, self._base, self._most = ahead, base, most
         if is_thin:  # it hides little, and the page draws no frame while it takes up another
             return
-        for path, (dots, before) in list(self._known.items()):
-            kept = self._kept(dots)
-            if not np.array_equal(kept, before):
-                self._known[path] = dots, kept
-                self._send(path, dots.where(kept))
+        with self._lock:
+            for path, (dots, before) in list(self._known.items()):
+                kept = self._kept(dots)
+                if not np.array_equal(kept, before):
+                    self._known[path] = dots, kept
+                    self._send(path, dots.where(kept))
 
     def forget(self, path: str) -> None:
         """Draw a cloud no more; its node is the caller's to remove."""

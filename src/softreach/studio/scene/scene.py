@@ -234,18 +234,6 @@ class Scene:
             self._api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
         return coloring.key
 
-    def draw_thick_lines(self, reach: Reach, look: Appearance, thickness: float) -> None:
-        """Edges and folds of the boundary this thick [L]: those that `glb` draws have one pixel.
-
-        A page draws them slowly, so that they are for pictures, whose pixels are small.
-        """
-        if not (look.surface and reach.has_surface) or shows_cloud(reach, look):
-            return
-        lines = _lines_of(reach, look).astype(np.float32)
-        if len(lines):
-            ink = _INK[look.dark]
-            self._api.add_line_segments("/thick-lines", lines, ink, thickness=thickness)
-
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
         clouds = [reach] if free is None else [reach, free]
@@ -302,9 +290,11 @@ class Scene:
             precision="float32",
         )
 
-    def draw_reference(self, reach: Reach, cut: Slice) -> None:
+    def draw_reference(self, reach: Reach | None, cut: Slice) -> None:
         """The boundary of another design in gray; its points, where it has none."""
         self.remove("/reference")
+        if reach is None:
+            return
         if isinstance(reach.exact, ReachableSolid):
             self._surface("/reference", reach.sheets, reach, cut, _REFERENCE, 0.3)
         else:

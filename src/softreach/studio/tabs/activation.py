@@ -47,7 +47,7 @@ class ActivationPanel:
             self._design = session.state.design
             self._fit(session)
         self._sliders.show(session)
-        self._tip.say(*tip_text(session))
+        self._tip.say(*tip_text(session.found, session.state.design))
 
     def _fit(self, session: Session) -> None:
         ends = _slider_ends(session.state.design)

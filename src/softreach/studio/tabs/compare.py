@@ -53,15 +53,15 @@ class ComparePanel:
         self._fields.show(session)
         design, reference = session.state.design, session.state.reference
         show_where(reference is not None, self._others)
-        known = (design, reference, session.reach, session.reference)
+        known = (design, reference, session.found.reach, session.found.reference)
         if known == self._known:
             return
         self._known = known
         if reference is None:
             self._table.say(_HINT)
         else:
-            before = _known_reach(session.reference, reference)
-            now = _known_reach(session.reach, design)
+            before = _known_reach(session.found.reference, reference)
+            now = _known_reach(session.found.reach, design)
             self._table.show(comparison_html(compared((reference, before), (design, now))))
 
 
