@@ -11,7 +11,6 @@ from softreach.geometry.surface import plane_cut
 from softreach.inverse import solve_inverse
 from softreach.rod.tip_map import TipStatus
 from softreach.studio import StudioState
-from softreach.studio.captions import size_text
 from softreach.studio.plots.section import enclosed_area, plane_counts, section_curves, within
 from softreach.studio.reach import stages
 from softreach.studio.settings import PlotSettings
@@ -70,52 +69,6 @@ def mirrored_unstable(arm):
 
 
 @pytest.mark.large
-def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path):
-    tab, free = loads_tab, loads_tab.session.found.reach
-    tab.choose("gravity", "up")
-    become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
-    loaded = tab.session.found.reach
-    assert loaded.arm == tab.session.state.design
-    share = loaded.volume / free.volume
-    assert 0.7 < share < 0.85
-    tab.page.get_by_text(
-        f"{size_text(loaded.size, loaded.arm)} under loads, "
-        f"{100 * share:.0f} % of {1e6 * free.volume:.4g} mL without"
-    ).wait_for()
-    assert tab.drawn("/free")
-    tab.page.get_by_text("every sample rests in a stable equilibrium").wait_for()
-
-    before = loads(tab)
-    typed(tab, "payload [g]", "-5")
-    alert = tab.page.get_by_role("alert").filter(has_text="payload = ")
-    alert.wait_for()
-    assert loads(tab) == before
-    enter(
-        tab,
-        "payload [g]",
-        "2",
-        lambda one: one.payload == pytest.approx(0.002),
-        "a payload that can be",
-    )
-    alert.wait_for(state="hidden")
-
-    tab.open("Export")
-    tab.choose("data", "design (.toml)")
-    design = sr.Manipulator.load(tab.save("Save data", tmp_path))
-    assert design.loads == loads(tab)
-    tab.open("Parts")
-
-    tab.press("Take all loads off")
-    tab.wait(lambda: loads(tab) is None, "nothing acts")
-    tab.settle()
-    assert not tab.drawn("/free")
-    assert tab.session.found.reach.arm == designs.lce_arm()
-    tab.wait(lambda: tab.field("gravity").input_value() == "none", "the fields are empty")
-    told = tab.page.get_by_text("equilibrium")
-    tab.wait(lambda: told.count() == 0, "nothing is said of equilibria")
-
-
-@pytest.mark.large
 def test_postures_under_loads_are_told(loads_tab):
     tab = loads_tab
     tab.choose("gravity", "up")
@@ -157,30 +110,6 @@ def test_postures_under_loads_are_told(loads_tab):
 
 
 # End to end: two places, one of them missed, and a slider that changes that
-
-
-def test_needs_are_seen_met_and_missed_and_follow_a_slider(tab):
-    tab.open("Goals")
-    tab.press("Add to the needs")  # where the tip is
-    tab.page.get_by_text("place 1: reached").wait_for()
-    tab.field("numbers").fill("0.37, 0.15, 0.85")
-    tab.settle()
-    tab.press("Add to the needs")
-    tab.page.get_by_text("place 2: missed by 0.0082").wait_for()
-    tab.wait(lambda: tab.drawn("/needs/missed"), "the place is a cross")
-    assert len(tab.drawn("/needs/reached").points) == 1
-
-    tab.open("Design")
-    tab.page.get_by_text("needs: 1 of 2 met · place 2 missed by").wait_for()
-    tab.drag("taper φ [deg]", -85)
-    tab.wait(lambda: tab.drawn("/needs/missed") is None, "the cross is a ball")
-    tab.page.get_by_text("needs: 2 of 2 met").wait_for()
-    tab.settle()
-    assert len(tab.drawn("/needs/reached").points) == 2
-    tab.open("Goals")
-    tab.page.get_by_text("place 2: reached").wait_for()
-    tab.press("Undo")
-    tab.page.get_by_text("place 2: missed by").wait_for()
 
 
 # End to end: the reachable set in the plane of the slice

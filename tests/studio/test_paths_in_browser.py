@@ -30,18 +30,6 @@ def circled(tab, folder):
     return tab.session.found.track
 
 
-def test_a_path_from_a_file_is_followed_from_the_present_activation(tab, tmp_path):
-    found, state = circled(tab, tmp_path), tab.session.state
-    tab.page.get_by_text("All 97 points are followed").wait_for()
-    tab.wait(lambda: tab.drawn("/grip/ball").opacity, "where the path begins is seen in the ball")
-    np.testing.assert_allclose(found.activation.values[0], ACTIVATION, atol=1e-6)
-    tips = sr.tip_positions(state.design, found.activation.values)
-    np.testing.assert_allclose(tips, found.position, atol=2e-5 * state.design.length)
-    assert tab.drawn("/path/followed")
-    assert not tab.drawn("/path/end")
-    tab.page.locator(".uplot canvas").first.wait_for()
-
-
 @pytest.mark.large
 def test_playing_leads_the_arm_to_the_end_and_the_slider_back(tab, tmp_path):
     found = circled(tab, tmp_path)

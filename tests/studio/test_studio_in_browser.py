@@ -91,7 +91,7 @@ def test_a_state_is_saved_and_loaded(tab, tmp_path):
         lambda s: StudioState(design=sr.designs.minimal_trunk(1.0)).showing(level=12)
     )
     tab.settle()
-    tab.load(file)
+    tab.upload("Load state or design", file)
     tab.wait(lambda: tab.session.state.design == kept.design, "the design is back")
     tab.settle()
     assert tab.session.state.replace(camera=None) == kept.replace(camera=None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 
 import numpy as np
@@ -12,28 +11,10 @@ from softreach.studio.scene.camera import VIEWS, framing
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
+from tests.studio.tab import like
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
 BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
-
-
-def pixels(tab) -> np.ndarray:
-    """What the canvas shows, RGB from 0 to 1."""
-    from matplotlib.image import imread
-
-    tab.settle()
-    canvas = tab.page.locator("canvas").first.bounding_box()
-
-    def picture() -> np.ndarray:
-        tab.page.wait_for_timeout(400)
-        return imread(io.BytesIO(tab.page.screenshot(clip=canvas)))[..., :3]
-
-    image = picture()
-    for _ in range(8):  # until it stands still
-        last, image = image, picture()
-        if (last == image).all():
-            break
-    return image
 
 
 def show(tab, **look) -> None:
@@ -41,20 +22,13 @@ def show(tab, **look) -> None:
     tab.settle()
 
 
-def like(image: np.ndarray, color) -> int:
-    """Number of pixels of about this hue, however bright."""
-    size = np.linalg.norm(image, axis=-1)
-    cosine = image @ np.asarray(color) / np.maximum(size, 1e-9) / np.linalg.norm(color)
-    return int(((cosine > 0.985) & (size > 0.25)).sum())
-
-
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     show(tab, mouse="none")  # the handle has a blue arrow
-    seen = like(pixels(tab), BLUE)
+    seen = like(tab.pixels(), BLUE)
     show(tab, half=False)
-    hidden = like(pixels(tab), BLUE)
+    hidden = like(tab.pixels(), BLUE)
     show(tab, cloud=False)
-    alone = like(pixels(tab), BLUE)
+    alone = like(tab.pixels(), BLUE)
     assert seen > 0.9 * alone
     assert hidden < 0.75 * seen
 
@@ -75,7 +49,7 @@ def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
 
 def pixels_of(tab, **look) -> np.ndarray:
     show(tab, **look)
-    return pixels(tab)
+    return tab.pixels()
 
 
 @pytest.mark.large

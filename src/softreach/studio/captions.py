@@ -11,6 +11,7 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.clouds import FAINT
+from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -45,7 +46,14 @@ def size_text(size: Size, arm: Manipulator) -> str:
     if size.power == 0:
         return size.name
     error = max(size.error, _FINEST * arm.length**size.power)
-    return f"{size.name} {arm.length_unit.text(size.value, size.power, error)}"
+    return f"{size.name} {_unit_of(size, arm).text(size.value, size.power, error)}"
+
+
+def _unit_of(size: Size, arm: Manipulator) -> LengthUnit:
+    """The unit of the arm; for volumes of a liter and more that of liters in place of mL."""
+    unit, liter = arm.length_unit, as_unit("cm")
+    large = size.power == 3 and size.value >= liter.scale(3)
+    return liter if large and unit.name == "mm" else unit
 
 
 def place_text(place: Iterable[float], arm: Manipulator, decimals: int = 4) -> str:
@@ -107,7 +115,7 @@ def loaded_share(found: Found, design: Manipulator) -> str:
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = free.arm.length_unit.rounded(free.size.value, free.size.power)
+    whole = _unit_of(free.size, free.arm).rounded(free.size.value, free.size.power)
     return f" under loads, {share} of {whole} without"
 
 
