@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from tests.browser import CHROMIUM, FLAGS
@@ -13,11 +13,7 @@ from softreach import tip_positions
 from softreach.arm import designs
 from softreach.studio import Studio
 from softreach.studio.captions import size_text
-from softreach.studio.jobs.inverse import DragTip
 from softreach.studio.start import start_on_design
-
-if TYPE_CHECKING:
-    from softreach.studio.work import StaleCheck
 
 _WATCH = """() => new Promise(done => {
     const shown = () => document.body.innerText.match(/volume [^·]*/)?.[0];
@@ -50,7 +46,7 @@ def moved_slider(tab: Tab) -> float:
 def _wait_for_numbers(tab: Tab) -> None:
     """Until the page shows all that the server has found: the last of it may be on its way."""
     tab.settle()
-    reach = tab.session.reach
+    reach = tab.session.found.reach
     assert reach is not None and reach.size is not None, "the design has a volume"  # noqa: PT018
     tab.page.get_by_text(size_text(reach.size, reach.arm)).first.wait_for()
 
@@ -123,7 +119,7 @@ def dragged_tip(tab: Tab, seconds: float = 2.0) -> Drag:
     count = len(served) - first
     mouse.up()
     tab.settle()
-    del tab.session.job(DragTip).run  # counts no more
+    del tab.session.learn  # counts no more
     return Drag(events / spent, count / spent)
 
 
@@ -163,14 +159,14 @@ def turned_scene(tab: Tab, seconds: float = 2.0) -> float:
 
 def _count_pulls(tab: Tab) -> list[float]:
     """Times at which a pull of this tab was done; grows while the tip is dragged."""
-    job, done = tab.session.job(DragTip), []
-    run = job.run
+    done, learn = [], tab.session.learn
 
-    def counted(check: StaleCheck) -> None:
-        run(check)
-        done.append(time.perf_counter())
+    def counted(found: Any, **options: Any) -> None:
+        if isinstance(found, dict) and "lag" in found:
+            done.append(time.perf_counter())
+        learn(found, **options)
 
-    job.run = counted
+    tab.session.learn = counted
     return done
 
 

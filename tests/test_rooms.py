@@ -5,8 +5,6 @@ from __future__ import annotations
 import grimp
 
 CIRCLES = [
-    "studio.fields studio.jobs.calibration studio.jobs.plots studio.jobs.reach studio.plots "
-    "studio.plots.plot studio.plots.section studio.plots.sweep studio.session",
 ]
 """Modules that reach each other where imports for types count; the list may only shrink."""
 

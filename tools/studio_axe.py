@@ -65,7 +65,7 @@ def furnish(tab: Tab) -> None:
     tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section", "sweep"))))
     tab.settle()
     tab.open("Compare")
-    tab.press("Take snapshot")
+    tab.press("Keep this design")
     tab.settle()
 
 

@@ -15,7 +15,6 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 from tests.browser import CHROMIUM, FLAGS
 from tests.studio.tab import Tab
-from tests.studio.test_compare_in_browser import take
 from tests.studio.test_handle_in_browser import pose
 
 from softreach.arm import designs
@@ -47,10 +46,10 @@ def studio_handle(tab: Tab) -> None:
     tab.session.update(lambda state: state.replace(design=FOLDED))
     tab.settle()
     place = tuple(round(float(x), 5) for x in pose(tab, TWICE))
-    tab.session.update(lambda state: state.replace(target=place).showing(cut="half"))
+    tab.session.update(lambda state: state.replace(target=place))
     tab.session.look_from("side")
-    tab.wait(lambda: tab.session.answer is not None, "the inverse answers")
-    assert len(tab.session.answer or ()) > 1, "there is no ghost to see"
+    tab.wait(lambda: tab.session.found.answer is not None, "the inverse answers")
+    assert len(tab.session.found.answer or ()) > 1, "there is no ghost to see"
 
 
 def studio_plots(tab: Tab) -> None:
@@ -64,17 +63,11 @@ def studio_plots(tab: Tab) -> None:
 
 
 def studio_compare(tab: Tab) -> None:
-    """Three designs in a table."""
+    """Two designs in a table, the kept one in gray."""
     tab.open("Compare")
-    first = tab.session.state.design
-    for taper in (None, 1.5, 1.0):
-        if taper is not None:
-            design = changed(first, {"taper": np.radians(taper)})
-            tab.session.update(
-                lambda state, design=design: state.replace(design=design, activation=CURLED)
-            )
-            tab.settle()
-        take(tab)
+    tab.press("Keep this design")
+    design = changed(tab.session.state.design, {"taper": np.radians(1.5)})
+    tab.session.update(lambda state: state.replace(design=design, activation=CURLED))
 
 
 def studio_needs(tab: Tab) -> None:

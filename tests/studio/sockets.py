@@ -67,5 +67,5 @@ def page(studio: Studio) -> Iterator[Session]:
     with connected(studio):
         until(lambda: set(studio.sessions) - known)
         session = studio.sessions[max(studio.sessions)]
-        until(lambda: session.panels and session.reach is not None and not session.busy)
+        until(lambda: session.panels and session.found.reach is not None and not session.busy)
         yield session

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.studio import Start, Studio
+from softreach.studio.reach import Reach
 from softreach.studio.session import Session
 
 PATIENCE = 300.0  # [s] a loaded machine compiles shaders slowly
@@ -182,10 +185,78 @@ class Tab:
         caught.value.save_as(path)
         return path
 
-    def load(self, path: Path) -> None:
+    def upload(self, button: str, path: Path) -> None:
+        """Press a button that asks for a file, and choose one."""
         with self.page.expect_file_chooser() as caught:
-            self.press("Load state or design")
+            self.press(button)
         caught.value.set_files(path)
+
+    def type(self, label: str, text: str) -> None:
+        """Fill the field behind a label or beside its slider with another value, and apply it."""
+        self.settle()  # what follows from the change before shows in the field too
+        label = f"//label[normalize-space()='{label}']"
+        row = f"xpath={label}/ancestor::form[1]//input | {label}/following::form[1]//input"
+        place = self.page.locator(row).locator("visible=true").first
+        before, alerts = self.session.state, self.page.get_by_role("alert").locator("visible=true")
+
+        def applied() -> bool:
+            place.fill(text)
+            place.press("Enter")
+            self.page.wait_for_timeout(300)
+            self.settle()
+            return self.session.state != before or alerts.count() > 0
+
+        self.wait(applied, f"{label} is {text}, or refused")
+
+    def show_surface(self, on: bool = True) -> None:
+        """Show the exact surface alone, or nothing of the reach."""
+        self.open("View")
+        self.page.get_by_label("cloud", exact=True).set_checked(False)
+        self.page.get_by_label("exact surface", exact=True).set_checked(on)
+        self.settle()
+
+    def reach_of(self, arm: Manipulator) -> Reach:
+        """The reach of a design, once the page has it."""
+        self.wait(lambda: self.session.found.complete_reach(arm), "the reach is known")
+        self.settle()
+        reach = self.session.found.complete_reach(arm)
+        assert reach is not None
+        return reach
+
+    def pixels(self) -> np.ndarray:
+        """What the canvas shows once it stands still, RGB from 0 to 1, shape (rows, columns, 3)."""
+        self.settle()
+        from matplotlib.image import imread
+
+        canvas = self.page.locator("canvas").first.bounding_box()
+
+        def picture() -> np.ndarray:
+            self.page.wait_for_timeout(400)
+            return imread(io.BytesIO(self.page.screenshot(clip=canvas)))[..., :3]
+
+        image = picture()
+        for _ in range(8):
+            last, image = image, picture()
+            if (last == image).all():
+                break
+        return image
+
+    def changed(self, before: np.ndarray) -> float:
+        """Share of the canvas that looks different now."""
+        now = self.pixels()
+        rows, columns = np.minimum(now.shape[:2], before.shape[:2])
+        apart = np.abs(now[:rows, :columns] - before[:rows, :columns]).max(axis=-1)
+        return float((apart > 0.03).mean())
+
+    def like(self, color: Sequence[float]) -> int:
+        """Number of pixels of the canvas of about this hue, however bright."""
+        return like(self.pixels(), color)
+
+    def screen(self, point: np.ndarray) -> tuple[float, float]:
+        """Pixels of a point of the scene [L] in the page."""
+        canvas = self.page.locator("canvas").first.bounding_box()
+        right, down = self.projected(point)
+        return canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
 
     def click_at(self, point: np.ndarray) -> None:
         """Click where a point of the scene [L] appears."""
@@ -205,6 +276,13 @@ class Tab:
         half = np.tan(camera.fov / 2) * (offset @ forward)
         across = offset @ right / (half * camera.aspect)
         return 0.5 + across / 2, 0.5 - offset @ up / half / 2
+
+
+def like(image: np.ndarray, color: Sequence[float]) -> int:
+    """Number of pixels of about this hue, however bright."""
+    size = np.linalg.norm(image, axis=-1)
+    cosine = image @ np.asarray(color) / np.maximum(size, 1e-9) / np.linalg.norm(color)
+    return int(((cosine > 0.985) & (size > 0.25)).sum())
 
 
 def unit(vector: np.ndarray) -> np.ndarray:

@@ -32,9 +32,11 @@ def test_a_running_computation_is_canceled_and_taken_up_again(tab):
     tab.page.get_by_text("Canceled").first.wait_for()
     tab.session.quality = SMALL
     tab.press("Compute what is missing")
-    tab.wait(lambda: tab.session.reach.fine, "the rest is computed")
+    tab.wait(lambda: tab.session.found.reach.fine, "the rest is computed")
     tab.settle()
-    tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).first.wait_for()
+    tab.page.get_by_text(
+        size_text(tab.session.found.reach.size, tab.session.found.reach.arm)
+    ).first.wait_for()
 
 
 @pytest.mark.large
@@ -50,14 +52,16 @@ def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, mo
     monkeypatch.undo()
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
-    tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).first.wait_for()
+    tab.page.get_by_text(
+        size_text(tab.session.found.reach.size, tab.session.found.reach.arm)
+    ).first.wait_for()
 
 
 @pytest.mark.large
 def test_a_hundred_bundles_show_a_cloud_and_say_what_is_left_out(tab):
     changes = {"longitudinal.bundles": 98, "extent": 0.02}
     tab.session.update(lambda s: s.replace(design=changed(designs.minimal_trunk(), changes)))
-    tab.wait(lambda: tab.session.reach.arm == tab.session.state.design, "a cloud is there")
+    tab.wait(lambda: tab.session.found.reach.arm == tab.session.state.design, "a cloud is there")
     tab.open("Move")
     tab.page.get_by_text("60 more bundles have no slider here").wait_for()
     tab.session.cancel()

@@ -9,7 +9,6 @@ import pytest
 
 import softreach as sr
 from softreach.rod import tip_map
-from softreach.studio.jobs.inverse import SolveInverse
 
 
 @pytest.fixture
@@ -27,13 +26,6 @@ def full_tab(inverse_tab):
     return inverse_tab
 
 
-def screen(tab, point):
-    """Pixels of a point of the scene [L] in the page."""
-    canvas = tab.page.locator("canvas").first.bounding_box()
-    right, down = tab.projected(point)
-    return canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
-
-
 def pose(tab, activation):
     tab.session.update(lambda s: s.replace(activation=activation, target=None))
     tab.settle()
@@ -46,11 +38,11 @@ def pose(tab, activation):
 def drag_tip(tab, begin, end, steps=12):
     """Grab the ball at a point [L] and pull it to another; the button stays down."""
     mouse = tab.page.mouse
-    mouse.move(*screen(tab, begin))
+    mouse.move(*tab.screen(begin))
     tab.page.wait_for_timeout(100)
     mouse.down()
     for part in np.linspace(0, 1, steps + 1)[1:]:
-        mouse.move(*screen(tab, begin + part * (end - begin)))
+        mouse.move(*tab.screen(begin + part * (end - begin)))
         tab.page.wait_for_timeout(30)
 
 
@@ -58,7 +50,7 @@ def around(tab, point):
     """What the page shows where a point of the scene [L] is, RGB from 0 to 1."""
     from matplotlib.image import imread
 
-    x, y = screen(tab, point)
+    x, y = tab.screen(point)
     clip = {"x": x - 4, "y": y - 4, "width": 8, "height": 8}
     return imread(io.BytesIO(tab.page.screenshot(clip=clip)))[..., :3]
 
@@ -72,81 +64,18 @@ FOLDED = (-0.48, -0.16, -1.23)
 START = (-0.7, -0.4, -0.9)
 
 
-@pytest.mark.large
-def test_a_tip_inside_the_exact_surface_is_dragged(inverse_tab):
-    tab = inverse_tab
-    tab.session.update(lambda s: s.showing(surface=True, cloud=False))
-    begin = pose(tab, START)
-    tab.wait(lambda: tab.drawn("/surface"), "the surface is drawn")
-    end = sr.tip_positions(tab.session.state.design, [(-0.6, -0.55, -0.8)])[0]
-    drag_tip(tab, begin, end)
-    tab.page.mouse.up()
-    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
-    tab.settle()
-    np.testing.assert_allclose(tip_of(tab), tab.session.state.target, atol=1e-5)
-    np.testing.assert_allclose(screen(tab, tip_of(tab)), screen(tab, end), atol=3)
-    assert tab.drawn("/surface")
-    assert not tab.drawn("/cloud")
-
-    tip, up = tip_of(tab), np.array([0.0, 0.0, 1.0])
-    tab.page.wait_for_timeout(200)
-    drag_tip(tab, tip + 0.08 * up, tip + 0.16 * up)
-    tab.page.mouse.up()
-    tab.wait(lambda: abs(tip_of(tab)[2] - tip[2] - 0.08) < 0.01, "the arrow lifts the tip")
-    tab.settle()
-    np.testing.assert_allclose(tip_of(tab)[:2], tip[:2], atol=2e-5)
-
-
-MOVES = """async ([x, y]) => {
-    for (let step = 1; step <= 8; step++) {
-        const place = {clientX: x + step, clientY: y, pointerId: 1, buttons: 1, bubbles: true};
-        document.querySelector("canvas").dispatchEvent(new PointerEvent("pointermove", place));
-        await null;
-    }
-}"""
-
-
-def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(full_tab):
-    tab = full_tab
-    begin = pose(tab, START)
-    end = sr.tip_positions(tab.session.state.design, [(-0.6, -0.55, -0.8)])[0]
-    drag_tip(tab, begin, end)
-    tab.page.wait_for_timeout(300)
-    tab.settle()
-    middle = tab.session.drag
-    assert middle.dragged.gap == 0.0
-    tab.wait(lambda: len(tab.drawn("/cloud").points) <= 1 << 13, "the cloud is thin")
-    assert np.linalg.norm(tip_of(tab) - middle.wanted) < 1e-5
-    tab.page.mouse.up()
-    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
-    tab.settle()
-    state = tab.session.state
-    tab.wait(lambda: len(tab.drawn("/cloud").points) > 1 << 13, "the cloud is whole")
-    assert tab.drawn("/target").radius < tab.drawn("/grip/ball").radius
-    np.testing.assert_allclose(tip_of(tab), state.target, atol=1e-5)
-    # The pointer moves in the plane of the picture, and so does the tip.
-    np.testing.assert_allclose(screen(tab, np.array(state.target)), screen(tab, end), atol=3)
-    path = sr.track_path(state.design, [begin, state.target], START)
-    np.testing.assert_allclose(path.activation.values[-1], state.activation, atol=1e-3)
-
-    answer = tab.session.answer
-    held = np.abs(answer.activations - tab.session.state.activation).max(axis=1)
-    assert held.min() < 1e-3
-    assert all(tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer)))
-
-
 def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
     tab = inverse_tab
     arm, scene = tab.session.state.design, tab.session.scene
-    tab.session.job(SolveInverse).aim(np.array([0.2932, 0.0739, 0.0088]))
+    tab.session.aim(np.array([0.2932, 0.0739, 0.0088]))
     tab.settle()
-    shapes, eye = tab.session.answer.activations, tab.session.client.camera.position
+    shapes, eye = tab.session.found.answer.activations, tab.session.client.camera.position
     changes = np.abs(shapes - tab.session.state.activation).max(axis=1)
     here, other = changes.argmin(), changes.argmax()
     assert here != other
     places = tip_map(arm).frames(shapes[[other]], np.linspace(0.3, 0.9, 31)).position[0]
     place = next(p for p in places if scene.ghost_under(eye, p - eye) == other)
-    tab.page.mouse.click(*screen(tab, place))
+    tab.page.mouse.click(*tab.screen(place))
     there = tuple(shapes[other])
     tab.wait(lambda: tab.session.state.activation == there, "the arm is in the other shape")
     tab.settle()
@@ -159,9 +88,9 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
     tab = inverse_tab
     begin = pose(tab, (-0.2, -0.1, -0.1))
     drag_tip(tab, begin, begin + [0.0, 0.0, 0.35])
-    tab.wait(lambda: tab.session.drag and tab.session.drag.dragged.gap > 0.02, "a gap")
+    tab.wait(lambda: tab.session.found.lag and tab.session.found.lag.dragged.gap > 0.02, "a gap")
     tab.settle()
-    pull = tab.session.drag
+    pull = tab.session.found.lag
     assert tab.drawn("/lag").visible
     assert tab.drawn("/lag label").text == f"{pull.dragged.gap:.3g} m short"
     tab.page.get_by_text(f"This branch ends {pull.dragged.gap:.3g} m short").wait_for()
@@ -184,7 +113,7 @@ def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_t
     tab.wait(lambda: tab.drawn("/arm/0").opacity == 0.6, "an arm before its tip is not")
     tab.wait(lambda: around(tab, begin).min() < 0.45, "the ball is seen")  # the body is lighter
     drag_tip(tab, begin, begin + [0.0, 0.0, 0.02])
-    tab.wait(lambda: tab.session.drag, "the arm follows")
+    tab.wait(lambda: tab.session.found.lag, "the arm follows")
     tab.page.mouse.up()
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
     tab.settle()

@@ -57,7 +57,7 @@ def test_a_dragged_slider_is_one_step_that_buttons_and_keys_undo(tab):
     become(tab, lambda: tab.session.state.design == first, "the key undoes")
     tab.page.keyboard.press("Control+Shift+z")
     become(tab, lambda: tab.session.state.design == second, "the key does it again")
-    assert tab.session.reach.arm == second
+    assert tab.session.found.reach.arm == second
 
 
 def reloaded(tab, studio):
@@ -79,7 +79,9 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, folder):
         tab.settle()
         tab.session = reloaded(tab, studio)
         assert taper(tab) == 0.02
-        tab.page.get_by_text(size_text(tab.session.reach.size, tab.session.reach.arm)).wait_for()
+        tab.page.get_by_text(
+            size_text(tab.session.found.reach.size, tab.session.found.reach.arm)
+        ).wait_for()
         tab.press("Undo")
         become(tab, lambda: tab.session.state.design == TRUNK, "the history is there too")
         tab.close()

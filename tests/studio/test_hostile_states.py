@@ -13,8 +13,7 @@ from softreach.arm.parameters import changed
 from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
 from softreach.studio.captions import size_text
-from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
-from softreach.studio.page import static_page
+from softreach.studio.files import cloud_file, figure_file, page_file, state_from, surface_file
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.clouds import in_slice, sample_values
 from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
@@ -121,11 +120,11 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
 
 
 def test_a_saved_page_holds_everything_itself(fine):
-    saved = static_page(StudioState(design=fine.arm), fine)
+    saved = page_file(fine, StudioState(design=fine.arm)).decode()
     assert size_text(fine.size, fine.arm) in saved
-    assert "taper_deg = 2.0" in saved
-    assert '<script src="http' not in saved
-    assert '<link href="http' not in saved
+    assert "taper φ [deg] 2" in saved
+    assert "src=" not in saved
+    assert "://" not in saved
 
 
 def test_a_design_file_changes_the_design_alone(trunk):

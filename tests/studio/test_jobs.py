@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import threading
 
-import pytest
+import numpy as np
 from hypothesis import given
 from numba import njit
 
@@ -14,62 +12,52 @@ from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements
 from softreach.studio.app import JOBS
-from softreach.studio.jobs.beside import DrawFree, DrawReference
-from softreach.studio.jobs.calibration import DrawSample
-from softreach.studio.jobs.inverse import SolveInverse
-from softreach.studio.jobs.needs import CheckNeeds
-from softreach.studio.jobs.page import KeepState, SetTheme
-from softreach.studio.jobs.plots import PLOT_JOBS
-from softreach.studio.jobs.reach import (
-    ComputeReach,
-    DifferentiateVolume,
-    DrawArm,
-    DrawCloud,
-    DrawSurface,
-    FollowCamera,
-)
-from softreach.studio.plots import PLOTS
-from softreach.studio.session import what_follows
+from softreach.studio.found import Found
+from softreach.studio.job import Job, Learned, what_follows
+from softreach.studio.reach import Reach
+from softreach.studio.session import Session
 from softreach.studio.settings import PlotSettings
 from softreach.studio.state import Camera, Slice, StudioState
-from softreach.studio.work import CompilationWatch, IdleCompiler, Latest
+from softreach.studio.work import CompilationWatch, Latest
+from softreach.support.errors import InvalidInput
+from tests.studio.sockets import page
 from tests.studio.test_state import states
 
-_PLOT = {plot.name: job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True)}
 NEEDS = Requirements(payloads=(0.0,)).to_toml()
-SWEEP, SECTION = _PLOT["sweep"], _PLOT["section"]
+NOTHING = Found()
+
+
+def stale(old, new, before=NOTHING, after=NOTHING):
+    """Names of the jobs that follow from a change."""
+    given = None if old is None else (old, before)
+    return {job.name for job in what_follows(JOBS, given, (new, after))}
 
 
 @given(states())
 def test_nothing_follows_from_no_change_and_all_from_a_first_state(state):
-    assert what_follows(JOBS, state, state) == frozenset()
-    assert what_follows(JOBS, None, state) == frozenset(JOBS)
+    assert stale(state, state) == set()
+    assert stale(None, state) == {job.name for job in JOBS} - {"fit", "play"}
 
 
 def test_each_change_makes_stale_what_depends_on_it(trunk):
     state = StudioState(design=trunk)
     other = changed(trunk, {"taper": 0.01})
     changes = {
-        state.replace(activation=(-1.0, 0.0, 0.0)): {DrawArm, DrawSample},
-        state.showing(color="multiplicity"): {DrawCloud, DrawSurface},
-        state.showing(slice=Slice(axis="x")): {DrawCloud, DrawSurface},
-        state.showing(surface=False): {DrawCloud, DrawSurface},
-        state.showing(cloud=True): {DrawCloud, DrawSurface},
-        state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowCamera},
-        state.showing(cut="half"): {FollowCamera},
-        state.showing(dark=True): {SetTheme, DrawSurface},
-        state.replace(needs=NEEDS): {CheckNeeds, FollowCamera},
-        state.replace(reference=trunk): {DrawReference},
-        state.replace(design=other): {
-            ComputeReach,
-            DifferentiateVolume,
-            DrawArm,
-            DrawSample,
-        },
+        state.replace(activation=(-1.0, 0.0, 0.0)): {"arm", "sample"},
+        state.showing(color="multiplicity"): {"cloud", "surface"},
+        state.showing(slice=Slice(axis="x")): {"cloud", "surface"},
+        state.showing(surface=False): {"cloud", "surface"},
+        state.showing(cloud=True): {"cloud", "surface"},
+        state.replace(target=(0.1, 0.0, 0.8)): {"inverse"},
+        state.showing(half=False): {"camera"},
+        state.showing(dark=True): {"theme", "surface"},
+        state.replace(needs=NEEDS): {"needs"},
+        state.replace(reference=trunk): {"reference"},
+        state.replace(design=other): {"reach", "slopes", "arm", "sample"},
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
     }
     for new, jobs in changes.items():
-        assert what_follows(JOBS, state, new) == jobs | {KeepState}
+        assert stale(state, new) == jobs
 
 
 def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(trunk):
@@ -80,29 +68,25 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
     other = changed(trunk, {"taper": 0.01})
     moves = {
         full.replace(design=other): {
-            ComputeReach,
-            DifferentiateVolume,
-            DrawArm,
-            DrawSample,
-            SolveInverse,
-            CheckNeeds,
-            SWEEP,
+            "reach", "slopes", "arm", "sample", "inverse", "needs", "sweep",
         },
-        full.showing(slice=Slice(axis="x")): {
-            DrawCloud,
-            DrawReference,
-            DrawSurface,
-            SECTION,
-        },
-        full.showing(color="rgb"): {DrawCloud, DrawReference, DrawSurface},
-        full.showing(surface=False): {DrawCloud, DrawSurface},
-        full.showing(plots=PlotSettings()): {SWEEP, SECTION},
-        full.replace(target=None): {SolveInverse, FollowCamera},
-        full.replace(reference=None): {DrawReference},
-        full.replace(needs=""): {CheckNeeds, FollowCamera},
-    }
+        full.showing(slice=Slice(axis="x")): {"cloud", "reference", "surface", "section"},
+        full.showing(plots=PlotSettings()): {"sweep", "section"},
+        full.replace(target=None): {"inverse"},
+        full.replace(reference=None): {"reference"},
+        full.replace(needs=""): {"needs"},
+    }  # fmt: skip
     for new, jobs in moves.items():
-        assert what_follows(JOBS, full, new) == jobs | {KeepState}
+        assert stale(full, new) == jobs
+
+
+def test_what_is_found_out_makes_stale_what_is_made_of_it(trunk):
+    state = StudioState(design=trunk).showing(plots=PlotSettings(shown=("section",)))
+    reach = object.__new__(Reach)
+    assert stale(state, state, NOTHING, Found(reach=reach)) == {
+        "cloud", "surface", "slopes", "section",
+    }  # fmt: skip
+    assert stale(state, state, Found(reach=reach), Found(reach=reach)) == set()
 
 
 def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
@@ -111,10 +95,35 @@ def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
     light, heavy = (
         bare.replace(design=arm.replace(loads=Loads(payload=payload))) for payload in (0.0, 0.001)
     )
-    assert DrawFree in what_follows(JOBS, bare, light)
-    assert DrawFree not in what_follows(JOBS, light, heavy)
-    assert DrawFree in what_follows(JOBS, heavy, bare)
-    assert DrawFree not in what_follows(JOBS, bare, bare.replace(design=trunk))
+    assert "free" in stale(bare, light)
+    assert "free" not in stale(light, heavy)
+    assert "free" in stale(heavy, bare)
+    assert "free" not in stale(bare, bare.replace(design=trunk))
+
+
+def test_a_job_that_fails_forgets_what_it_knew_and_takes_away_what_it_drew(studio):
+    def compute(state, found, tools):
+        yield Learned({"check_refusal": "known"})
+        if state.target is not None:
+            raise InvalidInput("target", "wrong", "right")
+
+    def draw(page, state, found):
+        page.scene.draw_dots("/mark", np.zeros((1, 3)), (0, 0, 0))
+        return {}
+
+    mark = Job("mark", ("target",), compute, draw, makes=("check_refusal",), draws=("/mark",))
+    with page(studio) as tab:
+        session = Session(tab.client, studio.start, [mark])
+        session.begin()
+        assert session.settle()
+        drawn = session.client.scene.get_handle_by_name
+        assert session.found.check_refusal == "known"
+        assert drawn("/mark") is not None
+        session.update(lambda state: state.replace(target=(0.0, 0.0, 0.5)))
+        assert session.settle()
+        assert session.found.check_refusal == ""
+        assert drawn("/mark") is None
+        assert "target = wrong" in session.note
 
 
 # Laws of background work
@@ -193,19 +202,3 @@ def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
     watch.close()
     outer(1.5)
     assert told == [True, False]
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="priorities are others")
-def test_what_is_compiled_ahead_waits_for_all_others_and_ends_with_the_studio():
-    compiler = IdleCompiler()
-    compiler.close()
-    compiler.start()
-    assert compiler._process is None
-    compiler = IdleCompiler()
-    compiler.start()
-    process = compiler._process
-    compiler.start()
-    assert compiler._process is process
-    assert os.getpriority(os.PRIO_PROCESS, process.pid) == 19
-    compiler.close()
-    assert process.returncode is not None

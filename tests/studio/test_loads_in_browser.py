@@ -11,7 +11,6 @@ from softreach.geometry.surface import plane_cut
 from softreach.inverse import solve_inverse
 from softreach.rod.tip_map import TipStatus
 from softreach.studio import StudioState
-from softreach.studio.captions import size_text
 from softreach.studio.plots.section import enclosed_area, plane_counts, section_curves, within
 from softreach.studio.reach import stages
 from softreach.studio.settings import PlotSettings
@@ -22,7 +21,7 @@ from tests.studio.conftest import SMALL
 @pytest.fixture
 def loads_tab(tab):
     """An arm of a known stiffness."""
-    state = StudioState(design=designs.lce_arm()).showing(level=12, cut="none")
+    state = StudioState(design=designs.lce_arm()).showing(level=12, half=False)
     tab.session.update(lambda _: state)
     tab.settle()
     tab.open("Parts")
@@ -70,52 +69,6 @@ def mirrored_unstable(arm):
 
 
 @pytest.mark.large
-def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path):
-    tab, free = loads_tab, loads_tab.session.reach
-    tab.choose("gravity", "up")
-    become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
-    loaded = tab.session.reach
-    assert loaded.arm == tab.session.state.design
-    share = loaded.volume / free.volume
-    assert 0.7 < share < 0.85
-    tab.page.get_by_text(
-        f"{size_text(loaded.size, loaded.arm)} under loads, "
-        f"{100 * share:.0f} % of {1e6 * free.volume:.4g} mL without"
-    ).wait_for()
-    assert tab.drawn("/free")
-    tab.page.get_by_text("every sample rests in a stable equilibrium").wait_for()
-
-    before = loads(tab)
-    typed(tab, "payload [g]", "-5")
-    alert = tab.page.get_by_role("alert").filter(has_text="payload = ")
-    alert.wait_for()
-    assert loads(tab) == before
-    enter(
-        tab,
-        "payload [g]",
-        "2",
-        lambda one: one.payload == pytest.approx(0.002),
-        "a payload that can be",
-    )
-    alert.wait_for(state="hidden")
-
-    tab.open("Export")
-    tab.choose("data", "design (.toml)")
-    design = sr.Manipulator.load(tab.save("Save data", tmp_path))
-    assert design.loads == loads(tab)
-    tab.open("Parts")
-
-    tab.press("Take all loads off")
-    tab.wait(lambda: loads(tab) is None, "nothing acts")
-    tab.settle()
-    assert not tab.drawn("/free")
-    assert tab.session.reach.arm == designs.lce_arm()
-    tab.wait(lambda: tab.field("gravity").input_value() == "none", "the fields are empty")
-    told = tab.page.get_by_text("equilibrium")
-    tab.wait(lambda: told.count() == 0, "nothing is said of equilibria")
-
-
-@pytest.mark.large
 def test_postures_under_loads_are_told(loads_tab):
     tab = loads_tab
     tab.choose("gravity", "up")
@@ -127,19 +80,19 @@ def test_postures_under_loads_are_told(loads_tab):
         lambda one: one.payload == pytest.approx(0.03),
         "the payload hangs",
     )
-    reach = tab.session.reach
+    reach = tab.session.found.reach
     assert reach.arm == tab.session.state.design
     share = f"{100 * reach.share(TipStatus.NO_EQUILIBRIUM):.2g}"
     tab.page.get_by_text(f"no equilibrium, not shown: {share} %").wait_for()
 
     tab.open("Move")  # it tells the posture
     tab.page.get_by_text("a stable equilibrium").locator("visible=true").wait_for()
-    arm, cloud = tab.session.state.design, tab.session.reach.cloud
+    arm, cloud = tab.session.state.design, tab.session.found.reach.cloud
     pulled = cloud.activation.values[5]
     tab.session.update(lambda s: s.replace(activation=tuple(pulled)))
     tab.settle()
     np.testing.assert_allclose(
-        tab.session.tip, sr.tip_positions(arm, [pulled])[0] / arm.length, atol=5e-5
+        tab.session.found.tip, sr.tip_positions(arm, [pulled])[0] / arm.length, atol=5e-5
     )
     folded = cloud.activation.values[reach.status == TipStatus.NO_EQUILIBRIUM][0]
     for lost, status, words in (
@@ -148,7 +101,7 @@ def test_postures_under_loads_are_told(loads_tab):
     ):
         tab.session.update(lambda s, lost=lost: s.replace(activation=tuple(lost)))
         tab.settle()
-        assert tab.session.posture == status
+        assert tab.session.found.posture == status
         tab.page.get_by_text(words).locator("visible=true").wait_for()
     assert not tab.drawn("/arm/0")
     tab.session.update(lambda s: s.replace(activation=()))
@@ -157,30 +110,6 @@ def test_postures_under_loads_are_told(loads_tab):
 
 
 # End to end: two places, one of them missed, and a slider that changes that
-
-
-def test_needs_are_seen_met_and_missed_and_follow_a_slider(tab):
-    tab.open("Goals")
-    tab.press("Add to the needs")  # where the tip is
-    tab.page.get_by_text("place 1: reached").wait_for()
-    tab.field("numbers").fill("0.37, 0.15, 0.85")
-    tab.settle()
-    tab.press("Add to the needs")
-    tab.page.get_by_text("place 2: missed by 0.0082").wait_for()
-    tab.wait(lambda: tab.drawn("/needs/missed"), "the place is a cross")
-    assert len(tab.drawn("/needs/reached").points) == 1
-
-    tab.open("Design")
-    tab.page.get_by_text("needs: 1 of 2 met · place 2 missed by").wait_for()
-    tab.drag("taper φ [deg]", -85)
-    tab.wait(lambda: tab.drawn("/needs/missed") is None, "the cross is a ball")
-    tab.page.get_by_text("needs: 2 of 2 met").wait_for()
-    tab.settle()
-    assert len(tab.drawn("/needs/reached").points) == 2
-    tab.open("Goals")
-    tab.page.get_by_text("place 2: reached").wait_for()
-    tab.press("Undo")
-    tab.page.get_by_text("place 2: missed by").wait_for()
 
 
 # End to end: the reachable set in the plane of the slice
@@ -193,7 +122,7 @@ def test_the_section_is_that_of_the_exact_set(tab):
     tab.page.get_by_text("y = 0 m: ").wait_for()
     picture = tab.page.locator("img").first
     assert picture.evaluate("image => image.naturalWidth") > 600
-    reach = tab.session.reach
+    reach = tab.session.found.reach
     curves = section_curves(reach, Slice())
     points = np.concatenate(curves)
     assert np.ptp(points[:, 1]) == 0.0
@@ -211,13 +140,13 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     tab.session.update(lambda s: s.showing(slice=cut))
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
     assert tab.page.locator("img").first.get_attribute("src") != before
-    area = enclosed_area(section_curves(tab.session.reach, cut), 2)
+    area = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
     tab.page.get_by_text(f"{area:.4g} m²").wait_for()
     tab.open("Design")
     tab.drag("revolution Ω [deg]", 40)
     tab.settle()
-    assert tab.session.figures.plots["section"].arm == tab.session.state.design
-    changed = enclosed_area(section_curves(tab.session.reach, cut), 2)
+    assert tab.session.found.section.arm == tab.session.state.design
+    changed = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
     assert changed != area
     tab.page.get_by_text(f"{changed:.4g} m²").wait_for()
 
@@ -240,7 +169,7 @@ def test_the_numbers_in_the_plane_are_those_of_the_inverse():
 
 @pytest.mark.large
 def test_the_areas_of_sections_sum_up_to_the_volume(tab):
-    reach = tab.session.reach
+    reach = tab.session.found.reach
     surface, length = reach.exact.surface(), reach.arm.length
     low, high = surface.vertices[:, 2].min(), surface.vertices[:, 2].max()
     edges = np.linspace(low, high, 41)

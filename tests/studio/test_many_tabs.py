@@ -17,7 +17,7 @@ from softreach.arm.parameters import changed
 from softreach.inverse.prepared import prepared_map
 from softreach.studio import Studio, work
 from softreach.studio.session import Session
-from tests.studio.sockets import CAMERA, PATIENCE, connected, page, until
+from tests.studio.sockets import PATIENCE, connected, page, until
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_of_tabs_that_were_closed_nothing_stays(studio):
     gone = []
     for _ in range(2):
         with page(studio) as session:
-            gone.append(weakref.ref(session.reach.cloud))
+            gone.append(weakref.ref(session.found.reach.cloud))
             del session
     until(lambda: not studio.sessions)
     until(lambda: own_threads() <= before)
@@ -117,8 +117,8 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
         threads = own_threads()
         shake(session, 40, 0.01)
         assert session.settle(PATIENCE)
-        assert session.reach is not None
-        assert session.reach.arm == session.state.design
+        assert session.found.reach is not None
+        assert session.found.reach.arm == session.state.design
         assert computed[-1] == session.state.design
         assert len(computed) < 60  # each in two or three stages, of which the later are dropped
         assert len(session.history.past) < 50
@@ -163,68 +163,3 @@ def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, m
     until(lambda: not studio.server.get_clients())
     go.set()
     until(lambda: not studio.sessions)
-
-
-STRANGE = (None, float("nan"), "xxx", "", [], [1, 2], {"a": 1}, b"xx")
-
-
-@pytest.mark.large
-def test_values_that_no_page_sends_change_nothing_end_nothing_and_print_nothing(studio, capfd):
-    known = set(studio.sessions)
-    with connected(studio) as send:
-        until(lambda: set(studio.sessions) - known)
-        session = studio.sessions[max(studio.sessions)]
-        until(lambda: session.panels and session.reach is not None and not session.busy)
-        inputs = session.client.gui._gui_input_handle_from_uuid
-        numbers = {u: w for u, w in inputs.items() if isinstance(w.value, float)}
-        before = session.state
-        for uuid in numbers:
-            for value in STRANGE:
-                send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
-            send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"__class__": 1}})
-        for uuid in inputs:
-            for value in (None, {"a": 1}):
-                send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
-        for name in ("wxyz", "position", "fov", "image_width"):
-            for value in STRANGE:
-                send({**CAMERA, name: value})
-        for raw in (b"", b"\xc1", b"\x80", b"\x91\x01", {"type": "Nope"}, {"type": 5}):
-            send(raw)
-        moved, widget = next(iter(numbers.items()))
-        other = widget.value + 0.001
-        send({"type": "GuiUpdateMessage", "uuid": moved, "updates": {"value": other}})
-        until(lambda: widget.value == other)  # what came before was heard, too
-        session.settle(PATIENCE)
-        assert session.state.activation == before.activation
-    assert "Traceback" not in capfd.readouterr().err
-
-
-def test_a_file_that_is_too_large_is_refused_before_it_comes_and_not_held(studio):
-    known = set(studio.sessions)
-    with connected(studio) as send:
-        until(lambda: set(studio.sessions) - known)
-        session = studio.sessions[max(studio.sessions)]
-        until(lambda: session.panels and not session.busy)
-        gui = session.client.gui
-        button = next(
-            uuid for uuid, w in gui._gui_input_handle_from_uuid.items() if hasattr(w, "on_upload")
-        )
-        start = {
-            "type": "FileTransferStartUpload",
-            "source_component_uuid": button,
-            "filename": "state.json",
-            "mime_type": "",
-        }
-        part = {"type": "FileTransferPart", "source_component_uuid": button}
-        send({**start, "transfer_uuid": "a", "part_count": 300, "size_bytes": 300_000_000})
-        send({**part, "transfer_uuid": "a", "part_index": 0, "content": bytes(1_000_000)})
-        until(lambda: "state.json = 300 MB: must be at most 20 MB" in session.note)
-        assert not gui._current_file_upload_states
-        send({**start, "transfer_uuid": "b", "part_count": 99, "size_bytes": 1})  # a lie
-        for k in range(30):
-            send({**part, "transfer_uuid": "b", "part_index": k, "content": bytes(1_000_000)})
-        held = gui._current_file_upload_states
-        until(lambda: "b" in held and len(held["b"]["parts"]) == 20)
-        send({**CAMERA, "fov": 0.5})
-        until(lambda: session.client.camera.fov == 0.5)
-        assert len(held["b"]["parts"]) == 20

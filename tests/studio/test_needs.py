@@ -16,7 +16,6 @@ from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.studio import Studio
-from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.needs import requirements_of
 from softreach.studio.scene.needs import COLORS
 from softreach.studio.session import Session
@@ -84,21 +83,19 @@ def test_a_place_is_a_ball_where_it_is_reached_and_a_cross_with_its_gap_where_it
     assert drawn(session, "/missed") is None
 
 
-def test_the_gap_follows_the_design(session, monkeypatch):
-    monkeypatch.setattr(jobs.ConfirmNeeds, "run", lambda *_: None)
+def test_the_gap_follows_the_design(session):
     added(session, "place to reach", "150, 60, 330")
     gaps = []
     for taper in (0.0, 0.05):
         session.update(lambda s, taper=taper: s.replace(design=changed(ARM, {"taper": taper})))
         session.settle()
-        assert session.check.arm == session.state.design
-        gaps.append(float(session.check.gaps.max()))
+        assert session.found.check.arm == session.state.design
+        gaps.append(float(session.found.check.gaps.max()))
     assert gaps[0] < 1e-6 < 1e-3 < gaps[1]
     assert "missed by" in verdict(session)
 
 
-def test_a_place_can_be_the_target(session, monkeypatch):
-    monkeypatch.setattr(SolveInverse, "run", lambda *_: None)
+def test_a_place_can_be_the_target(session):
     with pytest.raises(sr.InvalidInput, match="tab Move"):
         added(session, "place at the target")
     session.update(lambda state: state.replace(target=(0.05, 0.0, 0.3)))
@@ -134,7 +131,7 @@ def test_what_quick_poses_miss_is_looked_at_again(session, monkeypatch):
 
     monkeypatch.setattr(jobs, "quick_check", blind)
     added(session, "place to reach")
-    assert session.check.met
+    assert session.found.check.met
     assert "place 1</b>: reached" in verdict(session)
 
 
@@ -143,7 +140,7 @@ def test_a_payload_without_a_modulus_is_refused_below_the_needs(session):
     assert requirements_of(session.state.needs).payloads == (0.05,)
     added(session, "place to reach")
     assert "modulus" in panel_of(session)._refusal._widget.content
-    assert session.check is None
+    assert session.found.check is None
 
 
 BAD_FILES = {
@@ -171,9 +168,9 @@ def test_files_and_numbers_of_no_needs_are_refused_and_the_needs_before_stay(ope
 
 
 def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session):
-    session.update(lambda state: state.showing(cut="none", cloud=True))
+    session.update(lambda state: state.showing(half=False, cloud=True))
     assert session.settle()
-    tip = session.reach.cloud.tip.values[3]
+    tip = session.found.reach.cloud.tip.values[3]
     point = tip / ARM.length
     origin = 3.0 * point
     assert not panel_of(session).click(origin, point - origin)
@@ -182,7 +179,7 @@ def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session)
     session.settle()
     (place,) = requirements_of(session.state.needs).places
     assert np.linalg.norm(np.cross(place, point) / np.linalg.norm(point)) < 0.02 * ARM.length
-    assert session.check.met
+    assert session.found.check.met
 
 
 def test_needs_of_many_places_are_drawn_with_few_labels(session):

@@ -25,21 +25,9 @@ def circled(tab, folder):
     file = folder / "circle.csv"
     np.savetxt(file, tip + offset, "%.17g", ",", header="x,y,z", comments="")
     load(tab, file)
-    tab.wait(lambda: tab.session.figures.track is not None, "the path is followed")
+    tab.wait(lambda: tab.session.found.track is not None, "the path is followed")
     tab.settle()
-    return tab.session.figures.track
-
-
-def test_a_path_from_a_file_is_followed_from_the_present_activation(tab, tmp_path):
-    found, state = circled(tab, tmp_path), tab.session.state
-    tab.page.get_by_text("All 97 points are followed").wait_for()
-    tab.wait(lambda: tab.drawn("/grip/ball").opacity, "where the path begins is seen in the ball")
-    np.testing.assert_allclose(found.activation.values[0], ACTIVATION, atol=1e-6)
-    tips = sr.tip_positions(state.design, found.activation.values)
-    np.testing.assert_allclose(tips, found.position, atol=2e-5 * state.design.length)
-    assert tab.drawn("/path/followed")
-    assert not tab.drawn("/path/end")
-    tab.page.locator(".uplot canvas").first.wait_for()
+    return tab.session.found.track
 
 
 @pytest.mark.large
@@ -61,7 +49,7 @@ def test_playing_leads_the_arm_to_the_end_and_the_slider_back(tab, tmp_path):
     at, state = tab.session.state.path.at, tab.session.state
     np.testing.assert_allclose(state.activation, found.activation.values[at])
     place = found.position.values[at] / state.design.length
-    np.testing.assert_allclose(tab.session.tip, place, atol=2e-5)
+    np.testing.assert_allclose(tab.session.found.tip, place, atol=2e-5)
 
 
 @pytest.mark.large
@@ -74,7 +62,7 @@ def test_the_page_says_where_the_branch_ends_and_why(tab, tmp_path):
     load(tab, file)
     tab.page.get_by_text("of 21 points are followed").wait_for()
     tab.settle()
-    found = tab.session.figures.track
+    found = tab.session.found.track
     assert found.attrs["end"] in ("bound", "fold")
     reason = "bound." if found.attrs["end"] == "bound" else "turns back"
     assert tab.page.get_by_text(reason).count()

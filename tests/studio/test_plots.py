@@ -1,9 +1,8 @@
-"""Plots as they are declared: what makes them stale, and what is computed of them."""
+"""Plots: what is computed of them, and how charts draw it."""
 
 from __future__ import annotations
 
 from contextlib import nullcontext
-from operator import attrgetter
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,60 +10,15 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.studio.app import JOBS
-from softreach.studio.jobs.plots import PLOT_JOBS
-from softreach.studio.plots import PLOTS
-from softreach.studio.plots.plot import Chart, Curve, Figures
-from softreach.studio.plots.sweep import SweepPlot, sweep
+from softreach.studio.plots.chart import Chart, Curve
+from softreach.studio.plots.sweep import sweep
 from softreach.studio.reach import Quality
-from softreach.studio.session import what_follows
 from softreach.studio.settings import MOST_POINTS, PlotSettings, TipPath
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 
 STATE = StudioState(design=designs.minimal_trunk())
-MOVED = STATE.replace(activation=(-1.0, 0.0, -0.5))
-
-
-class Session(SimpleNamespace):
-    """Session that counts what it shows."""
-
-    def __init__(self, state: StudioState) -> None:
-        super().__init__(state=state, figures=Figures(), shown=0)
-
-    def show(self) -> None:
-        self.shown += 1
-
-
-def job_of(plot, state):
-    return PLOT_JOBS[PLOTS.index(plot)](Session(state))
-
-
-def test_a_name_is_of_one_plot_and_what_it_depends_on_is_in_the_state():
-    assert len({plot.name for plot in PLOTS}) == len({plot.label for plot in PLOTS}) == len(PLOTS)
-    for plot in PLOTS:
-        assert attrgetter(*plot.depends_on)(STATE) is not None
-
-
-@pytest.mark.parametrize("plot", PLOTS)
-def test_only_what_is_shown_becomes_stale(plot):
-    job = PLOT_JOBS[PLOTS.index(plot)]
-    assert job in JOBS
-    shown = STATE.showing(plots=PlotSettings(shown=(plot.name,)))
-    assert job in what_follows(JOBS, STATE, shown)
-    assert job not in what_follows(JOBS, STATE, MOVED)
-    assert job not in what_follows(JOBS, shown, shown.replace(activation=MOVED.activation))
-
-
-def test_a_plot_is_computed_only_while_it_is_shown(monkeypatch):
-    monkeypatch.setattr(SweepPlot, "compute", lambda *_: iter(["a result"]))
-    for settings, count in ((PlotSettings(), 0), (PlotSettings(shown=("sweep",)), 1)):
-        job = job_of(SweepPlot, STATE.showing(plots=settings))
-        job.run(lambda: None)
-        assert (len(job.session.figures.plots), job.session.shown) == (count, count)
-
-
 QUICK = Quality(coarse_accuracy=0.1, tol=1e-4)
 
 

@@ -28,7 +28,7 @@ def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
     tab.wait(lambda: tab.session.state.appearance.plots.parameter == "taper", "it is chosen")
     tab.page.get_by_text("here V =").wait_for()
     tab.settle()
-    found, design = tab.session.figures.plots["sweep"], tab.session.state.design
+    found, design = tab.session.found.sweep, tab.session.state.design
     assert found.complete
     assert (np.diff(found.value) > 0).all()
     assert found.refused  # the steepest tapers leave no tip
@@ -50,18 +50,18 @@ def test_a_line_stands_at_the_value_of_the_slider_and_follows_it(tab):
     tab.session.update(lambda s: s.showing(plots=settings))
     tab.settle()
     tab.wait(lambda: [2, 2] in tab.page.evaluate(LINES), "the line stands at 2 degrees")
-    known = tab.session.figures.plots["sweep"]
+    known = tab.session.found.sweep
     tab.drag("taper φ [deg]", -20)
     tab.settle()
     arm = tab.session.state.design
     there = pytest.approx([np.degrees(find_parameter(arm, "taper").value(arm))] * 2)
     tab.wait(lambda: there in tab.page.evaluate(LINES), "the line follows")
-    after = tab.session.figures.plots["sweep"]
+    after = tab.session.found.sweep
     assert {*known.value} < {*after.value}  # nothing was computed twice
 
 
 def test_names_in_a_chart_are_text(tab):
-    from softreach.studio.plots.plot import Chart, Curve
+    from softreach.studio.plots.chart import Chart, Curve
 
     gui = tab.session.client.gui
     folder = gui.add_folder("names")

@@ -18,8 +18,7 @@ from softreach.picture.axes_box import axes_box, seen_from
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import TipStatus, has_tip
-from softreach.studio.captions import legend_text, scale_bar, size_text
-from softreach.studio.jobs.reach import swept_activation
+from softreach.studio.captions import legend_text, size_text
 from softreach.studio.reach import (
     Quality,
     Reach,
@@ -241,33 +240,6 @@ def test_the_name_of_an_axis_keeps_its_distance_from_the_number_beside_it(eye, f
             number = focal * ways @ (at - eye) / (forward @ (at - eye))
             beside, above = np.abs(seen[name] - number)
             assert beside > 19 or above > 11
-
-
-def test_a_sweep_is_a_smooth_loop_through_the_box_from_where_the_arm_is(rng):
-    bounds = np.array([[-5 / 3, 0.0], [-1.0, 0.5], [0.2, 0.2]])
-    start = rng.uniform(*bounds.T)
-    way = np.array([swept_activation(start, bounds, share) for share in np.linspace(0, 1, 401)])
-    np.testing.assert_allclose(way[[0, -1]], [start, start], atol=1e-12)
-    assert (way >= bounds[:, 0]).all()
-    assert (way <= bounds[:, 1]).all()
-    size = np.maximum(np.ptp(bounds, axis=1), 1e-9)
-    steps = np.diff(way, axis=0) / size
-    assert np.abs(steps).max() < 0.04
-    assert np.abs(np.diff(steps, axis=0)).max() < 2e-3  # no kink, at its ends either
-    assert np.abs(steps[[0, -1]]).max() < 2e-3
-    assert (np.ptp(way, axis=0)[:2] > 0.9 * size[:2]).all()
-
-
-@pytest.mark.parametrize("focal", [37.0, 100.0, 862.0, 1e4])
-def test_a_scale_bar_is_round_as_long_as_it_says_and_nearly_as_long_as_there_is_room(focal):
-    bar = scale_bar(focal, 180.0, 0.25)
-    named, unit, _, meters, metric = bar.text.split()
-    assert unit == "L"
-    assert bar.pixels == pytest.approx(float(named) * focal)
-    assert 180 / 2.5 < bar.pixels <= 180 * (1 + 1e-9)
-    assert float(f"{float(named):e}"[0]) in (1, 2, 5)
-    size = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}[metric]
-    assert float(meters) * size == pytest.approx(0.25 * float(named), rel=5e-3)
 
 
 # Loads as they are typed, and what is computed of a loaded arm

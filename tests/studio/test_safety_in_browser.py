@@ -41,7 +41,7 @@ STATES = {
     "level": state_with(look__level=STRIKE),
     "color": state_with(look__color=STRIKE),
     "design": state_with(design=STRIKE),
-    "reference": state_with(design=RING, reference=NAMED, side_by_side=True),
+    "reference": state_with(design=RING, reference=NAMED),
 }
 NAMELESS = f"{STRIKE.replace('/', '')}.toml"
 FILES = {f"{name}.json": text for name, text in STATES.items()} | {
@@ -149,6 +149,6 @@ def guarded():
 @pytest.mark.large
 def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, guarded):
     tab = Tab(browser, guarded)
-    assert tab.session.reach is not None
+    assert tab.session.found.reach is not None
     assert tab.errors == []
     tab.close()

@@ -160,7 +160,7 @@ def test_forces_and_moduli_have_sliders_of_their_size():
     modulus = found["rings[0].material.young_modulus"]
     assert modulus.low > 0
     assert modulus.limits[1] == 2 * modulus.shown
-    assert modulus.label == "E of ring 0 [kPa]"  # as the tab of the parts has it
+    assert modulus.label == "modulus of backbone [kPa]"
     assert "[N]" in next(one.label for name, one in found.items() if name.endswith("upper"))
 
 

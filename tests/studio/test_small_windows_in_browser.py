@@ -7,7 +7,6 @@ import pytest
 
 import softreach as sr
 from softreach.studio import Quality
-from softreach.studio.jobs.inverse import SolveInverse
 from tests.studio.tab import Tab
 
 COARSE = Quality(coarse_level=12, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.1)
@@ -117,7 +116,7 @@ def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
         tab.open(name)
         tab.wait(lambda: not tab.page.evaluate(LACKING), f"controls of {name} are named")
     inside = sr.tip_positions(tab.session.state.design, [[-0.5, -0.4, -0.3]])[0]
-    tab.session.job(SolveInverse).aim(inside)  # its button has another color
+    tab.session.aim(inside)  # its button has another color
     for dark in (False, True):
         tab.session.update(lambda s, dark=dark: s.showing(dark=dark))
         tab.settle()

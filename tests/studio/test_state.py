@@ -47,7 +47,6 @@ def states(draw: st.DrawFn) -> StudioState:
         appearance=look,
         target=draw(st.none() | vectors),
         reference=draw(st.none() | st.just(designs.redundant_trunk())),
-        side_by_side=draw(st.booleans()),
         camera=draw(st.none() | st.builds(Camera, position=vectors, look_at=vectors)),
         needs=draw(st.sampled_from(["", NEEDS])),
     )

@@ -71,37 +71,12 @@ def test_every_control_has_a_tooltip_with_its_meaning(tab):
     assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")
 
 
-def test_keys_choose_tabs_and_show_their_table_but_not_while_one_types(tab):
-    def chosen() -> str:
-        return tab.page.locator("[role=tab][aria-selected=true]").first.inner_text()
-
-    names = [one.inner_text() for one in tab.page.get_by_role("tab").all()]
-    tab.page.locator("canvas").first.focus()
-    for number in (3, 1):
-        tab.page.keyboard.press(str(number))
-        tab.wait(lambda number=number: chosen() == names[number - 1], "the key chooses a tab")
-    table = tab.page.locator("dialog.keys")
-    for closing in ("?", "Escape"):
-        tab.page.keyboard.press("?")
-        table.get_by_text("choose a tab").wait_for()
-        tab.page.keyboard.press(closing)
-        table.wait_for(state="hidden")
-    fields = tab.slider("taper φ [deg]"), tab.page.locator("form input:visible").first
-    for typed in fields:
-        typed.focus()
-        tab.page.keyboard.press("2")
-        tab.page.keyboard.press("?")
-        assert chosen() == names[0]
-        assert not table.is_visible()
-    tab.page.keyboard.press("Escape")  # restores what was in the field
-
-
 @pytest.mark.large
 def test_an_arm_is_read_and_aimed_in_the_unit_of_its_design(tab):
     arm = designs.lce_arm().replace(display_unit="mm")
     tab.session.update(lambda state: state.replace(design=arm))
     tab.settle()
-    volume = tab.session.reach.exact.volume * 1e6
+    volume = tab.session.found.reach.exact.volume * 1e6
     tab.page.get_by_text(f"volume {volume:.0f}").first.wait_for()
     assert " mL" in tab.page.get_by_text(f"volume {volume:.0f}").first.inner_text()
     tab.open("Move")
@@ -109,12 +84,12 @@ def test_an_arm_is_read_and_aimed_in_the_unit_of_its_design(tab):
     aim = np.round(1e3 * tip_positions(arm, [arm.bounds @ (0.4, 0.6)])[0], 2)
     place.fill(", ".join(map(str, aim)))
     place.press("Enter")
-    tab.wait(lambda: tab.session.answer is not None, "it is solved")
+    tab.wait(lambda: tab.session.found.answer is not None, "it is solved")
     tab.settle()
     np.testing.assert_allclose(tab.session.state.target, 1e-3 * aim, atol=1e-12)
     there = "({:.3f}, {:.3f}, {:.3f}) mm".format(*(aim + 0.0))
     tab.page.get_by_text(f"1 activation reaches {there} to").wait_for()
-    at = "({:.5f}, {:.5f}, {:.5f}) mm".format(*(1e3 * arm.length * tab.session.tip))
+    at = "({:.5f}, {:.5f}, {:.5f}) mm".format(*(1e3 * arm.length * tab.session.found.tip))
     tab.page.get_by_text(f"tip at {at}, pointing along (").wait_for()
     axes = [tab.drawn(f"/axes/label {k}") for k in range(60)]
     assert {label.text for label in axes if label is not None} >= {"x [mm]", "z [mm]"}

@@ -2,40 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from softreach.studio.jobs.reach import SweepReach
 from softreach.studio.scene.camera import VIEWS, framing
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
-from tests.studio.tab import SIZE, unit
+from tests.studio.tab import like
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
 BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
-
-
-def pixels(tab) -> np.ndarray:
-    """What the canvas shows, RGB from 0 to 1."""
-    from matplotlib.image import imread
-
-    tab.settle()
-    canvas = tab.page.locator("canvas").first.bounding_box()
-
-    def picture() -> np.ndarray:
-        tab.page.wait_for_timeout(400)
-        return imread(io.BytesIO(tab.page.screenshot(clip=canvas)))[..., :3]
-
-    image = picture()
-    for _ in range(8):  # until it stands still
-        last, image = image, picture()
-        if (last == image).all():
-            break
-    return image
 
 
 def show(tab, **look) -> None:
@@ -43,20 +22,13 @@ def show(tab, **look) -> None:
     tab.settle()
 
 
-def like(image: np.ndarray, color) -> int:
-    """Number of pixels of about this hue, however bright."""
-    size = np.linalg.norm(image, axis=-1)
-    cosine = image @ np.asarray(color) / np.maximum(size, 1e-9) / np.linalg.norm(color)
-    return int(((cosine > 0.985) & (size > 0.25)).sum())
-
-
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     show(tab, mouse="none")  # the handle has a blue arrow
-    seen = like(pixels(tab), BLUE)
-    show(tab, cut="none")
-    hidden = like(pixels(tab), BLUE)
+    seen = like(tab.pixels(), BLUE)
+    show(tab, half=False)
+    hidden = like(tab.pixels(), BLUE)
     show(tab, cloud=False)
-    alone = like(pixels(tab), BLUE)
+    alone = like(tab.pixels(), BLUE)
     assert seen > 0.9 * alone
     assert hidden < 0.75 * seen
 
@@ -77,7 +49,7 @@ def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
 
 def pixels_of(tab, **look) -> np.ndarray:
     show(tab, **look)
-    return pixels(tab)
+    return tab.pixels()
 
 
 @pytest.mark.large
@@ -109,9 +81,8 @@ def test_numbers_stand_outside_of_what_they_number_from_every_side(tab):
     low, high = tab.session.scene.axes.corners
     middle = (low + high) / 2
     for toward in ((2, -4, 1.5), (-3, 3, 1), (3, 2, -2), (-4, -1, -2)):
-        with tab.session.drawing:  # the eye's own job turns them too
-            tab.session.scene.axes.turn(middle + np.array(toward))
-            labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
+        tab.session.scene.axes.turn(middle + np.array(toward))
+        labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
         places = np.array([label.position for label in labels if label is not None])
         assert ((places < low) | (places > high)).any(axis=1).all()
 
@@ -138,67 +109,6 @@ def test_a_saved_picture_is_drawn_anew_over_key_numbers_and_design(tab, tmp_path
     monkeypatch.setattr("softreach.studio.scene.camera._LONGEST", 100)
     with pytest.raises(InvalidInput, match="make the window smaller"):
         tab.session.picture()
-
-
-def test_a_scale_bar_is_as_long_as_that_length_at_the_depth_of_the_target(tab):
-    def length(depth: float) -> float:
-        """Pixels of 1 L across the sight, so much [L] behind the target."""
-        camera = tab.session.client.camera
-        forward = unit(camera.look_at - camera.position)
-        right = 0.05 * unit(np.cross(forward, camera.up_direction))
-        middle = camera.look_at + depth * forward
-        ends = [tab.projected(middle + side * right)[0] for side in (-1, 1)]
-        return (ends[1] - ends[0]) * camera.image_width / 0.1
-
-    assert tab.session.camera.pixels_per_length == pytest.approx(length(0.0), rel=1e-9)
-    assert length(0.3) < 0.95 * length(0.0)
-
-
-@pytest.mark.large
-def test_f_leaves_the_scene_with_large_numbers_and_escape_brings_the_panel_back(tab):
-    page, numbers = tab.page, tab.page.locator("[data-history] b").first
-    canvas, small = page.locator("canvas").first, numbers.bounding_box()["height"]
-    field = page.get_by_role("textbox", name="taper φ [deg]")
-    field.focus()
-    page.keyboard.press("f")
-    assert page.get_by_role("tab", name="Design").is_visible()  # who types an f wants one
-    page.keyboard.press("Escape")
-    page.get_by_role("tab", name="Design").focus()
-    for leave in ("Escape", "f"):
-        page.keyboard.press("f")
-        tab.wait(lambda: canvas.bounding_box()["width"] == SIZE[0], "the scene is as wide")
-        assert not page.get_by_role("tab", name="Design").is_visible()
-        assert numbers.bounding_box()["height"] > 1.3 * small
-        page.keyboard.press(leave)
-        tab.wait(lambda: canvas.bounding_box()["width"] < SIZE[0], "the panel is back")
-        assert page.get_by_role("tab", name="Design").is_visible()
-
-
-def sweep(tab, motion: str) -> None:
-    tab.page.evaluate(f"localStorage.setItem('viser-user:softreach-motion', '{motion}')")
-    tab.session.job(SweepReach).ask()
-
-
-@pytest.mark.large
-def test_the_arm_sweeps_until_a_key_and_leaves_nothing_behind(tab, monkeypatch):
-    show(tab)
-    session, moved = tab.session, []
-    monkeypatch.setattr(session, "is_touched", False)
-    draw = session.scene.draw_arm
-    monkeypatch.setattr(
-        session.scene,
-        "draw_arm",
-        lambda arm, at, *more, **held: moved.append(at) or draw(arm, at, *more, **held),
-    )
-    before, tip = (session.state, session.history), session.tip
-    sweep(tab, "welcome")
-    tab.wait(lambda: len(moved) > 3, "the arm moves")
-    tab.page.keyboard.press("x")
-    tab.settle()
-    assert moved[-1] == before[0].activation
-    assert (session.state, session.history) == before
-    np.testing.assert_array_equal(session.tip, tip)
-    assert not session.is_touched
 
 
 def test_a_view_that_was_kept_on_a_phone_is_framed_anew_from_its_side(tab):

@@ -39,7 +39,7 @@ def studio(
     """Open the design desk in the browser.
 
     Move sliders, and see at once what the design can reach. The work on a design
-    and its snapshots are kept in a folder of your own, and found again.
+    is kept in a folder of your own, and found again.
 
     Example: softreach studio redundant_trunk --no-open
 
@@ -64,7 +64,8 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.serve.access import check_address, is_local, new_token
+    from softreach.studio.serve.guard import new_token
+    from softreach.studio.serve.server import check_address, is_local
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
@@ -72,7 +73,7 @@ def studio(
     with_token = not is_local(host) if token is None else token
     start = _start(source)
     secret, work = new_token() if with_token else "", _work(start, source, fresh=fresh)
-    with Studio(start, host, port, secret, work=work, compile_ahead=True, sweeps=True) as running:
+    with Studio(start, host, port, secret, work=work) as running:
         console.line(f"{running.url}  (Ctrl-C ends it)")
         for url in running.urls_for_others:
             console.line(f"{url}  (for other machines)")

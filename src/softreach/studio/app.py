@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import suppress
-from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,32 +12,34 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
-from softreach.studio.jobs.calibration import DrawSample, FitArm
-from softreach.studio.jobs.inverse import DragTip, SolveInverse
-from softreach.studio.jobs.needs import CheckNeeds, ConfirmNeeds
-from softreach.studio.jobs.page import KeepState, SetTheme
-from softreach.studio.jobs.path import FollowPath, PlayPath
-from softreach.studio.jobs.plots import PLOT_JOBS
+from softreach.studio.jobs.arm import DRAW_ARM, FOLLOW_CAMERA, SET_THEME
+from softreach.studio.jobs.beside import DRAW_FREE, DRAW_REFERENCE
+from softreach.studio.jobs.calibration import DRAW_SAMPLE, FIT_ARM
+from softreach.studio.jobs.inverse import DRAG_TIP, SOLVE_INVERSE
+from softreach.studio.jobs.needs import CHECK_NEEDS
+from softreach.studio.jobs.path import FOLLOW_PATH, PLAY_PATH
+from softreach.studio.jobs.plots import DRAW_SECTION, SWEEP_VOLUME
 from softreach.studio.jobs.reach import (
-    ComputeReach,
-    DifferentiateVolume,
-    DrawArm,
-    DrawCloud,
-    DrawSurface,
-    FollowCamera,
-    SweepReach,
+    COMPUTE_REACH,
+    DIFFERENTIATE_VOLUME,
+    DRAW_CLOUD,
+    DRAW_SURFACE,
 )
-from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
-from softreach.studio.serve.messages import LARGEST_UPLOAD
-from softreach.studio.serve.server import page_url, start_server, stop_server
-from softreach.studio.serve.viser_fixes import close_sockets, guard_inputs
-from softreach.studio.session import Job, Session
-from softreach.studio.snapshots import Snapshots
+from softreach.studio.serve.guard import close_sockets
+from softreach.studio.serve.server import (
+    LOOPBACK,
+    page_address,
+    page_url,
+    reachable_hosts,
+    start_server,
+    stop_server,
+    with_token,
+)
+from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
-from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import CompilationWatch, IdleCompiler, Latest, StaleCheck
-from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.studio.state import Camera, vector
+from softreach.studio.work import CompilationWatch, Latest
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -47,21 +48,19 @@ if TYPE_CHECKING:
 
 __all__ = ["JOBS", "Studio"]
 
-JOBS: tuple[type[Job], ...] = (
-    ComputeReach, DifferentiateVolume, DrawArm, DrawCloud, DrawSurface, FollowCamera, SweepReach,
-    DrawFree, DrawReference, DrawReferenceArm,
-    SolveInverse, DragTip,
-    FollowPath, PlayPath,
-    DrawSample, FitArm,
-    CheckNeeds, ConfirmNeeds,
-    *PLOT_JOBS,
-    SetTheme, KeepState,
+JOBS = (
+    COMPUTE_REACH, DIFFERENTIATE_VOLUME, DRAW_CLOUD, DRAW_SURFACE,
+    DRAW_ARM, FOLLOW_CAMERA, SET_THEME,
+    DRAW_FREE, DRAW_REFERENCE,
+    SOLVE_INVERSE, DRAG_TIP,
+    FOLLOW_PATH, PLAY_PATH,
+    DRAW_SAMPLE, FIT_ARM,
+    CHECK_NEEDS,
+    DRAW_SECTION, SWEEP_VOLUME,
 )  # fmt: skip
 """Every kind of work that a tab has done for it."""
 
 _CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
-_PATIENCE = 0.5  # [s]
-_MOST_LEFT = 20  # closed tabs whose work is remembered
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
 
@@ -76,8 +75,6 @@ class Studio:
         token: str = "",
         *,
         work: KeptWork | None = None,
-        compile_ahead: bool = False,
-        sweeps: bool = False,
     ) -> None:
         """Start serving.
 
@@ -87,27 +84,15 @@ class Studio:
             port: None for a free one.
             token: What every page has to know; "" for nothing.
             work: Where the work is kept when tabs and server end; nowhere by default.
-            compile_ahead: Whether to compile what may be needed, such as for loads, once the first
-                picture is complete.
-            sweeps: Whether the arm of a fresh tab sweeps its reach once.
 
         Raises:
             InvalidInput: The address cannot be used.
             MissingExtra: viser is not installed.
         """
         self.start, self._token, self.work = start, token, work
-        self._sweeps = sweeps and start.state.camera is None
-        self.snapshots = Snapshots(work)
-        # On a thread of its own: two tabs that show each other's changes would wait for each other.
-        self._retold = Latest(_ignored)
-        self.snapshots.changed = lambda: self._retold.submit(lambda _: self._show_all())
-        self._left: list[tuple[StudioState, History]] = []
-        """The work of tabs that are closed: a page that is reloaded takes up the latest."""
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
-        self._compiler = IdleCompiler() if compile_ahead else None
-        self._rested = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
         self._libraries = threading.Thread(target=_load_libraries, daemon=True)
         self._libraries.start()
@@ -133,10 +118,6 @@ class Studio:
     def stop(self) -> None:
         """Stop serving."""
         self._compilation.close()
-        self._retold.close()
-        self._rested.close()
-        if self._compiler is not None:
-            self._compiler.close()
         for session in list(self.sessions.values()):
             session.close()
         self._disconnect_tabs()
@@ -170,37 +151,28 @@ class Studio:
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start, JOBS, work=self.work, snapshots=self.snapshots)
-        guard_inputs(client, partial(_refuse_file, session))
+        session = Session(client, self.start, JOBS, work=self.work)
         session.compiling = self._compilation.running
         session.compiled = self._compilation.done
         self._libraries.join()
+        left = None if self.work is None else self.work.latest
         with self._lock:
-            left = self._work_left()
             self.sessions[client.client_id] = session
         if left is not None:
-            session.take_up(*left)
+            session.take_up(left)
         _furnish(session)
-        session.camera.on_move(lambda: session.follow(FollowCamera))
-        session.job(SweepReach).is_due = self._sweeps and left is None
+        session.camera.on_move(lambda: session.follow("camera"))
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)
-        elif session.camera.is_upright and (left is None or left[0].camera is None):
+        elif session.camera.is_upright and (left is None or left.camera is None):
             session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
-        elif left is not None and not left[1].past:
+        elif left is not None:
             session.say(_GOES_ON)
-        self._rested.submit(partial(self._compile_ahead, session))
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)
-
-    def _compile_ahead(self, session: Session, check: StaleCheck) -> None:
-        while self._compiler is not None and not session.settle(_PATIENCE):
-            check()
-        if self._compiler is not None:
-            self._compiler.start()
 
     def _disconnected(self, client: ClientHandle) -> None:
         with self._lock:
@@ -209,23 +181,7 @@ class Studio:
             session.close()
             if not self.sessions:
                 forget_prepared()
-            if self.work is not None:
-                session.keep()
-                self._left.append((session.state_now(), session.history))
-                del self._left[:-_MOST_LEFT]
-
-    def _work_left(self) -> tuple[StudioState, History] | None:
-        """State and history that a new tab goes on with: those of tabs that are open are theirs."""
-        if self.work is None:
-            return None
-        if self._left:
-            return self._left.pop()
-        latest = None if self.sessions else self.work.latest
-        return None if latest is None else (latest, History())
-
-    def _show_all(self) -> None:
-        for session in list(self.sessions.values()):
-            session.show()
+            session.keep()
 
 
 def _load_libraries() -> None:
@@ -245,11 +201,6 @@ def _camera_beside(arm: Manipulator) -> Camera:
     look_at = arm.base.to_world(arm.length * np.array(_CAMERA.look_at)) / arm.length
     position = look_at + np.subtract(_CAMERA.position, _CAMERA.look_at)
     return Camera(position=vector(position), look_at=vector(look_at))
-
-
-def _refuse_file(session: Session, name: str, size: int) -> None:
-    most = f"at most {LARGEST_UPLOAD / 1e6:g} MB"
-    session.say(str(InvalidInput(name, f"{size / 1e6:.3g} MB", most)))
 
 
 def _furnish(session: Session) -> None:

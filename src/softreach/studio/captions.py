@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.clouds import FAINT
-from softreach.support.quantity import round_below
+from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from softreach.arm.manipulator import Manipulator
+    from softreach.studio.found import Found
     from softreach.studio.reach import Reach, Size
-    from softreach.studio.session import Session
 
 UNREACHABILITY = (
     "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
@@ -46,7 +46,14 @@ def size_text(size: Size, arm: Manipulator) -> str:
     if size.power == 0:
         return size.name
     error = max(size.error, _FINEST * arm.length**size.power)
-    return f"{size.name} {arm.length_unit.text(size.value, size.power, error)}"
+    return f"{size.name} {_unit_of(size, arm).text(size.value, size.power, error)}"
+
+
+def _unit_of(size: Size, arm: Manipulator) -> LengthUnit:
+    """The unit of the arm; for volumes of a liter and more that of liters in place of mL."""
+    unit, liter = arm.length_unit, as_unit("cm")
+    large = size.power == 3 and size.value >= liter.scale(3)
+    return liter if large and unit.name == "mm" else unit
 
 
 def place_text(place: Iterable[float], arm: Manipulator, decimals: int = 4) -> str:
@@ -100,54 +107,28 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 
 
-def loaded_share(session: Session) -> str:
+def loaded_share(found: Found, design: Manipulator) -> str:
     """Share of the reach without loads that is left; nothing for an arm without loads."""
-    reach, free = session.reach, session.free
-    if reach is None or reach.arm.loads is None or reach.arm != session.state.design:
+    reach, free = found.reach, found.free
+    if reach is None or reach.arm.loads is None or reach.arm != design:
         return ""
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = free.arm.length_unit.rounded(free.size.value, free.size.power)
+    whole = _unit_of(free.size, free.arm).rounded(free.size.value, free.size.power)
     return f" under loads, {share} of {whole} without"
 
 
-def tip_text(session: Session) -> list[Part]:
+def tip_text(found: Found, design: Manipulator) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
     parts: list[Part] = []
-    if session.tip is not None:
-        place = place_text(session.tip, session.state.design, 6)
-        pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(session.scene.pointing, 3))
+    if found.tip is not None:
+        place = place_text(found.tip, design, 6)
+        pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(found.pointing, 3))
         parts.append(f"tip at {place}, pointing along ({pointing})")
-    if session.posture is not None:
-        parts.append(f"{' · ' if parts else ''}{_POSTURES[session.posture]}")
+    if found.posture is not None:
+        parts.append(f"{' · ' if parts else ''}{_POSTURES[found.posture]}")
     return parts
-
-
-class ScaleBar(NamedTuple):
-    """Line of a round length, and how long that is in words."""
-
-    pixels: float
-    text: str
-
-
-def scale_bar(pixels_per_length: float, room: float, length: float) -> ScaleBar:
-    """The longest bar of 1, 2 or 5 times a power of ten of L that there is room for.
-
-    Args:
-        pixels_per_length: Pixels of 1 L.
-        room: Pixels that the bar may take.
-        length: L [m].
-    """
-    bar = round_below(room / pixels_per_length)
-    return ScaleBar(bar * pixels_per_length, f"{bar:.12g} L = {_meters(bar * length)}")
-
-
-def _meters(length: float) -> str:
-    for unit, size in (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)):
-        if length >= size * (1 - 1e-9):
-            return f"{length / size:.3g} {unit}"
-    return f"{length / 1e-6:.3g} µm"
 
 
 def _percent(share: float) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +14,11 @@ from numpy.typing import NDArray
 
 from softreach.export import export_cloud, export_mesh
 from softreach.rod.kinematics import configuration
+from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.reach import Reach, cloud_points, shown_samples
+from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import Appearance, StudioState, design_of_text
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import text_of
@@ -21,13 +26,9 @@ from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
-__all__ = [
-    "cloud_file",
-    "figure_file",
-    "state_from",
-    "surface_file",
-]
+    from softreach.plot.coloring import BundleKey, ScalarKey
 
 Array = NDArray[np.float64]
 
@@ -77,6 +78,18 @@ def figure_file(reach: Reach, state: StudioState) -> bytes:
     return _written("figure.png", write)
 
 
+def page_file(reach: Reach, state: StudioState) -> bytes:
+    """A web page to be turned: the boundary or the points that are shown, and the arm as it is."""
+    from softreach import plot
+
+    look, shape = state.appearance, configuration(state.design, np.asarray(state.activation))
+    cloud, color = _shown(reach, look)
+    what = reach.exact if reach.has_surface and look.surface and not look.cloud else cloud
+    unit, text = state.design.length_unit.name, ". ".join(_caption(state, reach))
+    page = plot.plot_3d([what, shape], color=color, unit=unit, caption=text)
+    return _written("page.html", lambda path: plot.save_figure(page, path))
+
+
 def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.DataArray]:
     known = [name for name in ("tip", "activation", "status") if name in reach.cloud]
     cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))
@@ -101,3 +114,77 @@ def _written(name: str, write: Callable[[Path], object]) -> bytes:
         path = Path(folder) / name
         write(path)
         return path.read_bytes()
+
+
+# What a tab shows as a picture that explains itself: key, numbers and design under the scene.
+
+
+_PAPER_AND_INK = {False: ("white", "#222"), True: ("#141414", "#ddd")}
+"""Of a light page and of a dark one."""
+_DPI = 100.0
+_KEY, _LINE, _EDGE = 46, 17, 14  # pixels: height of the key and of a line of text, margin
+_CHARACTER = 6.4  # pixels
+
+
+def picture_file(
+    scene: NDArray[np.uint8],
+    state: StudioState,
+    reach: Reach,
+    key: BundleKey | ScalarKey | None,
+) -> bytes:
+    """The picture as PNG.
+
+    Args:
+        scene: What the canvas shows, RGBA on a transparent ground, finer than the page.
+        state: What it shows.
+        reach: Of its design.
+        key: To its colors.
+    """
+    from matplotlib.figure import Figure
+
+    height, width = (size / FINER for size in scene.shape[:2])
+    room = max(20, int((int(width) - 2 * _EDGE) / _CHARACTER))
+    lines = [line for text in _caption(state, reach) for line in textwrap.wrap(text, room)]
+    below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
+    total, dpi = height + below, _DPI * FINER
+    paper, ink = _PAPER_AND_INK[state.appearance.dark]
+    figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=dpi, facecolor=paper)
+    figure.figimage(scene, 0, below * FINER)
+    if key is not None:
+        _draw_key(figure, key, (1 - (height + 0.35 * _KEY) / total, _KEY / total), ink)
+    for k, line in enumerate(reversed(lines)):
+        at = (_EDGE + k * _LINE) / total
+        figure.text(_EDGE / width, at, line, fontsize=8.5, color=ink, va="bottom")
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=dpi, facecolor=paper)
+    return file.getvalue()
+
+
+def design_text(state: StudioState) -> str:
+    """The parameters of a design, as its sliders name them, and how hard each bundle pulls."""
+    values = ", ".join(f"{c.label} {c.shown:g}" for c in slider_parameters(state.design))
+    pulls = ", ".join(f"{value:.3g}" for value in state.activation)
+    return f"{values}; L = {state.design.length:g} m. Activation ({pulls})."
+
+
+def _caption(state: StudioState, reach: Reach) -> list[str]:
+    numbers = "".join(part for part in reach_text(reach) if isinstance(part, str))
+    marks = "".join(part for part in legend_text(reach, free=False) if isinstance(part, str))
+    return [numbers, *([marks.strip()] if marks else []), design_text(state)]
+
+
+def _draw_key(
+    figure: Figure, key: BundleKey | ScalarKey, place: tuple[float, float], ink: str
+) -> None:
+    from softreach.plot.coloring import BundleKey, color_map, draw_entries
+
+    top, height = place
+    if isinstance(key, BundleKey):
+        look = {"ncols": len(key.labels), "fontsize": 8.5, "frameon": False, "labelcolor": ink}
+        entries = zip(key.labels, key.colors / 255, strict=True)
+        draw_entries(figure, entries, loc="center", bbox_to_anchor=(0.5, top), **look)
+        return
+    bar = figure.add_axes((0.25, top, 0.5, 0.22 * height))
+    figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=key.extend)
+    bar.tick_params(labelsize=8, colors=ink)
+    bar.set_title(key.label, fontsize=8.5, color=ink, pad=3)

@@ -94,15 +94,9 @@ def fields_style() -> str:
     return f"<style>{_FIELDS}</style>"
 
 
-def status(*lines: str, available: Sequence[str]) -> str:
-    """Numbers of the design as HTML, of one height: the tabs below never jump.
-
-    Args:
-        lines: As the other functions here make them.
-        available: Which of undo and redo there are; the head of the page grays the others.
-    """
-    steps = html.escape(" ".join(available))
-    return f'<div data-softreach data-history="{steps}" style="{_STATUS}">{"".join(lines)}</div>'
+def status(*lines: str) -> str:
+    """Lines that the other functions here make, as HTML of one height: the tabs never jump."""
+    return f'<div data-softreach style="{_STATUS}">{"".join(lines)}</div>'
 
 
 def alert(text: str) -> str:

@@ -218,12 +218,6 @@ def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
     return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
 
 
-def beside(reach: Reach) -> NDArray[np.float64]:
-    """Offset of a cloud beside another of about its size [L], shape (3,)."""
-    across = cloud_points(reach, 14)[:, 0]
-    return np.array([1.3 * float(np.ptp(across)) if len(across) else 0.0, 0.0, 0.0])
-
-
 # Stages: coarse first and then fine, within a budget of time and memory.
 
 

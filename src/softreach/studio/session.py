@@ -3,48 +3,37 @@
 from __future__ import annotations
 
 import threading
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from operator import attrgetter
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.kinematics import tip_positions
-from softreach.rod.tip_map import TipStatus
-from softreach.studio.plots.plot import Figures
-from softreach.studio.reach import Reach, cloud_points, shown_rows
+from softreach.studio.found import Found, Pull
+from softreach.studio.job import Job, Learned, Page, Tools, forgotten, what_follows
+from softreach.studio.reach import cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene, shows_cloud
-from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
-from softreach.studio.state import Camera, History, StudioState
-from softreach.studio.work import Latest, StaleCheck, return_memory_soon
+from softreach.studio.state import Camera, History, StudioState, vector
+from softreach.studio.work import Dropped, Latest, StaleCheck, return_memory_soon
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-    from softreach.arm.manipulator import Manipulator
-    from softreach.inverse import Solution
-    from softreach.inverse.drag import Dragged
-    from softreach.plot.coloring import BundleKey, ScalarKey
-    from softreach.requirements import Check
-    from softreach.studio.jobs.calibration import Bench
-    from softreach.studio.scene.drag import TipDrag
-    from softreach.studio.slopes import VolumeSlopes
-
-__all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
+__all__ = ["Panel", "Session"]
 
 Array = NDArray[np.float64]
-_Kind = TypeVar("_Kind", bound="Job")
 
 _CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
-_LINE = 1.0  # pixels of the page that edges are thick in a picture
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
+_REST = 0.5  # [s] without changes, after which the state is kept
 
 
 class Panel(Protocol):
@@ -55,73 +44,6 @@ class Panel(Protocol):
         ...
 
 
-class Job(ABC):
-    """Work that follows from some part of the state; a session has one of each kind."""
-
-    depends_on: ClassVar[tuple[str, ...]] = ()
-    """Attributes of the state that decide the result, such as "appearance.arm"."""
-    only_with: ClassVar[str] = ""
-    """Attribute of the state without which there is nothing to do; "" for none."""
-    shown_plot: ClassVar[str] = ""
-    """Plot without which there is nothing to do either."""
-
-    def __init__(self, session: Session) -> None:
-        self.session = session
-
-    @classmethod
-    def has_use(cls, session: Session) -> bool:
-        """True for sessions that have this kind of work at all."""
-        del session
-        return True
-
-    @classmethod
-    def part_of(cls, state: StudioState) -> object:
-        """The part of a state that decides the result; None where there is nothing to do."""
-        if not cls.depends_on or (cls.only_with and not attrgetter(cls.only_with)(state)):
-            return None
-        if cls.shown_plot and cls.shown_plot not in state.appearance.plots.shown:
-            return None
-        return attrgetter(*cls.depends_on)(state)
-
-    @abstractmethod
-    def run(self, check: StaleCheck) -> None:
-        """Do the work for the state of the session as it is now, on a thread of its own.
-
-        Args:
-            check: To be called between stages; raises if the work is no longer wanted.
-        """
-
-
-class AskedJob(Job):
-    """Work that no state asks for, but a person who presses a button."""
-
-    wanted = False
-    """True if somebody pressed it since the work was last done."""
-
-    def ask(self) -> None:
-        """Do the work as soon as possible."""
-        self.wanted = True
-        self.session.follow(type(self))
-
-    def run(self, check: StaleCheck) -> None:
-        wanted, self.wanted = self.wanted, False
-        if wanted:
-            self.do(check)
-
-    @abstractmethod
-    def do(self, check: StaleCheck) -> None:
-        """Do the work; as `run`."""
-
-
-def what_follows(
-    kinds: Iterable[type[Job]], old: StudioState | None, new: StudioState
-) -> frozenset[type[Job]]:
-    """The jobs whose results a change makes stale; all of them if there was nothing before."""
-    if old is None:
-        return frozenset(kinds)
-    return frozenset(kind for kind in kinds if kind.part_of(old) != kind.part_of(new))
-
-
 class Session:
     """State of a tab and what is known of it; jobs do what is heavy, on threads of their own."""
 
@@ -129,39 +51,32 @@ class Session:
         self,
         client: ClientHandle,
         start: Start,
-        jobs: Iterable[type[Job]] = (),
+        jobs: Iterable[Job] = (),
         *,
         work: KeptWork | None = None,
-        snapshots: Snapshots | None = None,
     ) -> None:
         """Begin a session; `panels` are added by the app before the first `update`.
 
         Args:
             client: The tab.
             start: What it begins with.
-            jobs: Kinds of work that follow from its state.
+            jobs: Work that follows from its state.
             work: Where its state is kept, if anywhere.
-            snapshots: Those of all tabs.
         """
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
-        self.snapshots = snapshots or Snapshots()
         self.history = History()
         self.is_touched = False
         """True once there is anything to keep."""
         self.state: StudioState = start.state
+        self.found = Found(reach=start.reach)
+        """What jobs have found out."""
         self.panels: list[Panel] = []
         self.note = ""
         """Text for the reader."""
         self.revision = 0
         """Number of changes that widgets have to follow."""
-        self.reach: Reach | None = start.reach
-        """Reach of the design, or of the design before it until that is known."""
-        self.slopes: VolumeSlopes | None = None
-        """Change of its volume by each slider, or of the design before until that is known."""
-        self.refusal = ""
-        """Reason why nothing can be computed of the design."""
         self.canceled = False
         """True if the reader stopped what was being computed of this state."""
         self.doing = ""
@@ -170,41 +85,15 @@ class Session:
         """True while kernels are being compiled, for whichever tab."""
         self.compiled = 0
         """Number of kernels compiled since the studio was started."""
-        self.free: Reach | None = None
-        """Reach of a loaded design without its loads."""
-        self.reference: Reach | None = None
-        self.key: BundleKey | ScalarKey | None = None
-        """To the colors of the cloud."""
-        self.tip: Array | None = None
-        """Place of the tip [L]; None before it is known, and without equilibrium."""
-        self.posture: TipStatus | None = None
-        """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
-        self.answer: Solution | None = None
-        """Of the inverse problem."""
-        self.drag: TipDrag | None = None
-        """Of the tip; None when nobody drags."""
-        self.held: tuple[Manipulator, Dragged] | None = None
-        """An arm, and how the last drag left it."""
-        self.is_dragged = False
-        """True while a drag of the tip is under way."""
-        self.bench: Bench | None = None
-        """Measured poses, and what was fitted to them."""
-        self.check: Check | None = None
-        """The design against its needs, or the design before it until that is known."""
-        self.check_refusal = ""
-        """Reason why it cannot be judged."""
-        self.figures = Figures()
-        """Results of the plots beside the scene."""
-        self.drawing = threading.RLock()
-        """Held while nodes that several jobs draw are taken away and drawn again."""
         self._changing, self._showing = threading.RLock(), threading.RLock()
-        self._jobs = {kind: kind(self) for kind in jobs if kind.has_use(self)}
-        self._workers = {kind: Latest(self.fail, self._rested) for kind in self._jobs}
+        kept = () if work is None else (self._keeping(),)
+        self._jobs = {job.name: job for job in (*jobs, *kept)}
+        self._workers = {name: Latest(self.fail, self._rested) for name in self._jobs}
 
     def begin(self) -> None:
         """Do everything once; first what needs no kernel, which may have to be compiled."""
-        if self.reach is None:
-            with self.drawing, self.client.atomic():
+        if self.found.reach is None:
+            with self.client.atomic():
                 self.scene.draw_rest(self.state)
             self.report("computing")
         self._follow_change(None)
@@ -235,7 +124,7 @@ class Session:
             self.is_touched = self.is_touched or old != self.state
             self.revision += not by_widget
             self.canceled = False
-            self._follow_change(old)
+            self._follow_change((old, self.found))
         self.show()
 
     def restore(self, state: StudioState) -> None:
@@ -256,7 +145,7 @@ class Session:
         Returns:
             Shape (3,); None beside all samples.
         """
-        reach, look = self.reach, self.state.appearance
+        reach, look = self.found.reach, self.state.appearance
         shown = look.cloud or look.surface
         if reach is None or not shown or reach.arm != self.state.design:
             return None
@@ -286,15 +175,7 @@ class Session:
         Raises:
             InvalidInput: As `TabCamera.picture`.
         """
-        if self.reach is None:
-            return self.camera.picture()
-        thickness = _LINE / self.camera.pixels_per_length
-        with self.drawing:
-            self.scene.draw_thick_lines(self.reach, self.state.appearance, thickness)
-            try:
-                return self.camera.picture()
-            finally:
-                self.scene.remove("/thick-lines")
+        return self.camera.picture()
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
@@ -305,7 +186,7 @@ class Session:
             stays = self.state is old
             self.note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
             self.revision += 1
-            self._follow_change(old)
+            self._follow_change((old, self.found))
         self.show()
 
     def reset(self) -> None:
@@ -313,11 +194,11 @@ class Session:
         first = self.start.state
         self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
 
-    def take_up(self, state: StudioState, history: History) -> None:
+    def take_up(self, state: StudioState) -> None:
         """Go on where a tab left off, before anything is shown."""
-        self.state, self.history, self.is_touched = state, history, True
+        self.state, self.is_touched = state, True
         if state.design != self.start.state.design:
-            self.reach = None
+            self.found = Found()
         if state.camera is not None:
             self.look_as(state.camera)
 
@@ -346,6 +227,43 @@ class Session:
             for panel in self.panels:
                 panel.show(self)
 
+    def learn(
+        self, found: Mapping[str, Any] | Callable[[Found], Found] | None, *, quiet: bool = False
+    ) -> None:
+        """Replace what is known, and start what follows from that.
+
+        Args:
+            found: Fields of `Found` and their new values, or the next `Found` from this one.
+            quiet: Whether panels hear of it later.
+        """
+        if not found:
+            return
+        with self._changing:
+            old = self.state, self.found
+            self.found = found(self.found) if callable(found) else replace(self.found, **found)
+            self._follow_change(old)
+        if not quiet:
+            self.show()
+
+    def aim(self, target: ArrayLike) -> None:
+        """Find every activation that reaches a target [m], and take the nearest to the present.
+
+        Raises:
+            SoftreachError: The target is no point.
+        """
+        self.learn({"takes_nearest": True})
+        self.update(lambda state: state.replace(target=vector(np.asarray(target))))
+        self.follow("inverse")  # also where the target is the one before
+
+    def drag_to(self, phase: str, wanted: Array) -> None:
+        """Follow a drag of the tip; returns at once. Of its places only the latest is followed.
+
+        Args:
+            phase: "start", "update" or "end".
+            wanted: Where the tip should be [L].
+        """
+        self.learn({"pull": Pull(wanted, rests=phase == "end")}, quiet=True)
+
     @property
     def busy(self) -> bool:
         """True while any job has something to do."""
@@ -357,6 +275,10 @@ class Session:
         if any(stopped):
             self.canceled = True
             self.say("Canceled: what was complete by then is shown.")
+
+    def stop(self, name: str) -> None:
+        """Stop one job."""
+        self._workers[name].cancel()
 
     def resume(self) -> None:
         """Compute what is missing since it was canceled, or failed."""
@@ -380,44 +302,84 @@ class Session:
             self.report("")
             return_memory_soon()
 
-    def follow(self, *kinds: type[Job]) -> None:
+    def follow(self, *names: str) -> None:
         """Do these jobs as soon as they are free, for the state there is by then."""
-        for kind in kinds:
-            self._workers[kind].submit(self._jobs[kind].run)
+        for name in names:
+            self._workers[name].submit(lambda check, job=self._jobs[name]: self._do(job, check))
 
-    def refresh(self, *kinds: type[Job]) -> None:
-        """Do these jobs again, as far as the state asks for them."""
-        self.follow(*(kind for kind in kinds if kind.part_of(self.state) is not None))
+    def _follow_change(self, old: tuple[StudioState, Found] | None) -> None:
+        new = self.state, self.found
+        self.follow(*(job.name for job in what_follows(self._jobs.values(), old, new)))
 
-    def _follow_change(self, old: StudioState | None) -> None:
-        self.follow(*what_follows(self._jobs, old, self.state))
+    def _do(self, job: Job, check: StaleCheck) -> None:
+        """Compute and draw; where that fails, forget what was known, and remove what is drawn."""
+        check()
+        if job.doing:
+            self.report(job.doing)
+        tools = Tools(self.quality, check, self.report, self._page)
+        is_drawn = False
+        try:
+            for learned in job.compute(self.state, self.found, tools):
+                check()
+                self._take(job, learned)
+                is_drawn = True
+            if not is_drawn:
+                self._draw(job)
+        except Dropped:
+            raise
+        except Exception:
+            self.learn(forgotten(job))
+            self.scene.remove(*job.draws)
+            raise
+        finally:
+            if job.doing:
+                self.report("")
+
+    def _take(self, job: Job, learned: Learned) -> None:
+        self.learn(learned.found, quiet=True)
+        if learned.change is not None:
+            self.update(learned.change, goes_on=True)
+        if learned.ends_step:
+            self.end_step()
+        self._draw(job)
+
+    def _draw(self, job: Job) -> None:
+        with self.client.atomic():
+            told = job.draw(self._page, self.state, self.found)
+        self.learn(told, quiet=True)
+        self.show()
 
     @property
-    def shows_sample(self) -> bool:
-        """True while the arm is at a measured pose."""
-        return self.bench is not None and self.bench.distances is not None
+    def _page(self) -> Page:
+        return Page(self.client, self.scene, self.camera)
 
-    def job(self, kind: type[_Kind]) -> _Kind:
-        """The job of a kind."""
-        job = self._jobs[kind]
-        assert isinstance(job, kind)
-        return job
+    def _keeping(self) -> Job:
+        """Writes the state, once it rests for a moment, to where the next tab finds it."""
+
+        def keep(state: StudioState, found: Found, tools: Tools) -> Iterator[Learned]:
+            del state, found
+            for _ in range(10 if self.is_touched else 0):
+                tools.check()
+                time.sleep(_REST / 10)
+            tools.check()
+            self.keep()
+            yield from ()
+
+        return Job("keep", tuple(field.name for field in fields(StudioState)), keep)
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that follows from the state is done; return whether it is."""
         with self._changing:  # what changes it also asks for what follows
             pass
         # Work of one kind may order work of another.
-        return all(worker.join(timeout) for _ in range(2) for worker in self._workers.values())
+        return all(worker.join(timeout) for _ in range(3) for worker in self._workers.values())
 
     def close(self) -> None:
         """Drop all work: the tab is gone."""
         for worker in self._workers.values():
             worker.close()
         # viser may hold on to what belongs to a page for a while; clouds are large.
-        self.reach = self.free = self.reference = self.answer = None
-        self.panels, self.figures, self.bench = [], Figures(), None
-        self.check = self.slopes = None
+        self.found, self.panels = Found(), []
         return_memory_soon()
 
     def _rested(self) -> None:

@@ -86,7 +86,7 @@ _OF_ARM = {
     "revolution": _Slider("revolution Ω [deg]", 1, 360, 1),
     "taper": _Slider("taper φ [deg]", -2, 5, 0.05),
     "radius_ratio": _Slider("inner / outer radius", 0, 1, 0.01),
-    "outer_radius": _Slider("outer radius / L", 0.02, 0.12, 5e-4),
+    "outer_radius": _Slider("outer radius", 0.02, 0.12, 5e-4),  # of L
     "extent": _Slider("extent σ [deg]", 2, 120, 1),
     "lower": _Slider("lowest γ", -4, 0, 0.01),
     "upper": _Slider("highest γ", -1, 2, 0.01),
@@ -113,6 +113,8 @@ _MORE = {
     "upper": "the most that a bundle extends",
 }
 _HALVINGS = 14
+_NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
+"""Words of symbols on sliders."""
 _IN_WORDS = {"R2(L)": "R₂ at the tip", "R2(0)": "R₂ at the base"}
 _Unit = tuple[str, float]
 """Name of a unit, and how many units of the parameter it is."""
@@ -180,19 +182,34 @@ def _slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     fixed = (_OF_PART if parameter.owner else _OF_ARM).get(parameter.field)
     outside_arm = parameter.field == "distance_ratio" and value > 1
     if fixed and parameter.unit in ("1", "rad", "m") and not outside_arm:
+        if parameter.unit == "m":
+            fixed = _in_unit_of(arm, fixed)
         return fixed if math.isfinite(value) else None
     return None if value == 0 or math.isnan(value) else _around(arm, parameter, value)
 
 
+def _in_unit_of(arm: Manipulator, slider: _Slider) -> _Slider:
+    """A slider over lengths in L, in the unit of the arm."""
+    unit, scale = arm.length_unit, float(f"{arm.length / arm.length_unit.size:.12g}")
+    ends = (scale * end for end in (slider.low, slider.high, slider.step))
+    return _Slider(unit.label(slider.label), *ends)
+
+
 def _around(arm: Manipulator, parameter: Parameter, value: float) -> _Slider:
     """From zero, or near it where it is not allowed, to twice the value."""
-    owner = f" of {owner_label(parameter.owner)}" if parameter.owner else ""
+    name = _NAMES.get(parameter.symbol, parameter.symbol)
+    owner = f" of {_owner_name(arm, parameter.owner)}" if parameter.owner else ""
     unit, scale = _unit(parameter, _units_on_sliders(arm))
     size = value / scale
     ends = (0.01 if parameter.field == "young_modulus" else 0.0) * size, 2 * size
-    return _Slider(
-        _titled(f"{parameter.symbol}{owner}", unit), min(ends), max(ends), abs(size) / 100
-    )
+    return _Slider(_titled(f"{name}{owner}", unit), min(ends), max(ends), abs(size) / 100)
+
+
+def _owner_name(arm: Manipulator, path: str) -> str:
+    """The part that owns a parameter, a ring by its own name if it has one."""
+    label = owner_label(path)
+    rings = {f"ring {k}": ring.name for k, ring in enumerate(arm.section.rings)}
+    return rings.get(label) or label
 
 
 def owner_label(path: str) -> str:
@@ -233,7 +250,7 @@ def _on_slider(arm: Manipulator, parameter: Parameter, slider: _Slider) -> Shown
 
 
 def _units_on_sliders(arm: Manipulator) -> Mapping[str, _Unit]:
-    return {"rad": _DEGREES, "m": ("L", arm.length), "Pa": _KPA}
+    return {"rad": _DEGREES, "m": (arm.length_unit.name, arm.length_unit.size), "Pa": _KPA}
 
 
 class Part(NamedTuple):

@@ -13,7 +13,6 @@ from pathlib import Path
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.files import LARGEST
 from softreach.studio.reach import Quality, Reach, reached
-from softreach.studio.snapshots import Snapshot
 from softreach.studio.state import StudioState
 from softreach.support.errors import SoftreachError
 from softreach.support.files.atomic import replacing
@@ -74,14 +73,8 @@ def user_folder() -> Path:
 
 # Work on a design that stays when its tab is reloaded or the server ends.
 #
-# The page offers no place of its own, so the server keeps it: in the user's own folder, one folder
-# for each design that the studio is opened on, one file for the latest state and one for each
-# snapshot. Every file appears complete or not at all and none is shared by two writers' halves, so
-# that two tabs, or two studios, cannot spoil each other's work: of two latest states the later one
-# stays.
-
-
-_MOST = 200  # files that are read
+# The server keeps it: in the user's own folder, a folder for each design that the studio is opened
+# on. The file appears complete or not at all: of two tabs that write, the later state stays.
 
 
 class KeptWork:
@@ -92,7 +85,7 @@ class KeptWork:
 
         Args:
             folder: Made when first written to.
-            goes_on: Whether to begin with the latest state; snapshots are there in any case.
+            goes_on: Whether to begin with the latest state.
         """
         self._folder, self._writing = folder, threading.Lock()
         self.complaint = ""
@@ -104,29 +97,6 @@ class KeptWork:
         """Keep the latest state."""
         self.latest = state
         self._write("latest.json", state.to_json())
-
-    def snapshots(self) -> tuple[Snapshot, ...]:
-        """Those that can be read, in the order in which they were taken."""
-        known: dict[str, Snapshot] = {}
-        for path in sorted(self._folder.glob("snapshot-*.json"))[:_MOST]:
-            try:
-                snapshot = Snapshot.from_json(read_text("file", path, LARGEST))
-            except (SoftreachError, OSError) as error:
-                self._complain(path, error)
-            else:
-                known[snapshot.name] = snapshot
-        return tuple(sorted(known.values(), key=lambda snapshot: snapshot.taken))
-
-    def put(self, snapshot: Snapshot) -> None:
-        """Keep a snapshot, instead of an older one of its name."""
-        self._write(_file_of(snapshot.name), snapshot.to_json())
-
-    def remove(self, name: str) -> None:
-        """Forget a snapshot."""
-        try:
-            (self._folder / _file_of(name)).unlink(missing_ok=True)
-        except OSError as error:
-            self._complain(self._folder, error)
 
     def _latest(self) -> StudioState | None:
         path = self._folder / "latest.json"
@@ -157,7 +127,3 @@ def work_on(design: Manipulator, *, goes_on: bool = True) -> KeptWork:
     """Work that is kept of a design."""
     digest = hashlib.sha256(design.to_toml().encode()).hexdigest()[:16]
     return KeptWork(user_folder() / "studio" / digest, goes_on=goes_on)
-
-
-def _file_of(name: str) -> str:
-    return f"snapshot-{hashlib.sha256(name.encode()).hexdigest()[:16]}.json"

@@ -77,16 +77,9 @@ def _is_solvable(arm: Manipulator) -> bool:
         return False
 
 
-VERSION = 2
+VERSION = 3
 LEVELS = range(12, 22)
 """The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
-
-CUTS = {
-    "window": "a window to the arm",
-    "half": "the half in front of the arm",
-    "none": "nothing",
-}
-"""Parts of a cloud that are cut away in front of the arm: name -> what the menu says."""
 
 MOUSE = {
     "tip": "drags the tip",
@@ -129,8 +122,8 @@ class Appearance:
     color: str = "effort"
     """One of `colors.color_names`."""
     slice: Slice = field(default_factory=Slice)
-    cut: str = "window"
-    """Part of the cloud that is cut away in front of the arm: one of `CUTS`."""
+    half: bool = True
+    """The half of the cloud in front of the arm is cut away."""
     dark: bool = False
     """The page is dark."""
     cloud: bool = False
@@ -149,8 +142,6 @@ class Appearance:
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
             raise InvalidInput("level", self.level, f"{LEVELS[0]} to {LEVELS[-1]}")
-        if self.cut not in CUTS:
-            raise InvalidInput("cut", self.cut, f"one of {', '.join(CUTS)}")
         if self.mouse not in MOUSE:
             raise InvalidInput("mouse", self.mouse, f"one of {', '.join(MOUSE)}")
         for each in fields(self):  # in a state that came from elsewhere too
@@ -191,9 +182,7 @@ class StudioState:
     target: Vector | None = None
     """Place where the tip should go [m]."""
     reference: Manipulator | None = None
-    """The design of a snapshot that is drawn around this one."""
-    side_by_side: bool = False
-    """It is drawn beside this one instead."""
+    """A design that is kept, to be compared with this one."""
     camera: Camera | None = None
     path: TipPath | None = None
     """Path that the tip follows."""
@@ -247,7 +236,7 @@ class StudioState:
             raise InvalidInput("state file", str(error), "one that the studio saved") from None
 
 
-_PLAIN = ("activation", "target", "side_by_side", "needs")
+_PLAIN = ("activation", "target", "needs")
 
 
 def _parsed(text: str | bytes) -> dict[str, Any]:
@@ -273,7 +262,6 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "appearance": Appearance(**look),
         "target": values["target"] and vector(values["target"]),
         "reference": reference and design_of_text(reference, "state file"),
-        "side_by_side": bool(values["side_by_side"]),
         "camera": camera and _camera(**camera),
         "path": path and TipPath.from_fields(path),
         "needs": str(values["needs"]),
@@ -312,7 +300,7 @@ def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...
 
 _LONGEST = 200  # steps back
 _PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
-_SETTINGS = ("design", "reference", "side_by_side", "needs")
+_SETTINGS = ("design", "reference", "needs")
 _POSE = ("activation", "target")
 
 

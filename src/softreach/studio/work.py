@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -285,43 +282,6 @@ def _tips(rod: TipMap, gamma: NDArray[np.float64]) -> None:
 
 
 # Compilation of kernels, for which only the first use on a machine has to wait.
-
-
-class IdleCompiler:
-    """Process that compiles every kernel into the cache on disk, where this one then finds them.
-
-    It has what nobody else wants of the processor. A thread of this process would hold the
-    compiler's lock for seconds, and whoever needs a kernel meanwhile would wait for all of them.
-    """
-
-    def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
-        self._lock, self._closed = threading.Lock(), False
-
-    def start(self) -> None:
-        """Begin, once."""
-        with self._lock:
-            if self._closed or self._process is not None:
-                return
-            idle = getattr(subprocess, "IDLE_PRIORITY_CLASS", 0)  # of Windows
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "softreach", "warmup"],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                creationflags=idle,
-            )
-            if not idle:
-                os.setpriority(os.PRIO_PROCESS, self._process.pid, 19)
-
-    def close(self) -> None:
-        """End it; what it has compiled stays."""
-        with self._lock:
-            self._closed = True
-            if self._process is not None:
-                self._process.terminate()
-                self._process.wait()
-
 
 _KIND = "numba:compile"
 

@@ -1,98 +1,77 @@
-"""Jobs of other designs in the scene: the arm without its loads, and that of a snapshot."""
+"""Jobs of other designs in the scene: the arm without its loads, and the one that is kept."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-
-import numpy as np
+from typing import Any
 
 from softreach.arm.manipulator import Manipulator
+from softreach.studio.found import Found
+from softreach.studio.job import Job, Learned, Page, Results, Tools
 from softreach.studio.jobs.reach import draw_axes
-from softreach.studio.reach import Reach, beside, stages
-from softreach.studio.session import Job
-from softreach.studio.work import StaleCheck
+from softreach.studio.reach import Reach, stages
+from softreach.studio.state import StudioState
 
 _LEVEL = 16
 
 
-class DrawFree(Job):
-    """The reach of a loaded arm without its loads, faint behind the loaded one."""
-
-    depends_on = "unloaded", "appearance.slice"
-    only_with = "design.loads"
-
-    def run(self, check: StaleCheck) -> None:
-        session, state = self.session, self.session.state
-        free, known = state.unloaded, session.reach
-        if state.design.loads is None:
-            session.free = None
-        elif session.free is None or session.free.arm != free or not session.free.fine:
-            if known is not None and known.fine and known.arm == free:
-                session.free = known  # the loads have just been put on
-            else:
-                quality = session.quality
-                small = replace(quality, fine_level=quality.coarse_level)
-                for reach in stages(free, min(_LEVEL, quality.coarse_level), small, check):
-                    check()
-                    session.free = reach
-                    self._draw()
-        self._draw()
-
-    def _draw(self) -> None:
-        session = self.session
-        with session.drawing, session.client.atomic():
-            session.scene.draw_free(session.free, session.state.appearance.slice)
-            draw_axes(session)
-        session.show()
+def _compute_free(state: StudioState, found: Found, tools: Tools) -> Results:
+    free = None if state.design.loads is None else state.unloaded
+    small = replace(tools.quality, fine_level=tools.quality.coarse_level)
+    for reach in _reaches(free, found.free, found.reach, small, tools):
+        yield Learned({"free": reach})
 
 
-class DrawReference(Job):
-    """The reach of the design of a snapshot, around this one's or beside it."""
-
-    depends_on = (
-        "reference", "side_by_side",
-        "appearance.level", "appearance.color", "appearance.slice",
-    )  # fmt: skip
-    only_with = "reference"
-
-    def run(self, check: StaleCheck) -> None:
-        session, state = self.session, self.session.state
-        reference = state.reference
-        if reference is None:
-            session.reference = None
-            with session.drawing:
-                session.scene.remove("/reference")
-        elif session.reference is None or session.reference.arm != reference:
-            session.reference = self._reach_of(reference, check)
-        if session.reference is not None:
-            shift = beside(session.reference) if session.state.side_by_side else np.zeros(3)
-            name = session.snapshots.name_of(session.reference.arm)
-            with session.drawing, session.client.atomic():
-                session.scene.draw_reference(session.reference, state.appearance, shift, name)
-            session.follow(DrawReferenceArm)
-        session.show()
-
-    def _reach_of(self, reference: Manipulator, check: StaleCheck) -> Reach:
-        known = self.session.reach
-        if known is not None and known.fine and known.arm == reference:
-            return known
-        *_, fine = stages(reference, _LEVEL, self.session.quality, check)
-        return fine
+def _draw_free(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
+    page.scene.draw_free(found.free, state.appearance.slice)
+    draw_axes(page, state, found)
+    return {}
 
 
-class DrawReferenceArm(Job):
-    """The arm of that design beside this one, in the same activation."""
+DRAW_FREE = Job(
+    "free",
+    ("unloaded", "appearance.slice"),
+    _compute_free,
+    _draw_free,
+    wanted=lambda state: state.design.loads is not None,
+    makes=("free",),
+    draws=("/free",),
+)
+"""The reach of a loaded arm without its loads, faint behind the loaded one."""
 
-    depends_on = "reference", "activation", "appearance.arm"
-    only_with = "side_by_side"
 
-    def run(self, check: StaleCheck) -> None:
-        check()
-        session, state = self.session, self.session.state
-        reference = session.reference
-        with session.drawing:
-            if reference is not None and state.side_by_side and state.appearance.arm:
-                same = state.replace(design=reference.arm).activation
-                session.scene.draw_reference_arm(reference.arm, same, beside(reference))
-            else:
-                session.scene.remove("/reference/arm")
+def _compute_reference(state: StudioState, found: Found, tools: Tools) -> Results:
+    for reach in _reaches(state.reference, found.reference, found.reach, tools.quality, tools):
+        yield Learned({"reference": reach})
+
+
+def _draw_reference(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
+    page.scene.draw_reference(found.reference, state.appearance.slice)
+    return {}
+
+
+DRAW_REFERENCE = Job(
+    "reference",
+    ("reference", "appearance.slice"),
+    _compute_reference,
+    _draw_reference,
+    wanted=lambda state: state.reference is not None,
+    makes=("reference",),
+    draws=("/reference",),
+)
+"""The boundary of the design that is kept."""
+
+
+def _reaches(
+    design: Manipulator | None, known: Reach | None, now: Reach | None, quality: Any, tools: Tools
+) -> Iterator[Reach | None]:
+    """The reach of another design, unless it is known; that of the present one, if they agree."""
+    if design is None:
+        yield None
+    elif known is not None and known.fine and known.arm == design:
+        return
+    elif now is not None and now.fine and now.arm == design:
+        yield now
+    else:
+        yield from stages(design, min(_LEVEL, quality.coarse_level), quality, tools.check)

@@ -1,110 +1,79 @@
-"""Jobs of a calibration: the markers of a sample over the arm, and the fit of free numbers."""
+"""Jobs of measured poses: markers over the arm, and the fit of free numbers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
 from itertools import count
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.calibration import Calibration, calibrate
+from softreach.calibration import calibrate
 from softreach.calibration.free_numbers import free_numbers
-from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import MarkerModel
-from softreach.studio.jobs.reach import FollowCamera
-from softreach.studio.session import AskedJob, Job
+from softreach.studio.found import Found, Sample
+from softreach.studio.job import Job, Learned, Page, Results, Tools
 from softreach.studio.state import StudioState
-from softreach.studio.work import StaleCheck
 from softreach.support.errors import no_warnings
 
-Array = NDArray[np.float64]
+
+def _predict(state: StudioState, found: Found, tools: Tools) -> Results:
+    """Markers of the pose, while the arm has its inputs."""
+    del tools
+    bench, design = found.bench, state.design
+    if bench is None:
+        return
+    if not bench.fits(design) or bench.posed(state).activation != state.activation:
+        yield Learned({"sample": None})
+        return
+    arm = bench.fitted(design) or design
+    pose = bench.data.of(np.array([bench.number]))
+    # The inputs of a pose may be beyond the bounds of the design.
+    predicted = MarkerModel.of(free_numbers(arm, ["pose"]), pose).of_arm(arm).places[0]
+    yield Learned({"sample": Sample(pose.places[0], predicted, arm)})
 
 
-@dataclass(eq=False)
-class Bench:
-    """Measured poses in a tab, the sample that is shown, and what was fitted to them."""
-
-    data: Measurements
-    arm: Manipulator
-    """The design that they were read for."""
-    sample: int = 0
-    distances: Array | None = None
-    """From the measured to the predicted markers of the sample [m]; None if it is not shown."""
-    result: Calibration | None = None
-
-    def fits(self, arm: Manipulator) -> bool:
-        """True of an arm with the inputs and the markers of the one that the data were read for."""
-        return _columns(arm) == _columns(self.arm)
-
-    def posed(self, state: StudioState) -> StudioState:
-        """The state with the inputs of the sample, as far as its bounds go."""
-        return state.replace(activation=tuple(self.data.inputs[self.sample].tolist()))
-
-    def fitted(self, design: Manipulator) -> Manipulator | None:
-        """The calibrated arm; None without a fit that began with this design."""
-        result = self.result
-        return result.arm if result is not None and result.start == design else None
+def _draw_sample(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
+    sample, design = found.sample, state.design
+    if sample is None:
+        page.scene.remove("/sample")
+        return {}
+    page.scene.draw_sample(sample.measured / design.length, sample.predicted / design.length)
+    if sample.arm == design:
+        page.scene.remove("/sample/arm")
+    else:
+        same = state.replace(design=sample.arm).activation
+        page.scene.draw_arm(sample.arm, same, "/sample/arm", design.length)
+    return {}
 
 
-def _columns(arm: Manipulator) -> tuple[object, ...]:
-    return arm.input_names, arm.input_units, [marker.name for marker in arm.markers]
+DRAW_SAMPLE = Job(
+    "sample",
+    ("design", "activation", "found.bench"),
+    _predict,
+    _draw_sample,
+    makes=("sample",),
+    draws=("/sample",),
+)
+"""Measured and predicted markers of a pose, while the arm has its inputs."""
 
 
-class DrawSample(Job):
-    """Measured and predicted markers of a sample, while the arm has its inputs."""
+def _fit(state: StudioState, found: Found, tools: Tools) -> Results:
+    bench = found.bench
+    if bench is None:
+        return
+    steps = count(1)
 
-    depends_on = "design", "activation"
+    def progress(_: int) -> None:
+        tools.check()
+        tools.report(f"calibrating, step {next(steps)}")
 
-    def run(self, check: StaleCheck) -> None:
-        check()
-        session, state, bench = self.session, self.session.state, self.session.bench
-        if bench is None:
-            return
-        if bench.fits(state.design) and bench.posed(state).activation == state.activation:
-            self._draw(bench, state)
-        else:
-            bench.distances = None
-            session.scene.remove("/sample")
-        session.follow(FollowCamera)
-        session.show()
-
-    def _draw(self, bench: Bench, state: StudioState) -> None:
-        session, design = self.session, state.design
-        arm = bench.fitted(design) or design
-        sample = bench.data.of(np.array([bench.sample]))
-        # The inputs of a sample may be beyond the bounds of the design.
-        model = MarkerModel.of(free_numbers(arm, ["pose"]), sample)
-        predicted, measured = model.of_arm(arm).places[0], sample.places[0]
-        bench.distances = np.linalg.norm(predicted - measured, axis=1)
-        with session.drawing, session.client.atomic():
-            session.scene.draw_sample(measured / design.length, predicted / design.length)
-            if arm == design:
-                session.scene.remove("/sample/arm")
-            else:
-                same = state.replace(design=arm).activation
-                session.scene.draw_arm(arm, same, "/sample/arm", design.length)
+    with no_warnings():
+        result = calibrate(state.design, bench.data, free=bench.free, progress=progress)
+    tools.check()
+    yield Learned({"bench": replace(bench, result=result)})
 
 
-class FitArm(AskedJob):
-    """Fits free numbers of the design to all samples; says how far it is, and can be canceled."""
-
-    free: tuple[str, ...] = ()
-
-    def do(self, check: StaleCheck) -> None:
-        session, bench = self.session, self.session.bench
-        if bench is None:
-            return
-        steps = count(1)
-
-        def progress(_: int) -> None:
-            check()
-            session.report(f"calibrating, step {next(steps)}")
-
-        with session.working("calibrating"), no_warnings():
-            result = calibrate(session.state.design, bench.data, free=self.free, progress=progress)
-        check()
-        bench.result = result
-        session.follow(DrawSample)
-        session.show()
+FIT_ARM = Job("fit", (), _fit, doing="calibrating")
+"""Fits free numbers of the design to all poses."""

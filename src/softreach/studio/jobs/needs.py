@@ -1,17 +1,20 @@
-"""Jobs of requirements: the design against its needs, live."""
+"""Job of requirements: the design against its needs, live."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from softreach.requirements import Check, check
+from softreach.requirements import check
 from softreach.requirements.checks import quick_check
+from softreach.studio.found import Found
+from softreach.studio.job import Job, Learned, Page, Results, Tools
 from softreach.studio.needs import requirements_of
 from softreach.studio.scene.needs import draw_needs
-from softreach.studio.session import Job, Session
-from softreach.studio.work import StaleCheck
+from softreach.studio.state import StudioState
 from softreach.support.errors import SoftreachError, no_warnings
 
 _ACCURACY = 0.03  # of shares that are covered, and of distances between stations
@@ -21,53 +24,45 @@ _POSES = ("reach", "cover", "stay_inside", "avoid")
 """Kinds of findings that other poses may change."""
 
 
-class CheckNeeds(Job):
-    """The design against its needs, by poses that are found in some milliseconds."""
-
-    depends_on = "design", "needs"
-    only_with = "needs"
-
-    def run(self, check: StaleCheck) -> None:
-        check()
-        session, state = self.session, self.session.state
-        made, refusal = None, ""
-        if state.needs:
-            try:
-                with no_warnings():
-                    made = quick_check(state.design, requirements_of(state.needs), _ACCURACY)
-            except SoftreachError as error:
-                refusal = str(error)
-        check()
-        session.check, session.check_refusal = made, refusal
-        _draw(session)
-        session.follow(ConfirmNeeds)
-
-
-class ConfirmNeeds(Job):
-    """Looks for every pose where quick ones miss something, once the design stays as it is."""
-
-    def run(self, check: StaleCheck) -> None:
-        session, quick = self.session, self.session.check
-        if quick is None or all(f.met or f.kind not in _POSES for f in quick.findings):
-            return
-        begun = time.monotonic()
-        while time.monotonic() - begun < _PAUSE:
-            check()
-            time.sleep(_LOOK)
-        made = _checked(quick, check)
-        check()
-        if session.check is quick:  # else another design was judged meanwhile
-            session.check = made
-            _draw(session)
-
-
-def _checked(quick: Check, wanted: StaleCheck) -> Check:
+def _check(state: StudioState, found: Found, tools: Tools) -> Results:
+    """By poses that are found in some milliseconds; by every pose where these miss something."""
+    del found
+    if not state.needs:
+        yield Learned({"check": None, "check_refusal": ""})
+        return
+    try:
+        with no_warnings():
+            quick = quick_check(state.design, requirements_of(state.needs), _ACCURACY)
+    except SoftreachError as error:
+        yield Learned({"check": None, "check_refusal": str(error)})
+        return
+    yield Learned({"check": quick, "check_refusal": ""})
+    if all(finding.met or finding.kind not in _POSES for finding in quick.findings):
+        return
+    begun = time.monotonic()
+    while time.monotonic() - begun < _PAUSE:
+        tools.check()
+        time.sleep(_LOOK)
     with no_warnings():
-        return check(quick.arm, quick.requirements, accuracy=_ACCURACY, progress=lambda _: wanted())
+        made = check(
+            quick.arm, quick.requirements, accuracy=_ACCURACY, progress=lambda _: tools.check()
+        )
+    yield Learned({"check": made})
 
 
-def _draw(session: Session) -> None:
-    around = np.array(session.scene.axes.corners)
-    with session.drawing, session.client.atomic():
-        draw_needs(session.client.scene, session.check, around)
-    session.show()
+def _draw(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
+    del state
+    draw_needs(page.client.scene, found.check, np.array(page.scene.axes.corners))
+    return {}
+
+
+CHECK_NEEDS = Job(
+    "needs",
+    ("design", "needs"),
+    _check,
+    _draw,
+    wanted=lambda state: state.needs,
+    makes=("check",),
+    draws=("/needs",),
+)
+"""The design against its needs."""

@@ -3,66 +3,73 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from softreach.inverse.path import PathStatus, track_path
-from softreach.studio.session import AskedJob, Job
-from softreach.studio.settings import TipPath
+from softreach.studio.found import Found
+from softreach.studio.job import Job, Learned, Page, Results, Tools
 from softreach.studio.state import StudioState, solvable_rod
-from softreach.studio.work import StaleCheck
 
 _RESIDUAL = 1e-8  # [L]
 _STEP = 0.05  # [s] between points that are played
 
 
-class FollowPath(Job):
-    """The activations along the path, and where the branch ends."""
-
-    depends_on = "design", "path.points", "path.start"
-    only_with = "path"
-
-    def run(self, check: StaleCheck) -> None:
-        check()
-        session, state = self.session, self.session.state
-        session.figures.track = None
-        if state.path is None:
-            session.scene.remove("/path")
-            session.show()
-            return
-        points = np.array(state.path.points)
-        session.scene.draw_path(points / state.design.length, np.empty((0, 3)))
-        with session.working("following the path"):
-            self._follow(state, state.path, points)
-        check()
-        session.show()
-
-    def _follow(self, state: StudioState, path: TipPath, points: np.ndarray) -> None:
-        session, rod = self.session, solvable_rod(state.design)
+def _follow(state: StudioState, found: Found, tools: Tools) -> Results:
+    del found, tools
+    path = state.path
+    yield Learned({"track": None})
+    if path is not None:
+        rod = solvable_rod(state.design)
         fits = path.start is not None and len(path.start) == rod.box.bundles
         start = rod.box.clip(np.array(path.start)) if fits else None
-        track = track_path(rod, points, start, residual_over_length=_RESIDUAL)
-        session.figures.track = track
+        track = track_path(rod, np.array(path.points), start, residual_over_length=_RESIDUAL)
+        yield Learned({"track": track})
+
+
+def _draw_path(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
+    if state.path is None:
+        page.scene.remove("/path")
+        return {}
+    points, done, track = np.array(state.path.points), np.empty((0, 3)), found.track
+    if track is not None and track.sizes["point"] == len(points):
         done = points[track.status.values == PathStatus.FOLLOWED]
         if len(done) and len(done) < len(points):
             done = np.concatenate([done, track.end_position.values[None]])
-        session.scene.draw_path(points / state.design.length, done / state.design.length)
+    page.scene.draw_path(points / state.design.length, done / state.design.length)
+    return {}
 
 
-class PlayPath(AskedJob):
-    """Moves the arm along the path."""
+FOLLOW_PATH = Job(
+    "path",
+    ("design", "path.points", "path.start"),
+    _follow,
+    _draw_path,
+    wanted=lambda state: state.path is not None,
+    makes=("track",),
+    doing="following the path",
+    draws=("/path",),
+)
+"""The activations along the path, and where the branch ends."""
 
-    def do(self, check: StaleCheck) -> None:
-        track, path = self.session.figures.track, self.session.state.path
-        if track is None or path is None:
-            return
-        count = int((track.status == PathStatus.FOLLOWED).sum())
-        first = path.at if path.at < count - 1 else 0
-        for point in range(first, count):
-            check()
-            self.session.update(lambda state, k=point: at_point(state, track.activation.values, k))
-            time.sleep(_STEP)
+
+def _play(state: StudioState, found: Found, tools: Tools) -> Results:
+    track, path = found.track, state.path
+    if track is None or path is None:
+        return
+    count = int((track.status == PathStatus.FOLLOWED).sum())
+    activations = track.activation.values
+    for point in range(path.at if path.at < count - 1 else 0, count):
+        tools.check()
+        yield Learned(change=lambda now, k=point: at_point(now, activations, k))
+        time.sleep(_STEP)
+
+
+PLAY_PATH = Job("play", (), _play)
+"""Moves the arm along the path."""
 
 
 def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioState:

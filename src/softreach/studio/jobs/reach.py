@@ -1,125 +1,40 @@
-"""Jobs of a design in the scene: its reach, its arm, and what the camera should see of both."""
+"""Jobs of the reach of a design: cloud, volume and surface, their colors, and changes of volume."""
 
 from __future__ import annotations
 
-import time
+from collections.abc import Mapping
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from softreach.rod.tip_map import TipStatus
-from softreach.studio.jobs.plots import REACH_JOBS
+from softreach.studio.found import Found
+from softreach.studio.job import Job, Learned, Page, Results, Tools
 from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.needs import requirements_of
 from softreach.studio.reach import Reach, shown_rows, stages
-from softreach.studio.scene.camera import Viewpoint, is_behind
 from softreach.studio.scene.clouds import shown_color
 from softreach.studio.scene.scene import shows_cloud
-from softreach.studio.session import AskedJob, Job, Session
 from softreach.studio.slopes import volume_slopes
-from softreach.studio.state import StudioState, rod_of, solvable_rod
-from softreach.studio.work import OverBudget, StaleCheck
+from softreach.studio.state import Appearance, StudioState
+from softreach.studio.work import OverBudget
 from softreach.support.errors import InvalidInput
 
-Array = NDArray[np.float64]
 
-_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_MOST_PLACES = 40  # that a view is cut free to
-_SWEEP, _FRAME, _TURNS = 4.0, 0.04, 2.0  # [s] of a sweep, [s] between its pictures, turns
-_MOTION = "softreach-motion"  # what `serve/page.js` keeps: "welcome" until a key or a click
-_ANSWER = 2.0  # [s] in which a page tells that
-_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
-
-
-class ComputeReach(Job):
-    """Cloud, volume and unreachability of the design, coarse and then fine."""
-
-    depends_on = ("design",)  # how many points are shown, `DrawCloud` watches
-
-    def run(self, check: StaleCheck) -> None:
-        session, state = self.session, self.session.state
-        if _is_complete(session.reach, state):
-            _draw_cloud(session)
-            session.follow(DifferentiateVolume)
-            return
-        session.refusal = ""
-        try:
-            level = state.appearance.level
-            for reach in stages(state.design, level, session.quality, check, session.report):
-                check()
-                session.reach = reach
-                _count_shown(session, check)
-                _draw_cloud(session)
-            session.follow(DifferentiateVolume)
-        except InvalidInput as error:
-            _withdraw(session, str(error))
-        except OverBudget as error:
-            _withdraw(session, f"Not computed: the cloud needs {error}.")
-        except MemoryError:
-            _withdraw(session, "Not computed: there is not enough free memory.")
+def _compute_reach(state: StudioState, found: Found, tools: Tools) -> Results:
+    if _is_complete(found.reach, state):
+        return
+    yield Learned({"refusal": ""})
+    try:
+        level = state.appearance.level
+        for reach in stages(state.design, level, tools.quality, tools.check, tools.report):
+            yield Learned({"reach": reach})
+    except InvalidInput as error:
+        yield _withdrawn(str(error))
+    except OverBudget as error:
+        yield _withdrawn(f"Not computed: the cloud needs {error}.")
+    except MemoryError:
+        yield _withdrawn("Not computed: there is not enough free memory.")
 
 
-class DifferentiateVolume(Job):
-    """Slopes of the volume by the sliders, once known; dropped when one moves."""
-
-    depends_on = ("design",)
-
-    def run(self, check: StaleCheck) -> None:
-        check()
-        session, reach = self.session, self.session.reach
-        if reach is None or not reach.fine or reach.arm != session.state.design:
-            return
-        if self._done is not reach.exact or session.slopes is None:
-            slopes = volume_slopes(reach, session.quality, check)
-            check()
-            session.slopes, self._done = slopes, reach.exact
-            session.show()
-
-    _done: object = None
-    """The set whose volume was differentiated last."""
-
-
-class DrawCloud(Job):
-    """Points, their colors, and the axes around them."""
-
-    depends_on = (
-        "appearance.level", "appearance.color", "appearance.slice",
-        "appearance.cloud", "appearance.surface",
-    )  # fmt: skip
-
-    def run(self, check: StaleCheck) -> None:
-        check()
-        if _is_complete(self.session.reach, self.session.state):
-            _count_shown(self.session, check)
-            with self.session.working("coloring the points"):
-                _draw_points(self.session)
-        else:
-            self.session.follow(ComputeReach)
-
-
-class DrawSurface(Job):
-    """The exact boundary."""
-
-    depends_on = (
-        "appearance.surface", "appearance.slice",
-        "appearance.cloud", "appearance.color", "appearance.dark",
-    )  # fmt: skip
-    only_with = "appearance.surface"
-
-    def run(self, check: StaleCheck) -> None:
-        check()
-        reach, look = self.session.reach, self.session.state.appearance
-        if reach is None:
-            return
-        with self.session.working("computing the surface" if look.surface else ""):
-            if look.surface and reach.has_surface and not look.cloud:
-                _count(self.session, reach.boundary, check)
-            key = self.session.scene.draw_surface(reach, look)
-        if key is not None:
-            self.session.key = key
-        self.session.show()
-        if reach.fine:
-            self.session.job(SweepReach).offer()
+def _withdrawn(refusal: str) -> Learned:
+    return Learned({"reach": None, "key": None, "slopes": None, "refusal": refusal})
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:
@@ -129,28 +44,83 @@ def _is_complete(known: Reach | None, state: StudioState) -> bool:
     return enough or known.cloud.attrs.get("sampler") != "sobol"
 
 
-def _withdraw(session: Session, refusal: str) -> None:
-    session.reach, session.key, session.refusal = None, None, refusal
-    with session.drawing:
-        session.scene.remove("/cloud", "/unstable", "/slice", "/surface")
-    session.show()
+COMPUTE_REACH = Job(
+    "reach",
+    ("design", "appearance.level"),
+    _compute_reach,
+    makes=("reach", "key", "slopes"),
+)
+"""Cloud, volume and unreachability, coarse and then fine."""
 
 
-def _draw_cloud(session: Session) -> None:
-    _draw_points(session)
-    session.refresh(DrawSurface, *REACH_JOBS)
-    session.show()
-
-
-def _count_shown(session: Session, check: StaleCheck) -> None:
-    """Count the activations of the points that are shown, where their colors tell it."""
-    reach, look = session.reach, session.state.appearance
+def _color_cloud(state: StudioState, found: Found, tools: Tools) -> Results:
+    reach, look = found.reach, state.appearance
     if reach is not None and shows_cloud(reach, look):
-        _count(session, reach, check)
+        _count(reach, look, tools)
+    yield Learned()
 
 
-def _count(session: Session, reach: Reach, check: StaleCheck) -> None:
-    look = session.state.appearance
+def _draw_cloud(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
+    reach, look = found.reach, state.appearance
+    if reach is None:
+        page.scene.remove("/cloud", "/unstable", "/slice")
+        return {}
+    key = page.scene.draw_cloud(reach, look)
+    draw_axes(page, state, found)
+    return {"key": key} if shows_cloud(reach, look) or not look.surface else {}
+
+
+def draw_axes(page: Page, state: StudioState, found: Found) -> None:
+    """The box with numbers around what is drawn."""
+    if found.reach is not None:
+        page.scene.draw_axes(found.reach, found.free if state.design.loads is not None else None)
+
+
+DRAW_CLOUD = Job(
+    "cloud",
+    (
+        "found.reach", "appearance.level", "appearance.color", "appearance.slice",
+        "appearance.cloud", "appearance.surface",
+    ),
+    _color_cloud,
+    _draw_cloud,
+    doing="coloring the points", draws=("/cloud", "/unstable", "/slice"))  # fmt: skip
+"""Points in their colors, and the axes around them."""
+
+
+def _color_surface(state: StudioState, found: Found, tools: Tools) -> Results:
+    reach, look = found.reach, state.appearance
+    if reach is not None and look.surface and reach.has_surface:
+        tools.report("computing the surface")
+        if look.cloud:
+            reach.sheets  # noqa: B018  slow the first time
+        else:
+            _count(reach.boundary, look, tools)
+    yield Learned()
+
+
+def _draw_surface(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
+    if found.reach is None:
+        page.scene.remove("/surface")
+        return {}
+    key = page.scene.draw_surface(found.reach, state.appearance)
+    return {} if key is None else {"key": key}
+
+
+DRAW_SURFACE = Job(
+    "surface",
+    (
+        "found.reach", "appearance.surface", "appearance.slice",
+        "appearance.cloud", "appearance.color", "appearance.dark",
+    ),
+    _color_surface,
+    _draw_surface,
+    wanted=lambda state: state.appearance.surface, draws=("/surface",))  # fmt: skip
+"""The exact boundary."""
+
+
+def _count(reach: Reach, look: Appearance, tools: Tools) -> None:
+    """Count the activations of what is shown, where its colors tell them."""
     if not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
         return
     missing, done = uncounted(reach, shown_rows(reach, look.level)), 0
@@ -158,164 +128,16 @@ def _count(session: Session, reach: Reach, check: StaleCheck) -> None:
     def progress(more: int) -> None:
         nonlocal done
         done += more
-        session.report(f"counting activations: {done:,} of {len(missing):,} points")
+        tools.report(f"counting activations: {done:,} of {len(missing):,} points")
 
-    with session.working("counting activations"):
-        count_activations(reach, missing, check, progress)
-
-
-def _draw_points(session: Session) -> None:
-    reach, look = session.reach, session.state.appearance
-    if reach is None:
-        return
-    with session.drawing, session.client.atomic():
-        key = session.scene.draw_cloud(reach, look)
-        if shows_cloud(reach, look) or not look.surface:  # else the surface has its own
-            session.key = key
-        draw_axes(session)
+    count_activations(reach, missing, tools.check, progress)
 
 
-def draw_axes(session: Session) -> None:
-    """The box around what is drawn; to be called by whoever holds `Session.drawing`."""
-    if session.reach is not None:
-        free = session.free if session.state.design.loads is not None else None
-        session.scene.draw_axes(session.reach, free)
+def _differentiate(state: StudioState, found: Found, tools: Tools) -> Results:
+    reach = found.complete_reach(state.design)
+    if reach is not None:
+        yield Learned({"slopes": volume_slopes(reach, tools.quality, tools.check)})
 
 
-# The arm.
-
-
-class DrawArm(Job):
-    """The arm in its activation, and where its tip has been."""
-
-    depends_on = "design", "activation", "appearance.arm"
-
-    def run(self, check: StaleCheck) -> None:
-        check()
-        session, state = self.session, self.session.state
-        if not state.appearance.arm:
-            session.scene.remove("/arm")
-        else:
-            self._draw(state)
-        session.follow(FollowCamera)
-        session.show()
-
-    def _draw(self, state: StudioState) -> None:
-        session = self.session
-        session.posture = None
-        try:
-            rod = solvable_rod(state.design)
-        except InvalidInput:  # `ComputeReach` says so
-            session.tip, session.posture = None, TipStatus.NO_EQUILIBRIUM
-            session.scene.remove("/arm")
-            return
-        if session.held is not None:
-            design, dragged = session.held
-            if design == state.design and dragged.activation == state.activation:
-                rod = dragged.rod  # in its posture
-        with session.client.atomic():
-            tip = session.scene.draw_arm(state.design, state.activation, rod=rod)
-        session.tip = tip if np.isfinite(tip).all() else None
-        if rod.supports_unstable:
-            status = TipStatus(rod.status([state.activation])[0])
-            lost = (
-                session.tip is None and status <= TipStatus.UNSTABLE
-            )  # its shape was not found again
-            session.posture = TipStatus.UNDECIDED if lost else status
-
-
-class SweepReach(AskedJob):
-    """The arm sweeps its reach once, after the first picture of a fresh tab."""
-
-    is_due = False
-    """True for a fresh tab whose arm has not swept yet."""
-
-    def offer(self) -> None:
-        """Sweep if that is due: there is a surface to sweep under."""
-        if self.is_due:
-            self.is_due = False
-            self.ask()
-
-    def do(self, check: StaleCheck) -> None:
-        session, state = self.session, self.session.state
-        if session.is_touched or session.tip is None or not state.appearance.arm:
-            return
-        start, begun = np.array(state.activation), None
-        bounds = np.array(rod_of(state.design).box.bounds)
-        try:
-            while session.state is state and _motion_is_welcome(session):
-                check()
-                begun = begun or time.monotonic()
-                share = (time.monotonic() - begun) / _SWEEP
-                if share >= 1.0:
-                    break
-                with session.client.atomic():
-                    at = swept_activation(start, bounds, share)
-                    tip = session.scene.draw_arm(state.design, at.tolist())
-                session.tip = tip if np.isfinite(tip).all() else None
-                session.show()
-                time.sleep(_FRAME)
-        finally:
-            session.follow(DrawArm)
-
-
-def swept_activation(start: Array, bounds: Array, share: float) -> Array:
-    """Activation on a smooth closed loop through the box.
-
-    Args:
-        start: Where it begins and ends, inside the box, shape (bundles,).
-        bounds: The lowest and the highest of each bundle, shape (bundles, 2).
-        share: Of the loop, 0 to 1.
-    """
-    low, high = bounds.T
-    phase = 2 * np.pi * (_TURNS * share + np.arange(len(start)) / len(start))
-    around = (low + high) / 2 + (high - low) / 2 * np.cos(phase)
-    weight = 1.0 - np.cos(np.pi * share) ** 8  # leaves and comes back at rest
-    return np.clip(start + weight * (around - start), low, high)
-
-
-def _motion_is_welcome(session: Session) -> bool:
-    """True until a person does anything in the page, unless the system asks for less motion."""
-    try:
-        said = session.client.local_storage.get_item(_MOTION, timeout=_ANSWER)
-    except (RuntimeError, TimeoutError):  # the page is gone or busy, or keeps nothing
-        return False
-    return said == "welcome"
-
-
-# The camera: the points that hide the arm from it, and the edges with numbers.
-
-
-class FollowCamera(Job):
-    """Cuts away what hides the arm and places to reach, and turns the axes to the camera."""
-
-    depends_on = (
-        "appearance.cut", "appearance.arm", "appearance.handle", "target", "needs",
-    )  # fmt: skip
-
-    def run(self, check: StaleCheck) -> None:
-        time.sleep(_PAUSE)
-        session = self.session
-        if session.camera.keep_width():
-            session.follow(FollowCamera)
-        with session.drawing, session.client.atomic():
-            viewpoint = self._viewpoint()
-            most = _DRAGGED if session.is_dragged else None
-            session.scene.clouds.look(viewpoint, session.state.appearance.cut, most)
-            session.scene.axes.turn(viewpoint.position, session.camera.focal)
-            hides = session.shows_sample or self._hides_handle(viewpoint.position)
-            session.scene.see_through_arm(hides)
-
-    def _hides_handle(self, camera: Array) -> bool:
-        """True if the arm is between the camera [L] and the handle on its own tip."""
-        session = self.session
-        tip, look = session.tip, session.state.appearance
-        shown = look.handle and look.arm
-        return shown and tip is not None and is_behind(tip, camera, *session.scene.spine)
-
-    def _viewpoint(self) -> Viewpoint:
-        session, state = self.session, self.session.state
-        places = requirements_of(state.needs).places[:_MOST_PLACES]
-        if state.target is not None:
-            places = np.vstack([places, state.target])
-        return session.scene.viewpoint(session.camera.actual(), state, places / state.design.length)
+DIFFERENTIATE_VOLUME = Job("slopes", ("design", "found.reach"), _differentiate, makes=("slopes",))
+"""Slopes of the volume by the sliders."""

@@ -6,20 +6,19 @@ its folds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.sets import plot_slice
 from softreach.studio.multiplicity import counts_at
-from softreach.studio.plots.plot import Picture, Plot, complete_reach, pixels
 from softreach.studio.reach import Reach
 from softreach.studio.state import Slice, solvable_rod
-from softreach.studio.widgets import PictureFrame
 from softreach.studio.work import StaleCheck, all_cores
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
@@ -27,10 +26,7 @@ from softreach.workspace import ReachableSolid, ReachableSurface
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from viser import GuiApi
-
-    from softreach.arm.manipulator import Manipulator
-    from softreach.studio.session import Session
+    from matplotlib.figure import Figure
 
 
 Array = NDArray[np.float64]
@@ -38,6 +34,7 @@ Array = NDArray[np.float64]
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
 _BOUNDARY = "#16324f"
 _SIZE = 4.3, 4.6  # [inch], about as wide as a panel
+_PAPER, _INK = "#242424", "#c9c9c9"  # of a dark page
 _DPI = 200  # sharp where a page has two pixels per point
 _CELLS, _CELLS_LOADED = 120, 40  # along the longer side: under loads each place costs much
 
@@ -189,28 +186,45 @@ def _described(curves: list[Array], plane: Slice, where: str, arm: Manipulator) 
     return f"{where}: {parts}, {shown}" if closed else f"{where}: {len(curves)} curves"
 
 
-class SectionPlot(Plot):
-    """Picture of the section by the plane of the slice."""
+class Picture(NamedTuple):
+    """Picture of a design."""
 
-    name = "section"
-    label = "section"
-    hint = (
-        "the reachable set in the plane of the slice (tab View; without a slice y = 0): its "
-        "boundary, and how many activations reach each place"
-    )
-    depends_on = ("appearance.slice.axis", "appearance.slice.center", "appearance.dark")
-    of_reach = True
+    arm: Manipulator
+    image: NDArray[np.uint8]
+    """RGB, shape (rows, columns, 3)."""
+    text: str = ""
+    """Its content in words."""
 
-    def __init__(self, gui: GuiApi, folder: Any) -> None:
-        self._frame = PictureFrame(gui, folder)
 
-    @staticmethod
-    def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:
-        look, reach = session.state.appearance, complete_reach(session)
-        if reach is not None:
-            with session.working("cutting the reachable set"):
-                yield section_picture(reach, look.slice, check, dark=look.dark)
+def pixels(figure: Figure, *, dark: bool = False) -> NDArray[np.uint8]:
+    """The figure as RGB; for a dark page its paper is dark, and what is written and drawn light."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    def show(self, result: Picture) -> str:
-        self._frame.show(result.image)
-        return result.text
+    if dark:
+        _darken(figure)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+    if dark:
+        white = (image == 255).all(axis=-1)  # of pictures within the figure
+        image[white] = list(bytes.fromhex(_PAPER[1:]))
+    return image
+
+
+def _darken(figure: Figure) -> None:
+    from matplotlib.legend import Legend
+    from matplotlib.lines import Line2D
+    from matplotlib.spines import Spine
+    from matplotlib.text import Text
+
+    figure.set_facecolor(_PAPER)
+    for ax in figure.axes:
+        ax.set_facecolor(_PAPER)
+        ax.tick_params(which="both", colors=_INK)
+    for legend in figure.findobj(Legend):
+        legend.get_frame().set(facecolor=_PAPER, edgecolor=_INK)
+    for spine in figure.findobj(Spine):
+        spine.set_edgecolor(_INK)
+    for kind in (Text, Line2D):
+        for artist in figure.findobj(kind):
+            artist.set_color(_INK)

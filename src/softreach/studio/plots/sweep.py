@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
-from softreach.studio.fields import Attribute, Fields
-from softreach.studio.plots.plot import Chart, Curve, Plot
 from softreach.studio.reach import Quality, exact_set
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck, all_cores
 from softreach.support.errors import InvalidDesign, SoftreachError
 
-if TYPE_CHECKING:
-    from viser import GuiApi
-
-    from softreach.studio.session import Session
-
 Array = NDArray[np.float64]
 
 _VALUES = 9
 _SECONDS = 10.0  # of each value
-_VOLUME = Curve("V", "#2f6db5", points=True)
 
 
 class Sweep(NamedTuple):
@@ -124,56 +116,3 @@ def _volume(
     except (SoftreachError, OverBudget, MemoryError):
         return None
     return exact.volume
-
-
-class SweepPlot(Plot):
-    """Chart of volumes against the parameter that is chosen in the tab."""
-
-    name = "sweep"
-    label = "V against parameter"
-    hint = "volume of designs that differ from this one in one parameter, computed while you look"
-    depends_on = ("design", "appearance.plots.parameter")
-
-    def __init__(self, gui: GuiApi, folder: Any) -> None:
-        self._chart = Chart(gui, folder)
-
-    @classmethod
-    def add_settings(cls, fields: Fields) -> None:
-        fields.dropdown(
-            "parameter",
-            _offered,
-            Attribute(
-                lambda state: parameter.name if (parameter := swept_parameter(state)) else "",
-                lambda state, name: state.showing(
-                    plots=state.appearance.plots.showing(cls.name).sweeping(name)
-                ),
-            ),
-            "what changes in the plot of V against a parameter",
-        )
-
-    @staticmethod
-    def compute(session: Session, check: StaleCheck) -> Iterator[Sweep]:
-        state, latest = session.state, session.figures.plots.get(SweepPlot.name)
-        parameter = swept_parameter(state)
-        if parameter is None:
-            return
-        subject = state.design, parameter
-        if latest is None or not latest.complete or (latest.arm, latest.parameter) != subject:
-            yield from sweep(state.design, parameter, session.quality, check, latest)
-
-    def show(self, result: Sweep) -> str:
-        unit = result.arm.length_unit
-        volumes = result.volume[result.value == result.parameter.shown]
-        if len(result.value) > 1:
-            label, here = result.parameter.label, result.parameter.shown
-            known, y = unit.of(result.volume, 3), unit.label("V", 3)
-            self._chart.show(label, result.value, (_VOLUME,), (known,), here, y=y)
-        parts = [f"here V = {unit.rounded(v, 3)} at {result.parameter.shown:g}" for v in volumes]
-        if result.refused:
-            parts.append(f"{len(result.refused)} values make no design or take too long")
-        return " · ".join([*parts, *([] if result.complete else ["computing ..."])])
-
-
-def _offered(state: StudioState) -> dict[str, str]:
-    sliders = slider_parameters(state.design)
-    return {slider.name: slider.label for slider in sliders} or {"": ""}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ class NumberedBox:
     """One box, drawn into one scene."""
 
     def __init__(self, api: SceneApi) -> None:
-        self._api = api
+        self._api, self._lock = api, threading.RLock()
         self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         self._unit, self._scale = in_lengths(1.0), 1.0  # of the numbers, and L in it
         self._camera: Array = np.array([50.0, -80.0, 30.0])
@@ -38,18 +39,20 @@ class NumberedBox:
 
     def draw(self, *points: Array, arm: Manipulator) -> None:
         """Surround points [L], shapes (n, 3), with numbers in the unit of the arm."""
-        self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
-        self._box = round_box(*(self._scale * each for each in points))
-        self._remove()
-        self._draw()
+        with self._lock:
+            self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
+            self._box = round_box(*(self._scale * each for each in points))
+            self._remove()
+            self._draw()
 
     def turn(self, camera: Array, focal: float = np.inf) -> None:
         """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
-        before = self._side()
-        self._camera, self._focal = camera, focal
-        if self._is_drawn and self._side() != before:
-            self._remove()
-            self._draw()
+        with self._lock:
+            before = self._side()
+            self._camera, self._focal = camera, focal
+            if self._is_drawn and self._side() != before:
+                self._remove()
+                self._draw()
 
     def _side(self) -> Side:
         return seen_from(self._scale * self._camera, *self._box, self._focal)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +28,6 @@ VIEWS: dict[str, Array] = {
 }
 """Directions from the middle to the camera."""
 
-_STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _PATIENCE = 30.0  # [s] for a picture
 _LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
@@ -130,12 +128,6 @@ class TabCamera:
             self.look_from(Camera(position=position, look_at=camera.look_at))
         return False
 
-    @property
-    def pixels_per_length(self) -> float:
-        """Pixels of what is 1 L long across the sight, at the depth of what it looks at."""
-        camera = self._client.camera
-        return self.focal / float(np.linalg.norm(camera.look_at - camera.position))
-
     def picture(self) -> NDArray[np.uint8]:
         """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
 
@@ -155,66 +147,11 @@ class TabCamera:
             allowed = "in the foreground"
             raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
 
-    def step_back(self, shift: Array) -> None:
-        """Make room for a second cloud that stands `shift` [L] beside the first."""
-        self._step(shift, _STEP_BACK)
 
-    def step_forth(self, shift: Array) -> None:
-        """The inverse of `step_back`."""
-        self._step(-shift, 1 / _STEP_BACK)
-
-    def _step(self, shift: Array, ratio: float) -> None:
-        now = self.actual()
-        look_at = np.asarray(now.look_at) + shift / 2
-        position = (np.asarray(now.position) - now.look_at) * ratio + look_at
-        self.look_from(Camera(position=vector(position), look_at=vector(look_at)))
+# What stands between the camera and a place.
 
 
-# Points between the camera and what is to be seen: the arm and the target.
-
-
-_CELLS = 192  # of the picture, along each side
-_MARGIN = 0.02  # [L] around what is to be seen
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
-
-
-@dataclass(frozen=True, eq=False)
-class Viewpoint:
-    """Camera, and the balls that it should see [L]."""
-
-    position: Array
-    look_at: Array
-    base: Array
-    """Position of the clamped end, shape (3,)."""
-    centers: Array
-    """Shape (n, 3)."""
-    radii: Array
-    """Shape (n,)."""
-
-    def seen(self, points: ArrayLike) -> Array:
-        """Places in the picture (right, up) [-] and depth [L], shape (n, 3)."""
-        right, up, forward = _axes_of(self.look_at - self.position)
-        offset = np.asarray(points, float) - self.position
-        depth = np.maximum(offset @ forward, 1e-6)
-        return np.stack([offset @ right / depth, offset @ up / depth, depth], axis=-1)
-
-
-def in_the_way(points: Array, viewpoint: Viewpoint, cut: str) -> NDArray[np.bool_]:
-    """Mask of the points [L], shape (n, 3), that hide one of the balls, or stand before the base.
-
-    Args:
-        points: Of a cloud.
-        viewpoint: The camera and what it should see.
-        cut: One of `CUTS`.
-    """
-    if cut == "none" or not len(points):
-        return np.zeros(len(points), bool)
-    seen = viewpoint.seen(points)
-    hides = _hides(seen, viewpoint) if len(viewpoint.centers) else np.zeros(len(points), bool)
-    if cut == "half":
-        ahead = (viewpoint.look_at - viewpoint.position) * (1.0, 1.0, 0.0)
-        hides |= (points - viewpoint.base) @ ahead < 0.0
-    return hides
 
 
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
@@ -250,33 +187,6 @@ def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
     offset = points - origin
     ahead = offset @ way
     return ahead, np.linalg.norm(offset - ahead[:, None] * way, axis=1)
-
-
-def _hides(seen: Array, viewpoint: Viewpoint) -> NDArray[np.bool_]:
-    """Looked up in a picture of how far away the farthest ball is."""
-    balls = viewpoint.seen(viewpoint.centers)
-    sizes = (viewpoint.radii + _MARGIN) / balls[:, 2]
-    low = (balls[:, :2] - sizes[:, None]).min(axis=0)
-    high = (balls[:, :2] + sizes[:, None]).max(axis=0)
-    step = (high - low).max() / _CELLS
-    picture = np.zeros((_CELLS + 1, _CELLS + 1))
-    across, along = (low[k] + step * np.arange(_CELLS + 1) for k in range(2))
-    for (x, y, depth), size in zip(balls, sizes, strict=True):
-        disk = (across[:, None] - x) ** 2 + (along - y) ** 2 <= size**2
-        picture[disk] = np.maximum(picture[disk], depth)
-    cell = np.rint((seen[:, :2] - low) / step)
-    inside = ((cell >= 0) & (cell <= _CELLS)).all(axis=1)
-    i, j = np.where(inside[:, None], cell, 0).astype(np.intp).T
-    return inside & (seen[:, 2] < picture[i, j])
-
-
-def _axes_of(direction: Array) -> tuple[Array, Array, Array]:
-    """Right, up and forward of a camera that keeps z upright."""
-    forward = direction / np.linalg.norm(direction)
-    upright = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
-    right = np.cross(forward, upright)
-    right /= np.linalg.norm(right)
-    return right, np.cross(right, forward), forward
 
 
 # Which point of a cloud a click means.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -18,7 +19,6 @@ from softreach.schema import activation_symbols
 from softreach.studio import markup
 from softreach.studio.multiplicity import count_activations
 from softreach.studio.reach import Reach, shown_rows, shown_samples
-from softreach.studio.scene.camera import Viewpoint, in_the_way
 from softreach.studio.state import Slice, rod_of
 from softreach.studio.work import all_cores
 
@@ -54,36 +54,38 @@ class Clouds:
     """Draws clouds, and draws those again whose hidden points change as camera or arm move."""
 
     def __init__(self, api: SceneApi) -> None:
-        self._api = api
+        self._api, self._lock = api, threading.RLock()
         self._known: dict[str, tuple[Dots, NDArray[np.bool_]]] = {}
-        self._viewpoint: Viewpoint | None = None
-        self._cut = "none"
+        self._ahead: Array | None = None
+        self._base = np.zeros(3)
         self._most: int | None = None
 
     def draw(self, path: str, dots: Dots) -> None:
         """All but the points in the way of what the last `look` wanted to see."""
-        kept = self._kept(dots)
-        self._known[path] = dots, kept
-        self._send(path, dots.where(kept))
+        with self._lock:
+            kept = self._kept(dots)
+            self._known[path] = dots, kept
+            self._send(path, dots.where(kept))
 
-    def look(self, viewpoint: Viewpoint | None, cut: str, most: int | None = None) -> None:
-        """Cut away what hides the arm; nothing is sent of a cloud that keeps its points.
+    def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
+        """Cut away the half in front of the arm; nothing is sent of a cloud that keeps its points.
 
         Args:
-            viewpoint: The camera and what it should see; None for nobody.
-            cut: One of `state.CUTS`.
+            ahead: Where the camera looks, level with the ground, shape (3,); None for no cut.
+            base: Of the arm [L], shape (3,).
             most: How many points to draw of a cloud, the first of it, which then stay the same
                 until another number is wanted; None for all.
         """
         is_thin = most is not None and most == self._most
-        self._viewpoint, self._cut, self._most = viewpoint, cut, most
+        self._ahead, self._base, self._most = ahead, base, most
         if is_thin:  # it hides little, and the page draws no frame while it takes up another
             return
-        for path, (dots, before) in list(self._known.items()):
-            kept = self._kept(dots)
-            if not np.array_equal(kept, before):
-                self._known[path] = dots, kept
-                self._send(path, dots.where(kept))
+        with self._lock:
+            for path, (dots, before) in list(self._known.items()):
+                kept = self._kept(dots)
+                if not np.array_equal(kept, before):
+                    self._known[path] = dots, kept
+                    self._send(path, dots.where(kept))
 
     def forget(self, path: str) -> None:
         """Draw a cloud no more; its node is the caller's to remove."""
@@ -91,9 +93,9 @@ class Clouds:
 
     def hidden(self, points: Array) -> NDArray[np.bool_]:
         """Mask of the points [L], shape (n, 3), that are cut away."""
-        if self._viewpoint is None:
+        if self._ahead is None:
             return np.zeros(len(points), bool)
-        return in_the_way(points, self._viewpoint, self._cut)
+        return (points - self._base) @ self._ahead < 0.0
 
     def _kept(self, dots: Dots) -> NDArray[np.bool_]:
         kept = ~self.hidden(dots.points)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.drag import Dragged
 from softreach.studio.scene.axes import add_label
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
-__all__ = ["DragBall", "TipDrag", "along_axis"]
+__all__ = ["DragBall", "along_axis"]
 
 Array = NDArray[np.float64]
 OnDrag = Callable[[str, Array], None]
@@ -28,14 +27,6 @@ _ARROW = np.array([[0, 0.03], [5e-3, 0.03], [5e-3, 0.1], [0.012, 0.1], [0, 0.13]
 """Radii and heights of half of an arrow [L]."""
 _LETTER = 0.15  # of an axis, from the ball [L]
 _STEEPEST = 0.03  # sin² between axis and line of sight, below which a drag tells no distance
-
-
-class TipDrag(NamedTuple):
-    """Drag of the tip: the place where a person wants it, and what comes of that."""
-
-    wanted: Array
-    """[L], shape (3,)."""
-    dragged: Dragged
 
 
 class DragBall:

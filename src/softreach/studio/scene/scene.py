@@ -15,8 +15,8 @@ from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.kinematics import configuration, rest_configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
-from softreach.studio.scene.axes import NumberedBox, add_label
-from softreach.studio.scene.camera import Viewpoint, way_to
+from softreach.studio.scene.axes import NumberedBox
+from softreach.studio.scene.camera import way_to
 from softreach.studio.scene.clouds import (
     FAINT,
     Clouds,
@@ -28,7 +28,7 @@ from softreach.studio.scene.clouds import (
     shaded,
 )
 from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
-from softreach.studio.state import Appearance, Camera, Slice, StudioState, solvable_rod
+from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support.palette import bundle_color
 from softreach.workspace import ReachableSolid
 
@@ -66,7 +66,6 @@ _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _MARKER, _MARKER_SIZE = (30, 30, 30), 0.016
 _MEASURED_SIZE = 0.03
 _AROUND_TIP = 0.06  # [L], where a click means no ghost: all shapes meet there
-_AROUND_PLACE = 0.02  # [L] that should be seen
 _AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
 """Corners around most clouds, seen from the base [L]."""
 _NOTHING = np.empty((0, 3)), np.empty(0)
@@ -191,22 +190,6 @@ class Scene:
             )
         return shape["position"].values[-1] / length
 
-    def viewpoint(
-        self, camera: Camera, state: StudioState, places: Array | None = None
-    ) -> Viewpoint:
-        """Viewpoint of a camera that should see the arm as it is drawn, and places [L]."""
-        centers, radii = self.spine if state.appearance.arm else _NOTHING
-        if places is not None:
-            centers = np.vstack([centers, places])
-            radii = np.append(radii, np.full(len(places), _AROUND_PLACE))
-        return Viewpoint(
-            position=np.asarray(camera.position),
-            look_at=np.asarray(camera.look_at),
-            base=np.array(state.design.base.position) / state.design.length,
-            centers=centers,
-            radii=radii,
-        )
-
     def see_through_arm(self, clear: bool) -> None:
         """Let what is behind the arm be seen through it, or not."""
         arm, handles = self._arms.get("/arm", (None, []))
@@ -249,18 +232,6 @@ class Scene:
             data = glb(skin, _CLEAR_SURFACE, lines, _INK[look.dark], both_sides=opened)
             self._api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
         return coloring.key
-
-    def draw_thick_lines(self, reach: Reach, look: Appearance, thickness: float) -> None:
-        """Edges and folds of the boundary this thick [L]: those that `glb` draws have one pixel.
-
-        A page draws them slowly, so that they are for pictures, whose pixels are small.
-        """
-        if not (look.surface and reach.has_surface) or shows_cloud(reach, look):
-            return
-        lines = _lines_of(reach, look).astype(np.float32)
-        if len(lines):
-            ink = _INK[look.dark]
-            self._api.add_line_segments("/thick-lines", lines, ink, thickness=thickness)
 
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
@@ -318,43 +289,17 @@ class Scene:
             precision="float32",
         )
 
-    def draw_reference(self, reach: Reach, look: Appearance, shift: Array, name: str) -> None:
-        """Another design: its boundary in gray around this one's cloud, or its cloud beside it.
-
-        Args:
-            reach: Its reach.
-            look: How this design is drawn.
-            shift: How far beside it stands [L]; zero for around.
-            name: Of the other design.
-        """
+    def draw_reference(self, reach: Reach | None, cut: Slice) -> None:
+        """The boundary of another design in gray; its points, where it has none."""
         self.remove("/reference")
-        if np.any(shift):
-            self._draw_beside(reach, look, shift, name)
-        elif isinstance(reach.exact, ReachableSolid):
-            self._surface("/reference", reach.sheets, reach, look.slice, _REFERENCE, 0.3)
+        if reach is None:
+            return
+        if isinstance(reach.exact, ReachableSolid):
+            self._surface("/reference", reach.sheets, reach, cut, _REFERENCE, 0.3)
         else:
-            points = cloud_points(reach, min(look.level, 16))
+            points = cloud_points(reach, _FREE_LEVEL)
             gray = np.array(_REFERENCE, np.uint8)
             self._points("/reference", points, gray, point_size(len(points)))
-
-    def _draw_beside(self, reach: Reach, look: Appearance, shift: Array, name: str) -> None:
-        level = min(look.level, 16)
-        points, coloring = cloud_points(reach, level), sample_colors(reach, level, look.color)
-        kept = in_slice(points, look.slice)
-        size = point_size(len(points))
-        self._points("/reference/cloud", points[kept] + shift, coloring.rgb[kept], size)
-        above = np.array([0, 0, points[:, 2].max(initial=0.0) + 0.12])
-        add_label(self._api, "/reference/name", name, above + shift)
-        add_label(self._api, "/reference/other", "this design", above)
-
-    def draw_reference_arm(
-        self, arm: Manipulator, activation: Sequence[float], shift: Array
-    ) -> None:
-        """The arm of the design beside this one."""
-        path = "/reference/arm"
-        self.draw_arm(arm, activation, path)
-        for handle in self._arms.get(path, (arm, []))[1]:
-            handle.position = shift
 
     def remove(self, *paths: str) -> None:
         """Take nodes and everything under them out of the scene."""

@@ -5,24 +5,18 @@ from __future__ import annotations
 import contextlib
 import io
 import socket
-from functools import partial
 from typing import TYPE_CHECKING
 
 from softreach.studio.scene.camera import FOV
-from softreach.studio.serve.access import (
-    LOOPBACK,
-    answer_headers,
-    check_address,
-    page_address,
-    refusal,
-)
-from softreach.studio.serve.viser_fixes import guarding, without_tunnel
+from softreach.studio.serve.guard import LOCAL, guarding, without_tunnel
 from softreach.support.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:
     from viser import GuiApi, ViserServer
 
-__all__ = ["page_url", "start_server", "stop_server", "theme"]
+LOOPBACK = "127.0.0.1"
+ANYWHERE = ("0.0.0.0", "::")
+_LAST_PORT = 65535
 
 
 def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
@@ -48,7 +42,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
     # viser prints a banner; we print our own line.
     with (
         contextlib.redirect_stdout(io.StringIO()),
-        guarding(partial(refusal, host, token), partial(answer_headers, token)) as guard,
+        guarding(host, token) as guard,
     ):
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
     if not guard.is_set():
@@ -93,3 +87,63 @@ def _check_free(host: str, port: int) -> None:
         except OSError as error:
             allowed = "an address of this machine and a free port"
             raise InvalidInput("host:port", f"{host}:{port}", allowed, str(error)) from None
+
+
+# Addresses of the server.
+
+
+def is_local(host: str) -> bool:
+    """True if only this machine can connect."""
+    return host in LOCAL or host.startswith("127.")
+
+
+def check_address(host: str, port: int) -> None:
+    """Refuse what is no host or no port.
+
+    Raises:
+        InvalidInput: No host is named, or the port is not from 1 to 65535 (0 for a free one).
+    """
+    if not host.strip():  # systems take it for every address of the machine
+        allowed = f"an address to listen on, such as {LOOPBACK}"
+        raise InvalidInput("host", repr(host), allowed, f"{ANYWHERE[0]} is for every address")
+    if not 0 <= port <= _LAST_PORT:
+        raise InvalidInput("port", port, f"1 to {_LAST_PORT}", "leave it out for a free one")
+
+
+def page_address(host: str, port: int) -> str:
+    """The address of the page on a host of this machine."""
+    shown = LOOPBACK if host in ANYWHERE else host
+    return f"http://{f'[{shown}]' if ':' in shown else shown}:{port}"
+
+
+def reachable_hosts(host: str) -> list[str]:
+    """Addresses by which others reach a server that listens on a host; none if it is local."""
+    if is_local(host):
+        return []
+    if host not in ANYWHERE:
+        return [host]
+    hosts = [_outward()]
+    with contextlib.suppress(OSError):
+        hosts += [str(address[4][0]) for address in socket.getaddrinfo(socket.gethostname(), None)]
+    families = (host == "::", False)
+    useful = [
+        address
+        for address in hosts
+        if address and not is_local(address) and (":" in address) in families
+    ]
+    return list(dict.fromkeys(useful))
+
+
+def _outward() -> str:
+    """The address that this machine would call from; nothing is sent."""
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            line.connect(("192.0.2.1", 9))  # reserved for examples
+            return str(line.getsockname()[0])
+    except OSError:
+        return ""
+
+
+def with_token(address: str, token: str) -> str:
+    """An address that shows the token; the address alone without any."""
+    return f"{address}/?token={token}" if token else address

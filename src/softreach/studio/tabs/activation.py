@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
+_KINDS = {"N": "tension", "Pa": "pressure"}
+"""Kinds of inputs by their units."""
 _MOST = 40
 """Sliders: a page with hundreds takes minutes to build."""
 
@@ -47,7 +49,7 @@ class ActivationPanel:
             self._design = session.state.design
             self._fit(session)
         self._sliders.show(session)
-        self._tip.say(*tip_text(session))
+        self._tip.say(*tip_text(session.found, session.state.design))
 
     def _fit(self, session: Session) -> None:
         ends = _slider_ends(session.state.design)
@@ -82,8 +84,12 @@ _SliderEnds = tuple[str, float, float]
 
 
 def _slider_ends(arm: Manipulator) -> list[_SliderEnds]:
-    symbols = activation_symbols(arm.input_units)
-    units = (f" [{unit}]" if unit != "1" else "" for unit in arm.input_units)
-    labels = zip(symbols, arm.input_names, units, strict=True)
+    inputs = zip(activation_symbols(arm.input_units), arm.input_names, arm.input_units, strict=True)
     bounds = rod_of(arm).box.bounds
-    return [("{} {}{}".format(*label), *ends) for label, ends in zip(labels, bounds, strict=True)]
+    return [(_label(*each), *ends) for each, ends in zip(inputs, bounds, strict=True)]
+
+
+def _label(symbol: str, name: str, unit: str) -> str:
+    kind = _KINDS.get(unit)
+    words = f"{symbol} {name}" if kind is None else f"{kind} of {name}"
+    return words if unit == "1" else f"{words} [{unit}]"

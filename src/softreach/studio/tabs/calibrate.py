@@ -12,7 +12,7 @@ from softreach.calibration import Calibration
 from softreach.calibration.measurements import read_measurements, read_table
 from softreach.studio import markup
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.jobs.calibration import Bench, DrawSample, FitArm
+from softreach.studio.found import Bench
 from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput, counted
 
@@ -26,11 +26,18 @@ _ABOUT = {
     "tension1_N, tip_x_mm",
     "sample": "Moves the arm to the inputs of a sample. Large dots were measured, small ones are "
     "predicted",
-    "free": "Numbers that the fit may change, separated by commas: pose is where the base stands; "
-    "* is any text; a = b ties two",
+    "free": "Lets the fit change this number",
     "fit": "Finds the numbers with which predicted markers come nearest to measured ones",
     "apply": "Makes the calibrated arm the design; can be undone",
 }
+_FREE = {
+    "pose": "pose of the base",
+    "taper": "taper φ",
+    "revolution": "revolution Ω",
+    "*.offset": "offsets of bundles",
+    "*.young_modulus": "Young's moduli",
+}
+"""Numbers that a fit may change: name -> what the check box says."""
 
 
 class CalibratePanel:
@@ -47,7 +54,10 @@ class CalibratePanel:
             with self._samples:
                 self._at = gui.add_slider("sample", 0, 1, 1, 0, hint=_ABOUT["sample"])
                 self._residuals = Line(gui)
-                self._free = gui.add_text("free", "pose", hint=_ABOUT["free"])
+                self._free = {
+                    name: gui.add_checkbox(label, name == "pose", hint=_ABOUT["free"])
+                    for name, label in _FREE.items()
+                }
                 fit = gui.add_button("Fit", hint=_ABOUT["fit"])
                 self._summary = Line(gui)
                 self._apply = gui.add_button("Apply", hint=_ABOUT["apply"], visible=False)
@@ -58,7 +68,7 @@ class CalibratePanel:
 
     def show(self, session: Session) -> None:
         """Show the residuals of the sample, and what was fitted."""
-        bench = session.bench
+        bench = session.found.bench
         if bench is None:
             return
         if bench is not self._bench:
@@ -69,7 +79,7 @@ class CalibratePanel:
             )
             self._samples.visible = True
             self._at.max = max(len(data) - 1, 1)
-            self._at.value = bench.sample
+            self._at.value = bench.number
         self._residuals.say(_residuals_text(bench, session))
         if bench.result is not self._summarized:
             self._summarized = bench.result
@@ -79,30 +89,30 @@ class CalibratePanel:
     def _read(self, file: UploadedFile) -> None:
         arm = self._session.state.design
         data = read_measurements(arm, read_table(io.BytesIO(file.content), file.name))
-        self._session.bench = Bench(data=replace(data, source=file.name), arm=arm)
-        self._pose(self._session.bench)
+        self._pose(Bench(data=replace(data, source=file.name), arm=arm))
 
     def _pose(self, bench: Bench) -> None:
-        session = self._session
-        if not bench.fits(session.state.design):
+        if not bench.fits(self._session.state.design):
             allowed = "one with the inputs and markers of the data"
             raise InvalidInput("design", "another one", allowed, "load the data again")
-        session.update(bench.posed, goes_on=True)
-        session.follow(DrawSample)
+        self._session.update(bench.posed, goes_on=True)
+        self._session.learn({"bench": bench})
 
     def _moved(self, event: Any) -> None:
-        bench = self._session.bench
+        bench = self._session.found.bench
         if event.client_id is not None and bench is not None:
-            bench.sample = min(int(self._at.value), len(bench.data) - 1)
-            attempt(self._session, lambda: self._pose(bench))
+            number = min(int(self._at.value), len(bench.data) - 1)
+            attempt(self._session, lambda: self._pose(replace(bench, number=number)))
 
     def _ask(self) -> None:
-        fit = self._session.job(FitArm)
-        fit.free = tuple(name.strip() for name in self._free.value.split(",") if name.strip())
-        fit.ask()
+        bench = self._session.found.bench
+        free = tuple(name for name, box in self._free.items() if box.value)
+        if bench is not None:
+            self._session.learn({"bench": replace(bench, free=free)})
+            self._session.follow("fit")
 
     def _applied(self) -> None:
-        bench, design = self._session.bench, self._session.state.design
+        bench, design = self._session.found.bench, self._session.state.design
         arm = None if bench is None else bench.fitted(design)
         if arm is None:
             raise InvalidInput("design", "changed since the fit", "the one that was fitted")
@@ -110,12 +120,12 @@ class CalibratePanel:
 
 
 def _residuals_text(bench: Bench, session: Session) -> str:
-    if bench.distances is None:
-        return "The arm is not at a sample: move the slider."
-    names, design = bench.data.marker_names, session.state.design
-    known = zip(names, 1e3 * bench.distances, strict=True)
+    sample, design = session.found.sample, session.state.design
+    if sample is None:
+        return "The arm is not at a measured pose: move the slider."
+    known = zip(bench.data.marker_names, 1e3 * sample.distances, strict=True)
     each = [f"{name} {d:.3g} mm" if np.isfinite(d) else f"{name} unknown" for name, d in known]
-    inputs = bench.data.inputs[bench.sample]
+    inputs = bench.data.inputs[bench.number]
     low, high = design.input_bounds.T
     beyond = bool(((inputs < low) | (inputs > high)).any())
     note = ". Its inputs are beyond the bounds, at which the arm is drawn" if beyond else ""

@@ -1,152 +1,221 @@
-"""Comparison of snapshots of the work: in a table, and drawn around or beside the design."""
+"""Comparison of the design with one that is kept: numbers, and the kept boundary in gray."""
 
 from __future__ import annotations
 
-import threading
-import time
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from softreach.studio.comparison import Candidate, compared, comparison_html
-from softreach.studio.fields import attempt, bind_button
-from softreach.studio.reach import beside
-from softreach.studio.snapshots import REFERENCE, Snapshot, numbers_of
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import changed, parameters
+from softreach.studio import markup
+from softreach.studio.fields import Fields
+from softreach.studio.reach import Reach
+from softreach.studio.shown_parameters import ShownParameter, named_parameters, slider_parameters
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import Line
-from softreach.support.errors import InvalidInput
+from softreach.studio.widgets import Line, show_where
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
     from softreach.studio.session import Session
 
-_HINT = "Keep designs as snapshots to see them side by side here."
-_NONE = "none yet"
-_NOW = "now"
-"""Name of the row of the design in the fields."""
-_UNDRAWN, _AROUND, _BESIDE = "not drawn", "in gray around this design", "beside this design"
+_HINT = "Keep this design to see what a change of it costs and gains."
+_EQUAL = 1e-9  # relative difference that is rounding
+_FINEST = 1e-6  # error of what is shown: six digits after the point are enough
+_MINUS = "\N{MINUS SIGN}"
+_MOST = 24
+"""Rows of parameters; designs that differ in more are other arms altogether."""
+
+Value = float | None
 
 
 class ComparePanel:
-    """Takes, restores and deletes snapshots; the table compares them with the first."""
+    """Keeps a design, and compares the design with it."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._session, self._lock = session, threading.RLock()
+        self._fields = Fields(session, dragged=False)
         self._known: object = None
         with tab:
             self._table = Line(gui, _HINT)
-            take = gui.add_button("Take snapshot", hint="keep design, activation and target")
-            self._of_chosen = gui.add_folder("snapshots", visible=False)
-            with self._of_chosen:
-                self._choice: Any = gui.add_dropdown(
-                    "snapshot", (_NONE,), hint="the one to draw, restore or delete"
+            self._fields.button("Keep this design", kept, "Draws its boundary in gray from now on")
+            self._others = gui.add_folder("kept design", visible=False)
+            with self._others:
+                self._fields.button("Swap", swapped, "Makes the kept design the design, and back")
+                forget = "Compares no more, and takes the gray boundary away"
+                self._fields.button(
+                    "Forget", lambda state: state.replace(reference=None), forget, color="gray"
                 )
-                self._drawn: Any = gui.add_dropdown(
-                    "draw",
-                    (_UNDRAWN, _AROUND, _BESIDE),
-                    hint="what it reaches, and beside this design its arm too, pulled as this is",
-                )
-                restore = gui.add_button("Restore", hint="go back to it; the view stays")
-                delete = gui.add_button("Delete", color="gray", hint="forget it, for good")
-        self._choice.on_update(lambda _: self._follow_drawn(session.state))
-        self._drawn.on_update(self._draw)
-        bind_button(take, session, self._take)
-        bind_button(restore, session, self._restore)
-        bind_button(delete, session, self._delete)
 
     def show(self, session: Session) -> None:
-        """Bring menu and table in line with the snapshots and the design."""
-        with self._lock:
-            self._measure(session)
-            self._follow_drawn(session.state)
-            kept, design = self._kept(), session.state.design
-            numbers = numbers_of(session.reach, session.state)
-            if self._known == (kept, design, numbers):
-                return
-            self._known = (kept, design, numbers)
-            names = tuple(each.name for each in kept) or (_NONE,)
-            if tuple(self._choice.options) != names:
-                self._choice.options = names
-            self._of_chosen.visible = bool(kept)
-            if not kept:
-                self._table.say(_HINT)
-                return
-            rows = [Candidate(each.name, each.state.design, each.numbers) for each in kept]
-            comparison = compared([*rows, Candidate(_NOW, design, numbers)])
-            self._table.show(comparison_html(comparison))
+        """Bring the table in line with both designs and what is known of them."""
+        self._fields.show(session)
+        design, reference = session.state.design, session.state.reference
+        show_where(reference is not None, self._others)
+        known = (design, reference, session.found.reach, session.found.reference)
+        if known == self._known:
+            return
+        self._known = known
+        if reference is None:
+            self._table.say(_HINT)
+        else:
+            before = _known_reach(session.found.reference, reference)
+            now = _known_reach(session.found.reach, design)
+            self._table.show(comparison_html(compared((reference, before), (design, now))))
 
-    def _kept(self) -> tuple[Snapshot, ...]:
-        """The snapshots, and what an older state draws without one."""
-        session, kept = self._session, self._session.snapshots.all
-        drawn = session.state.reference
-        if drawn is None or session.snapshots.name_of(drawn) != REFERENCE:
-            return kept
-        state = session.state.replace(design=drawn, reference=None, side_by_side=False)
-        numbers = numbers_of(session.reference, state)
-        return *kept, Snapshot(name=REFERENCE, state=state, taken=0.0, numbers=numbers)
 
-    def _measure(self, session: Session) -> None:
-        for each in session.snapshots.all:
-            if each.numbers is None and (numbers := numbers_of(session.reach, each.state)):
-                session.snapshots.measure(each.name, numbers)
+def kept(state: StudioState) -> StudioState:
+    """The state that keeps its design."""
+    return state.replace(reference=state.design)
 
-    def _follow_drawn(self, state: StudioState) -> None:
-        chosen, drawn = self._named(), _UNDRAWN
-        if chosen is not None and chosen.state.design == state.reference:
-            drawn = _BESIDE if state.side_by_side else _AROUND
-        if self._drawn.value != drawn:
-            self._drawn.value = drawn
 
-    def _draw(self, event: Any) -> None:
-        if event.client_id is not None:
-            attempt(self._session, lambda: self._become_drawn(self._drawn.value))
+def swapped(state: StudioState) -> StudioState:
+    """The state with both designs exchanged."""
+    return state.replace(design=state.reference or state.design, reference=state.design)
 
-    def _become_drawn(self, how: str) -> None:
-        design, beside_now = self._chosen().state.design, how == _BESIDE
-        reference = None if how == _UNDRAWN else design
-        if beside_now != self._session.state.side_by_side:
-            self._step(beside_now)
-        self._session.update(
-            lambda state: state.replace(reference=reference, side_by_side=beside_now)
-        )
 
-    def _step(self, back: bool) -> None:
-        session = self._session
-        if session.reach is not None:
-            shift = beside(session.reach)
-            (session.camera.step_back if back else session.camera.step_forth)(shift)
+def _known_reach(reach: Reach | None, design: Manipulator) -> Reach | None:
+    return reach if reach is not None and reach.fine and reach.arm == design else None
 
-    def _delete(self) -> None:
-        snapshot = self._chosen()
-        if snapshot.state.design == self._session.state.reference:
-            self._become_drawn(_UNDRAWN)
-        self._session.snapshots.remove(snapshot.name)
 
-    def _take(self) -> None:
-        session = self._session
-        state = session.state_now()
-        name = session.snapshots.free_name()
-        numbers = numbers_of(session.reach, state)
-        snapshot = Snapshot(name=name, state=state, taken=time.time(), numbers=numbers)
-        session.snapshots.add(snapshot)
-        session.show()
-        self._choice.value = name
+class Row(NamedTuple):
+    """A quantity of the kept design and of the present one; None where it is not known."""
 
-    def _restore(self) -> None:
-        state = self._chosen().state
-        self._session.update(
-            lambda now: state.replace(
-                appearance=now.appearance,
-                camera=now.camera,
-                reference=now.reference,
-                side_by_side=now.side_by_side,
-            )
-        )
+    title: str
+    """With its unit."""
+    kept: Value
+    now: Value
+    errors: tuple[Value, Value] = (None, None)
 
-    def _chosen(self) -> Snapshot:
-        snapshot = self._named()
-        if snapshot is None:
-            raise InvalidInput("snapshot", "none", "chosen", "take one first")
-        return snapshot
+    @property
+    def change(self) -> Value:
+        """From the kept design to the present one."""
+        return None if self.kept is None or self.now is None else self.now - self.kept
 
-    def _named(self) -> Snapshot | None:
-        return next((each for each in self._kept() if each.name == self._choice.value), None)
+
+class Comparison(NamedTuple):
+    """What differs between two designs."""
+
+    rows: tuple[Row, ...]
+    is_complete: bool
+    """True if the designs differ in these numbers alone."""
+
+
+Candidate = tuple[Manipulator, Reach | None]
+
+
+def compared(kept: Candidate, now: Candidate) -> Comparison:
+    """Compare what two designs reach, and the parameters in which they differ."""
+    parameters, is_complete = _parameter_rows(kept[0], now[0])
+    return Comparison((*_reach_rows(kept, now), *parameters), is_complete)
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """A row for each quantity: kept, now, and the change."""
+    rows = [[(row.title,), *map(_one, _texts(row))] for row in comparison.rows]
+    others = "The designs differ in more than these numbers."
+    more = "" if comparison.is_complete else markup.paragraph(others)
+    return markup.table(["", "kept", "now", "change"], rows) + more
+
+
+def _one(text: str) -> tuple[str]:
+    return (text,)
+
+
+def _texts(row: Row) -> tuple[str, str, str]:
+    values = zip((row.kept, row.now), row.errors, strict=True)
+    kept, now = ("–" if value is None else _digits(value, error) for value, error in values)
+    return kept, now, _change_text(row)
+
+
+def _change_text(row: Row) -> str:
+    if row.change is None:
+        return "–"
+    if row.change == 0:
+        return "="
+    before, now = row.errors
+    if before is None or now is None:
+        return _digits(row.change, None, "+")
+    error = before + now
+    text = _digits(row.change, error, "+")
+    if not row.kept:
+        return text
+    return f"{text} ({_digits(100 * row.change / row.kept, 100 * error / row.kept, '+')} %)"
+
+
+def _digits(value: float, error: Value, sign: str = "") -> str:
+    """A number to the first digit of its error; to five digits without one."""
+    usual = f"{sign}.5g"
+    if error is not None and 0 < (error := max(error, _FINEST)) < math.inf:
+        usual = f"{sign}.{max(0, -math.floor(math.log10(error)))}f"
+    return f"{value:{usual}}".replace("-", _MINUS)
+
+
+def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
+    """Volume, area or length, whatever each has, in the unit of the present design, and UNR."""
+    sizes = [reach.size if reach else None for _, reach in (kept, now)]
+    kinds = dict.fromkeys((size.name, size.power) for size in sizes if size is not None)
+    unit, rows = now[0].length_unit, []
+    for name, power in kinds or {("volume", 3): None}:
+        scale = unit.scale(power) if power else 1.0
+        same = [size if size and size.name == name else None for size in sizes]
+        values = [None if size is None else size.value / scale for size in same]
+        errors = [None if size is None else size.error / scale for size in same]
+        title = unit.label(name, power) if power else name
+        rows.append(Row(title, values[0], values[1], (errors[0], errors[1])))
+    shares = [_finite(100 * reach.unreachability) if reach else None for _, reach in (kept, now)]
+    if any(share is not None for share in shares):
+        before, after = (None if share is None else round(share, 2) for share in shares)
+        rows.append(Row("UNR [%]", before, after))
+    return rows
+
+
+def _parameter_rows(kept: Manipulator, now: Manipulator) -> tuple[list[Row], bool]:
+    """Sliders that differ, then other parameters; and whether they tell all."""
+    shown = _differing(slider_parameters(kept), slider_parameters(now))
+    if _explained(kept, now, list(shown)):
+        return list(shown.values()), True
+    every = _differing(named_parameters(kept), named_parameters(now))
+    others = [row for name, row in every.items() if name not in shown]
+    return [*shown.values(), *others][:_MOST], False
+
+
+def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) -> dict[str, Row]:
+    """Rows of the parameters whose values differ, by name."""
+    both = [{parameter.name: parameter for parameter in each} for each in (kept, now)]
+    rows = {}
+    for name in {**both[0], **both[1]}:
+        label = (both[1].get(name) or both[0][name]).label
+        values = [_finite(each[name].shown) if name in each else None for each in both]
+        if not _same(*values):
+            rows[name] = Row(label, values[0], values[1])
+    return rows
+
+
+def _explained(kept: Manipulator, now: Manipulator, names: Sequence[str]) -> bool:
+    """True if the kept design becomes the present one by these parameters alone."""
+    try:
+        goal = parameters(now)
+        near = changed(kept, {name: goal[name].value(now) for name in names})
+    except (KeyError, SoftreachError):
+        return False
+    alike = not _differing(named_parameters(near), named_parameters(now))
+    return alike and _shape(near) == _shape(now)
+
+
+def _shape(arm: Manipulator) -> object:
+    """Kinds and names of the parts: all that is no number."""
+    rings = tuple((ring.name, ring.material) for ring in arm.section.rings)
+    parts = tuple((type(actuator), actuator.name) for actuator in arm.actuators)
+    return type(arm.profile), rings, parts, arm.loads is None
+
+
+def _same(value: Value, other: Value) -> bool:
+    if value is None or other is None:
+        return value is other
+    return abs(value - other) <= _EQUAL * max(abs(value), abs(other))
+
+
+def _finite(value: float) -> Value:
+    return float(value) if math.isfinite(value) else None

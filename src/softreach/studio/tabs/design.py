@@ -74,7 +74,7 @@ class DesignPanel:
             self._show_slopes(session)
 
     def _show_slopes(self, session: Session) -> None:
-        slopes, design = session.slopes, session.state.design
+        slopes, design = session.found.slopes, session.state.design
         if slopes is None:
             bars = dict.fromkeys(self._bars, NO_BAR) if rod_of(design).box.dimension > 2 else {}
         else:

@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
-from softreach.studio.captions import scale_bar
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
-from softreach.studio.page import picture_file, static_page
-from softreach.studio.scene.camera import FINER
+from softreach.studio.files import (
+    cloud_file,
+    figure_file,
+    page_file,
+    picture_file,
+    state_from,
+    surface_file,
+)
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -28,9 +32,8 @@ _ABOUT = {
     "data": "The design alone, which the command line reads too; all samples of the cloud, tips "
     "[m] and activations; or the exact boundary of the reachable set [m]",
     "Save data": "As a file of this type",
-    "picture": "The scene as it is seen, with legend, design and a scale bar, which is right at "
-    "the depth of the point that the camera turns about; three views and an oblique one of the "
-    "points that are shown; or the scene in one file, to be turned without a studio",
+    "picture": "The scene as it is seen, with legend and design; three views and an oblique one of "
+    "the points that are shown; or the scene in one file, to be turned without a studio",
     "Save picture": "As a file of this type",
 }
 _SECOND: Any = {"color": "gray"}
@@ -83,16 +86,14 @@ class ExportPanel:
         self._send("design.toml", self._session.state.design.file_text.encode())
 
     def _picture(self, reach: Reach) -> bytes:
-        session, picture = self._session, self._session.picture()
-        focal, length = session.camera.pixels_per_length, session.state.design.length
-        bar = scale_bar(focal, picture.shape[1] / FINER / 5, length)
-        return picture_file(picture, session.state, reach, session.key, bar)
+        session = self._session
+        return picture_file(session.picture(), session.state, reach, session.found.key)
 
     def _figure(self, reach: Reach) -> bytes:
         return figure_file(reach, self._session.state)
 
     def _page(self, reach: Reach) -> bytes:
-        return static_page(self._session.state_now(), reach).encode()
+        return page_file(reach, self._session.state)
 
     def _button(self, label: str, action: Callable[[], None], **looks: Any) -> None:
         button = self._session.client.gui.add_button(label, hint=_ABOUT[label], **looks)
@@ -102,7 +103,7 @@ class ExportPanel:
         self._session.restore(state_from(file.name, file.content, self._session.state))
 
     def _reach(self) -> Reach:
-        reach = self._session.reach
+        reach = self._session.found.reach
         if reach is None or not reach.fine or reach.arm != self._session.state.design:
             raise InvalidInput("cloud", "still being computed", "complete", "try again soon")
         return reach

@@ -10,7 +10,6 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.captions import place_text
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
-from softreach.studio.jobs.inverse import DragTip, SolveInverse
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.state import MOUSE, StudioState, rod_of
 from softreach.studio.widgets import Line, TextKind, TypedField, show_where, vector_kind
@@ -39,7 +38,7 @@ class DragPanel:
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         eye = lambda: np.array(session.camera.actual().position)  # noqa: E731
-        self._ball = DragBall(session.client.scene, session.job(DragTip).order, eye)
+        self._ball = DragBall(session.client.scene, session.drag_to, eye)
         self._fields = Fields(session, dragged=False)
         with tab:
             self._fields.dropdown("mouse", MOUSE, attribute("appearance.mouse"), _ABOUT_MOUSE)
@@ -48,20 +47,21 @@ class DragPanel:
     def show(self, session: Session) -> None:
         """Keep the ball on the tip."""
         self._fields.show(session)
-        state, drag, arm = session.state, session.drag, session.state.design
+        state, lag, arm = session.state, session.found.lag, session.state.design
         look = state.appearance
         grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
-        grasped = grasped and not session.shows_sample  # a marker may be on the tip
+        grasped = grasped and not session.found.sample is not None  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
-        tip, clear = session.tip if grasped else None, state.path is not None
+        tip, clear = session.found.tip if grasped else None, state.path is not None
         self._ball.move(tip, radius, dark=look.dark, clear=clear)
-        if drag is None:
+        if lag is None:
             self._text.say(*([_DRAG_HINT] if look.handle else []))
             self._ball.show_lag(None, None)
             return
-        gap = arm.length_unit.rounded(drag.dragged.gap, digits=".3g") if drag.dragged.gap else ""
+        short = lag.dragged.gap
+        gap = arm.length_unit.rounded(short, digits=".3g") if short else ""
         self._text.say(f"This branch ends {gap} short of the pointer." if gap else _DRAG_HINT)
-        self._ball.show_lag(drag.wanted, drag.dragged.tip / arm.length, gap)
+        self._ball.show_lag(lag.wanted, lag.dragged.tip / arm.length, gap)
 
 
 class InversePanel:
@@ -94,9 +94,9 @@ class InversePanel:
         self._fields.show(session)
         show_where(session.state.target is not None, self._clear)
         self._follow_unit(session.state.design.length_unit)
-        if session.answer is not self._answer:
-            self._answer = session.answer
-            self._list(session.answer)
+        if session.found.answer is not self._answer:
+            self._answer = session.found.answer
+            self._list(session.found.answer)
         for activation, button in self._buttons:
             is_here, text = _is_near(activation, session.state), _listed(activation)
             button.color = "green" if is_here else None
@@ -135,12 +135,12 @@ class InversePanel:
             return self._take_ghost(origin, direction)
         place = session.picked_place(origin, direction)
         if place is not None:
-            attempt(session, lambda: session.job(SolveInverse).aim(place))
+            attempt(session, lambda: session.aim(place))
         return True
 
     def _take_ghost(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
         """Move the arm to the shape under the cursor, as the button of that solution does."""
-        answer = self._session.answer
+        answer = self._session.found.answer
         ghost = self._session.scene.ghost_under(np.asarray(origin), np.asarray(direction))
         if answer is None or ghost is None or ghost >= len(answer):
             return False
@@ -152,7 +152,7 @@ class InversePanel:
         self._session.update(lambda state: state.replace(activation=target))
 
     def _solve_typed(self) -> None:
-        self._session.job(SolveInverse).aim(self._unit.size * np.asarray(self._target.value))
+        self._session.aim(self._unit.size * np.asarray(self._target.value))
 
     def _button(self, activation: Any) -> Any:
         button = self._gui.add_button(_listed(activation), hint="Moves the arm to this solution")

@@ -135,7 +135,9 @@ class LoadsPanel:
             self._design = design
             others = ", ".join(other_loads(design))
             self._others.say(*([f"From the design file act too: {others}."] if others else []))
-        self._posture.say(*(tip_text(session) if design.loads is not None else ()))
+        self._posture.say(
+            *(tip_text(session.found, session.state.design) if design.loads is not None else ())
+        )
 
 
 def _typed(name: str) -> Attribute:

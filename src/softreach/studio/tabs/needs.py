@@ -127,7 +127,7 @@ class NeedsPanel:
             self._part.value = (*parts, _ALL)[0]
 
     def _say_verdict(self, session: Session) -> None:
-        check, refusal = session.check, session.check_refusal
+        check, refusal = session.found.check, session.found.check_refusal
         old = check is not None and check.arm != session.state.design
         if (check, refusal, old) != self._said:
             self._said = check, refusal, old
@@ -153,9 +153,9 @@ class NeedsPanel:
         session = self._session
         if text.strip():
             return with_place(needs, [self._unit.size * x for x in _numbers(text, 3)])
-        if session.tip is None:
+        if session.found.tip is None:
             raise InvalidInput("tip", "nowhere", "in equilibrium, or type a place")
-        return with_place(needs, (session.tip * session.state.design.length).tolist())
+        return with_place(needs, (session.found.tip * session.state.design.length).tolist())
 
     def _place_at_target(self, needs: Requirements, text: str) -> Requirements:
         del text

@@ -12,8 +12,8 @@ from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.files import LARGEST
-from softreach.studio.jobs.path import PlayPath, at_point
-from softreach.studio.plots.plot import Chart, Curve
+from softreach.studio.jobs.path import at_point
+from softreach.studio.plots.chart import Chart, Curve
 from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.widgets import Line, show_where
@@ -74,7 +74,7 @@ class PathPanel:
 
     def show(self, session: Session) -> None:
         """Say how far the arm follows, and where it is."""
-        track, path = session.figures.track, session.state.path
+        track, path = session.found.track, session.state.path
         show_where(path is not None, self._clear)
         if path is None or track is None or track.sizes["point"] != len(path.points):
             self._shown, self._walk.visible = None, False
@@ -142,9 +142,9 @@ class PathPanel:
 
     def _played(self) -> None:
         if self._play.value == "Play":
-            self._session.job(PlayPath).ask()
+            self._session.follow("play")
         else:
-            self._session.follow(PlayPath)  # which drops what it is doing
+            self._session.stop("play")
 
     def _save_csv(self) -> None:
         if self._shown is not None:

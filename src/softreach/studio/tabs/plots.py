@@ -1,13 +1,15 @@
-"""Choice of the plots that stand beside the scene, and the window with them."""
+"""Plots beside the scene: which are shown, and the window with them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio.fields import Attribute, Fields
-from softreach.studio.plots import PLOTS
-from softreach.studio.plots.plot import Plot
-from softreach.studio.widgets import Line
+from softreach.studio.plots.chart import Chart, Curve
+from softreach.studio.plots.sweep import Sweep, swept_parameter
+from softreach.studio.shown_parameters import slider_parameters
+from softreach.studio.state import StudioState
+from softreach.studio.widgets import Line, PictureFrame, show_where
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -18,57 +20,69 @@ _HINT = (
     "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
     "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
 )
+_LABELS = {"section": "section", "sweep": "V against parameter"}
+_ABOUT = {
+    "section": "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
+    "boundary, and how many activations reach each place",
+    "sweep": "Volume of designs that differ from this one in one parameter, computed as you look",
+}
 _WIDTH = 380  # pixels
 _COMPUTING = "computing ..."
-
-
-class _Place:
-    def __init__(self, gui: GuiApi, kind: type[Plot]) -> None:
-        self.name = kind.name
-        self._folder = gui.add_folder(kind.label, visible=False)
-        with self._folder:
-            self._text = Line(gui, _COMPUTING)
-        self._plot = kind(gui, self._folder)
-        self._drawn: Any = None
-        self._caption = _COMPUTING
-
-    def show(self, session: Session) -> None:
-        self._folder.visible = self.name in session.state.appearance.plots.shown
-        result = session.figures.plots.get(self.name)
-        if not self._folder.visible or result is None:
-            return
-        if result is not self._drawn:
-            self._drawn, self._caption = result, self._plot.show(result)
-        old = result.arm != session.state.design
-        self._text.say(self._caption, " · of the design before, computing ..." if old else "")
+_VOLUME = Curve("V", "#2f6db5", points=True)
 
 
 class PlotsPanel:
     """Check boxes in the tab; a folder for each plot in the window."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._fields = Fields(session, dragged=False)
+        self._fields = fields = Fields(session, dragged=False)
         with tab:
             Line(gui, _HINT)
-            for kind in PLOTS:
-                self._fields.checkbox(kind.label, _switch(kind.name), kind.hint)
-            for kind in PLOTS:
-                kind.add_settings(self._fields)
+            for name, label in _LABELS.items():
+                fields.checkbox(label, _switch(name), _ABOUT[name])
+            about = "What changes in the plot of V against a parameter"
+            fields.dropdown("parameter", _offered, Attribute(_swept, _sweeping), about)
         self._window = gui.add_panel(visible=False)
         with self._window.add_tab("Figures"):
-            self._places = [_Place(gui, kind) for kind in PLOTS]
+            self._folders = {name: gui.add_folder(text) for name, text in _LABELS.items()}
+            self._texts = {name: self._text(gui, folder) for name, folder in self._folders.items()}
+        self._frame = PictureFrame(gui, self._folders["section"])
+        self._chart = Chart(gui, self._folders["sweep"])
+        self._drawn: Sweep | None = None
+
+    def _text(self, gui: GuiApi, folder: Any) -> Line:
+        with folder:
+            return Line(gui, _COMPUTING)
 
     def show(self, session: Session) -> None:
         """Show what is known of the plots that are wanted."""
         self._fields.show(session)
-        shown = session.state.appearance.plots.shown
+        found, shown = session.found, session.state.appearance.plots.shown
         if shown and not self._window.visible:
             self._window.visible = True
             self._window.dock_left()  # a page forgets where a hidden window was
             self._window.set_width(_WIDTH)
         self._window.visible = bool(shown)
-        for place in self._places:
-            place.show(session)
+        for name, folder in self._folders.items():
+            show_where(name in shown, folder)
+        if "section" in shown and found.section is not None:
+            self._frame.show(found.section.image)
+            self._say("section", found.section.text, found.section.arm, session)
+        if "sweep" in shown and found.sweep is not None:
+            self._draw_sweep(found.sweep)
+            self._say("sweep", _sweep_text(found.sweep), found.sweep.arm, session)
+
+    def _say(self, name: str, text: str, arm: object, session: Session) -> None:
+        old = arm != session.state.design
+        self._texts[name].say(text, " · of the design before, computing ..." if old else "")
+
+    def _draw_sweep(self, known: Sweep) -> None:
+        if known is self._drawn or len(known.value) < 2:
+            return
+        self._drawn, unit = known, known.arm.length_unit
+        label, here = known.parameter.label, known.parameter.shown
+        volumes = unit.of(known.volume, 3)
+        self._chart.show(label, known.value, (_VOLUME,), (volumes,), here, y=unit.label("V", 3))
 
 
 def _switch(name: str) -> Attribute:
@@ -76,3 +90,25 @@ def _switch(name: str) -> Attribute:
         lambda state: name in state.appearance.plots.shown,
         lambda state, on: state.showing(plots=state.appearance.plots.showing(name, on)),
     )
+
+
+def _offered(state: StudioState) -> dict[str, str]:
+    return {slider.name: slider.label for slider in slider_parameters(state.design)} or {"": ""}
+
+
+def _swept(state: StudioState) -> str:
+    parameter = swept_parameter(state)
+    return "" if parameter is None else parameter.name
+
+
+def _sweeping(state: StudioState, name: str) -> StudioState:
+    return state.showing(plots=state.appearance.plots.showing("sweep").sweeping(name))
+
+
+def _sweep_text(known: Sweep) -> str:
+    unit, parameter = known.arm.length_unit, known.parameter
+    volumes = known.volume[known.value == parameter.shown]
+    parts = [f"here V = {unit.rounded(v, 3)} at {parameter.shown:g}" for v in volumes]
+    if known.refused:
+        parts.append(f"{len(known.refused)} values make no design or take too long")
+    return " · ".join([*parts, *([] if known.complete else [_COMPUTING])])

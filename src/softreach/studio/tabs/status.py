@@ -41,16 +41,14 @@ class StatusPanel:
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
-        check, history = session.check, session.history
+        check = session.found.check
         lines = [_numbers_text(session), [verdict_text(check)] if check is not None else []]
         marks = [markup.paragraph(*line) for line in _marks(session)]
-        steps = {"undo": history.past, "redo": history.future}
         self._known.show(
             markup.status(
                 *(markup.paragraph(*line) for line in lines),
-                key_html(session.key),
+                key_html(session.found.key),
                 *marks,
-                available=[name for name, states in steps.items() if states],
             )
         )
         self._tell(session)
@@ -69,7 +67,7 @@ class StatusPanel:
         )
 
     def _offer(self, session: Session) -> None:
-        busy, lacking = session.busy, is_behind(session) and not session.refusal
+        busy, lacking = session.busy, is_behind(session) and not session.found.refusal
         label = _GO_ON if lacking and not busy else _CANCEL
         if self._cancel.label != label:
             self._cancel.label = label
@@ -77,10 +75,10 @@ class StatusPanel:
 
 
 def _marks(session: Session) -> list[list[Part]]:
-    reach = session.reach
+    reach = session.found.reach
     if reach is None:
         return []
-    free = session.free is not None
+    free = session.found.free is not None
     lines = [legend_text(reach, free=free)]
     if reach.refusal:
         lines.append([f"No exact volume: {reach.refusal}"])
@@ -91,15 +89,15 @@ def _marks(session: Session) -> list[list[Part]]:
 
 def is_behind(session: Session) -> bool:
     """True if results of the design in the fields are missing."""
-    reach = session.reach
+    reach = session.found.reach
     return reach is None or reach.arm != session.state.design or not reach.fine
 
 
 def _numbers_text(session: Session) -> list[Part]:
-    reach, work = session.reach, _work(session)
+    reach, work = session.found.reach, _work(session)
     if reach is None:
-        return [session.refusal or work]
-    parts = reach_text(reach, loaded_share(session))
+        return [session.found.refusal or work]
+    parts = reach_text(reach, loaded_share(session.found, session.state.design))
     if reach.arm != session.state.design:
         parts = [Strong("of the design before: "), *parts]
     return [*parts, *([f" · {work}"] if work else [])]

@@ -1,0 +1,158 @@
+"""Knowledge of a tab as one frozen value: what its jobs have found out of its state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.tip_map import TipStatus
+from softreach.studio.state import StudioState
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.calibration.calibration import Calibration
+    from softreach.calibration.measurements import Measurements
+    from softreach.inverse import Solution
+    from softreach.inverse.drag import Drag, Dragged
+    from softreach.plot.coloring import BundleKey, ScalarKey
+    from softreach.requirements import Check
+    from softreach.studio.plots.section import Picture
+    from softreach.studio.plots.sweep import Sweep
+    from softreach.studio.reach import Reach
+    from softreach.studio.slopes import VolumeSlopes
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found:
+    """What is known; each part may be of the design before, until that of the present one is."""
+
+    reach: Reach | None = None
+    """Of the design."""
+    refusal: str = ""
+    """Reason why nothing can be computed of the design."""
+    slopes: VolumeSlopes | None = None
+    """Change of its volume by each slider."""
+    free: Reach | None = None
+    """Reach of a loaded design without its loads."""
+    reference: Reach | None = None
+    """Reach of the design that is kept."""
+    key: BundleKey | ScalarKey | None = None
+    """To the colors of cloud or surface."""
+    tip: Array | None = None
+    """Place of the tip [L]; None before it is known, and without equilibrium."""
+    pointing: Array = field(default_factory=lambda: np.full(3, np.nan))
+    """Direction d3 of the tip."""
+    posture: TipStatus | None = None
+    """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
+    answer: Solution | None = None
+    """Every activation that reaches the target."""
+    takes_nearest: bool = False
+    """True if the arm moves to the nearest of them, as after a click or a typed target."""
+    pull: Pull | None = None
+    """The latest order of a person who drags the tip; None once it is followed to its end."""
+    drag: Drag | None = None
+    """What follows a dragged tip of the design."""
+    lag: Lag | None = None
+    """How far the arm lags behind the pointer; None when nobody drags."""
+    held: tuple[Manipulator, Dragged] | None = None
+    """An arm, and how the last drag left it."""
+    bench: Bench | None = None
+    """Measured poses, and what was fitted to them."""
+    sample: Sample | None = None
+    """Markers of the pose that is shown."""
+    check: Check | None = None
+    """The design against its needs."""
+    check_refusal: str = ""
+    """Reason why it cannot be judged."""
+    section: Picture | None = None
+    """Of the reachable set by the plane of the slice."""
+    sweep: Sweep | None = None
+    """Volumes of designs that differ in one parameter."""
+    track: xr.Dataset | None = None
+    """Result of `track_path` for the path."""
+
+    @property
+    def is_dragged(self) -> bool:
+        """True while a drag of the tip is under way."""
+        return self.pull is not None and not self.pull.rests
+
+    def without(self, pull: Pull) -> Found:
+        """Without a drag that has ended; another may have begun meanwhile."""
+        return replace(self, pull=None, lag=None) if self.pull is pull else self
+
+    def complete_reach(self, design: Manipulator) -> Reach | None:
+        """Reach of a design, once it is fine."""
+        reach = self.reach
+        return reach if reach is not None and reach.fine and reach.arm == design else None
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """Place where a person wants the tip [L]."""
+
+    place: Array
+    rests: bool
+    """True once the drag has ended there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lag:
+    """Place where a person wants the tip [L], and what comes of that."""
+
+    wanted: Array
+    dragged: Dragged
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """Measured poses, the pose that is shown, and what was fitted to them."""
+
+    data: Measurements
+    arm: Manipulator
+    """The design that they were read for."""
+    number: int = 0
+    """Of the pose that is shown."""
+    free: tuple[str, ...] = ("pose",)
+    """Numbers that a fit may change."""
+    result: Calibration | None = None
+
+    def fits(self, arm: Manipulator) -> bool:
+        """True of an arm with the inputs and the markers of the one that the data were read for."""
+        return _columns(arm) == _columns(self.arm)
+
+    def posed(self, state: StudioState) -> StudioState:
+        """The state with the inputs of the pose, as far as its bounds go."""
+        return state.replace(activation=tuple(self.data.inputs[self.number].tolist()))
+
+    def fitted(self, design: Manipulator) -> Manipulator | None:
+        """The calibrated arm; None without a fit that began with this design."""
+        result = self.result
+        return result.arm if result is not None and result.start == design else None
+
+
+def _columns(arm: Manipulator) -> tuple[object, ...]:
+    return arm.input_names, arm.input_units, [marker.name for marker in arm.markers]
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Markers of a measured pose."""
+
+    measured: Array
+    """[m], shape (marker, 3)."""
+    predicted: Array
+    """Of the calibrated arm, or of the design [m], shape (marker, 3)."""
+    arm: Manipulator
+    """The one that predicts."""
+
+    @property
+    def distances(self) -> Array:
+        """From measured to predicted markers [m], shape (marker,)."""
+        return np.linalg.norm(self.predicted - self.measured, axis=1)
