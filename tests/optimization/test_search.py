@@ -88,16 +88,16 @@ def started(storage, count):
 @pytest.mark.parametrize(
     ("name", "each"),
     [
-        ("search.journal", 8),
+        ("search.journal", 10),
         pytest.param("search.journal", 1, marks=pytest.mark.large),
-        pytest.param("search.db", 8, marks=pytest.mark.large),
+        pytest.param("search.db", 10, marks=pytest.mark.large),
     ],
 )
 def test_a_search_that_was_killed_ends_as_if_it_had_not_been(name, each, tmp_path, alone):
     storage, kills = tmp_path / name, 0
     while started(storage, each).wait() == -9:
         kills += 1
-    assert kills >= 6 // each  # a batch is judged side by side
+    assert kills >= 1
     seen = []
     search = heavy(storage=storage, follow=seen.append)
     assert seen == []

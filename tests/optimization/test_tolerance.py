@@ -134,9 +134,9 @@ def test_it_says_what_costs_most_and_can_be_passed_on():
 
 def test_arms_that_cannot_exist_are_counted():
     ratio = changed(NARROW, {"rings[0].inner_ratio": 0.995})
-    result = tolerance(ratio, {"rings[0].inner_ratio": 0.01}, samples=100, checked=6, accuracy=0.2)
-    assert 0 < result.impossible < 6
-    assert result.made + result.impossible == 6
+    result = tolerance(ratio, {"rings[0].inner_ratio": 0.01}, samples=100, checked=4, accuracy=0.2)
+    assert 0 < result.impossible < 4
+    assert result.made + result.impossible == 4
     assert "cannot exist" in repr(result)
 
 
