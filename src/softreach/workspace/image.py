@@ -281,8 +281,8 @@ def image_of(
     lattice: Lattice,
     progress: Progress = silent,
     *,
-    is_lifted: Mask | None = None,
-    lifted: Index | None = None,
+    is_lifted: Mask,
+    lifted: Index,
 ) -> Image:
     """The image of a grid of boxes whose vertices go to `points`.
 
@@ -293,23 +293,21 @@ def image_of(
         lattice: Cells to rasterize on.
         progress: Called with the number of vertices done since its last call.
         is_lifted: Boxes in whose place others are, shape `cells`; points that are corners of no box
-            may be NaN. None by default.
+            may be NaN.
         lifted: Vertices at the corners of the others, in the order of their bits, shape (k, 8).
     """
     scaled = lattice.coordinates(points)
-    gaps = np.zeros(cells, bool) if is_lifted is None else is_lifted
-    others = np.empty((0, 8), np.int64) if lifted is None else lifted
     grid = scaled[: len(stretches)].reshape(*(n + 1 for n in cells), 3)
     steps = [np.nanmax(np.abs(np.diff(grid, axis=axis))) for axis in range(3)]
     longest = max(float(np.sum(steps)), 1.0)
-    longest = max(longest, float(np.ptp(scaled[others], axis=1).sum(axis=1).max(initial=0.0)))
+    longest = max(longest, float(np.ptp(scaled[lifted], axis=1).sum(axis=1).max(initial=0.0)))
     # Determinants of the kernels are then exact, as rounding adds no more than 1 unit.
     unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
     vertices = np.rint(scaled * unit)
     vertices[np.isnan(vertices)] = 0.0
-    triangles = _critical_triangles(vertices[: len(stretches)], stretches, gaps, progress)
-    if len(others):
-        triangles = np.concatenate([triangles, _lifted_triangles(vertices, others)])
+    triangles = _critical_triangles(vertices[: len(stretches)], stretches, is_lifted, progress)
+    if len(lifted):
+        triangles = np.concatenate([triangles, _lifted_triangles(vertices, lifted)])
     return Image(lattice=lattice, unit=unit, vertices=vertices, triangles=triangles)
 
 

@@ -75,7 +75,7 @@ class ReachableSolid(ReachableSet):
     """Source of the volume. "flux": the map is found to be one to one, and the volume is what
     flows through the images of the six faces of the activation box. "raster": the image folds or
     overlaps, or may do so under loads and at kinks; a signed volume by flux makes it exact
-    elsewhere. "search": more than three free bundles."""
+    elsewhere, unless the set is torn. "search": more than three free bundles."""
     is_torn: bool = False
     """True if the set is the image of several sheets of postures."""
     image: Image | ReachedCells = field(repr=False)
@@ -142,7 +142,8 @@ class ReachableSolid(ReachableSet):
         For the route "flux" it is the image of the faces of the activation box, on which its
         vertices lie exactly; for more than three free bundles a surface of tips, which is wrapped
         around parts of any thinness and leaves corners out by up to half a cell, and so it is for
-        three where the set is thinner than two cells. Otherwise it is found in the raster, and
+        three where the set is thinner than two cells. Under loads it goes around the raster, in one
+        part for most arms, and fills gaps below two cells. Otherwise it is found in the raster, and
         wrapped where that leaves a corner out by more than the diagonal of a cell. Parts that add
         up to less than the error of the volume are left out.
 

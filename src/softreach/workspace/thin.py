@@ -153,14 +153,15 @@ def _measure(rod: TipMap, grid: LiftedGrid) -> Estimate:
     """
     if rod.is_smooth and not grid.is_torn and np.isfinite(smooth := by_nodes(rod)).all():
         return smooth
-    rough = grid.coarser(rod)
-    fine, coarse = (_size(each.tips[each.cells]) for each in (grid, rough))
-    removed = (fine - coarse) / 3.0
+    fine, times = _size(grid), (2, 3) if grid.is_torn else (2,)
+    changes = [(fine - _size(grid.coarser(rod, k))) / (k - 1) for k in times]
+    removed = max(changes, key=abs) / 3.0
     return Estimate(fine + removed, _KINKED_SHARE * abs(removed))
 
 
-def _size(corners: Array) -> float:
-    """Length of chords, or area of two triangles each [m or m²], of cells (n, 2^m, 3)."""
+def _size(grid: LiftedGrid) -> float:
+    """Length of chords, or area of two triangles each [m or m²]."""
+    corners = grid.tips[grid.cells]
     if corners.shape[1] == 2:
         return float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=-1).sum())
     first, last, second = (corners[:, k] - corners[:, 0] for k in (1, 3, 2))

@@ -33,7 +33,7 @@ _MOST = 4  # postures of one node
 _END = 2.0**-10  # of an edge, to which the end of a branch is found
 _SAME = 2e-3  # [rad, L], of postures of the arm itself
 _POLISHED = 0.1  # [rad], by which the arm may differ from its twin
-_LEAP = 0.25  # [L]
+_LEAP = 0.3  # [L] between tips of neighbors, which may lie around a ring of leaning postures
 _EVERY = 4  # nodes along each axis to one that lines lead to, where there is no flood
 _UNKNOWN, _NONE = -2, -1
 
@@ -47,8 +47,6 @@ def held_over(
 ) -> Held:
     """The postures of both sides over a grid, see `TipMap.held`."""
     grid = _Grid(postures.solver, gamma, sizes)
-    if not postures.is_held_at_rest:  # around rest, tips of neighbors lie around a ring
-        grid.leap = _LEAP * grid.length
     grid.fill(postures, grid.has_arm)
     is_doubled = grid.states[:, 1] >= 0
     beside = grid.has_arm
@@ -82,8 +80,6 @@ class _Grid:
         self.shots = _shots(solver.empty(0))
         self.next = np.empty((0, 2 * len(sizes)), np.intp)
         """Postures on the same branch at the next node down and up each axis."""
-        self.leap = np.inf
-        """Distance of tips [m] from which on neighbors are not linked."""
         self.links = list[Index]()
         self.ends = list[Index]()
         self.end_gamma = list[Array]()
@@ -190,7 +186,7 @@ class _Grid:
         good = found.is_found
         numbers = self._put(to[good], found.of(good))
         before = self.shots.of(state)
-        leaps = np.linalg.norm(found.tips - before.tips, axis=1) > self.leap
+        leaps = np.linalg.norm(found.tips - before.tips, axis=1) > _LEAP * self.length
         found.put(np.flatnonzero(leaps), before.of(leaps))
         share[leaps] = 0.0
         kept = (numbers >= 0) & ~leaps[good]
