@@ -231,7 +231,7 @@ class Tab:
         canvas = self.page.locator("canvas").first.bounding_box()
 
         def picture() -> np.ndarray:
-            self.page.wait_for_timeout(400)
+            self.page.wait_for_timeout(250)
             return imread(io.BytesIO(self.page.screenshot(clip=canvas)))[..., :3]
 
         image = picture()

@@ -64,6 +64,7 @@ FOLDED = (-0.48, -0.16, -1.23)
 START = (-0.7, -0.4, -0.9)
 
 
+@pytest.mark.large
 def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
     tab = inverse_tab
     arm, scene = tab.session.state.design, tab.session.scene

@@ -83,9 +83,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
 def test_what_is_found_out_makes_stale_what_is_made_of_it(trunk):
     state = StudioState(design=trunk).showing(plots=PlotSettings(shown=("section",)))
     reach = object.__new__(Reach)
-    assert stale(state, state, NOTHING, Found(reach=reach)) == {
-        "cloud", "surface", "slopes", "section",
-    }  # fmt: skip
+    assert stale(state, state, NOTHING, Found(reach=reach)) == {"surface", "slopes", "section"}
     assert stale(state, state, Found(reach=reach), Found(reach=reach)) == set()
 
 

@@ -104,6 +104,7 @@ def test_memory_is_returned_once_a_tab_rests_and_when_it_is_gone(studio, monkeyp
     until(lambda: prepared() is None)
 
 
+@pytest.mark.large
 def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_full(
     studio, monkeypatch
 ):

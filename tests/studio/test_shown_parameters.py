@@ -84,10 +84,10 @@ def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
     assert sliders["turns"].step == 1
     assert found["angle"] == pytest.approx((0.0, -360.0, 360.0))
     assert found["share"] == pytest.approx((0.8, 0.008, 1.0))
-    assert found["width"] == pytest.approx((0.04, 0.0, 0.08))
+    assert found["width"] == pytest.approx((20.0, 0.0, 40.0))  # mm
     assert found["place[1]"] == pytest.approx((-0.01, -0.02, 0.0))
     assert "unknown" not in found
-    assert sliders["width"].label == f"w of {name} [L]"
+    assert sliders["width"].label == f"w of {name} [mm]"
     typed = part_parameters(arm, parts(arm)[name])
     assert f"{name}.unknown" in {one.name for one in typed}
 

@@ -17,6 +17,7 @@ from softreach.studio.work import all_cores
 from tests.studio.tab import Tab
 
 
+@pytest.mark.large
 def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(tab):
     assert not tab.page.evaluate("flashed")
     reach = tab.session.found.reach
@@ -42,6 +43,7 @@ def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(ta
     assert not np.allclose(after.cloud.tip[first], before.cloud.tip[first])
 
 
+@pytest.mark.large
 def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     tab.open("Move")
     tab.choose("mouse", "sets the target")
@@ -79,6 +81,7 @@ def parameter(tab, name: str) -> float:
     return find_parameter(design, name).value(design)
 
 
+@pytest.mark.large
 def test_a_state_is_saved_and_loaded(tab, tmp_path):
     tab.open("Export")
     kept = tab.session.state

@@ -22,6 +22,7 @@ def show(tab, **look) -> None:
     tab.settle()
 
 
+@pytest.mark.large
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     show(tab, mouse="none")  # the handle has a blue arrow
     seen = like(tab.pixels(), BLUE)

@@ -45,8 +45,13 @@ def size_text(size: Size, arm: Manipulator) -> str:
     """Size with its error in the unit of the arm, to the first digit of the error."""
     if size.power == 0:
         return size.name
-    error = max(size.error, _FINEST * arm.length**size.power)
-    return f"{size.name} {_unit_of(size, arm).text(size.value, size.power, error)}"
+    unit = _unit_of(size, arm)
+    return f"{size.name} {unit.text(size.value, size.power, told_error(size, arm))}"
+
+
+def told_error(size: Size, arm: Manipulator) -> float:
+    """Error of a size as it is told: no smaller than a millionth of L, L² or L³."""
+    return max(size.error, _FINEST * arm.length**size.power)
 
 
 def _unit_of(size: Size, arm: Manipulator) -> LengthUnit:

@@ -88,6 +88,9 @@ class Job:
     """Fields of `Found` that are forgotten where the work fails."""
     draws: tuple[str, ...] = ()
     """Nodes of the scene that are taken away then."""
+    at_once: bool = True
+    """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
+    that what computes while it draws is sent piece by piece."""
     doing: str = ""
     """What the reader is told meanwhile."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -344,7 +344,7 @@ class Session:
         self._draw(job)
 
     def _draw(self, job: Job) -> None:
-        with self.client.atomic():
+        with self.client.atomic() if job.at_once else nullcontext():
             told = job.draw(self._page, self.state, self.found)
         self.learn(told, quiet=True)
         self.show()

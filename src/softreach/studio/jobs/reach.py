@@ -20,11 +20,12 @@ from softreach.support.errors import InvalidInput
 def _compute_reach(state: StudioState, found: Found, tools: Tools) -> Results:
     if _is_complete(found.reach, state):
         return
-    yield Learned({"refusal": ""})
     try:
-        level = state.appearance.level
-        for reach in stages(state.design, level, tools.quality, tools.check, tools.report):
-            yield Learned({"reach": reach})
+        look = state.appearance
+        for reach in stages(state.design, look.level, tools.quality, tools.check, tools.report):
+            if shows_cloud(reach, look):
+                _count(reach, look, tools)
+            yield Learned({"reach": reach, "refusal": ""})
     except InvalidInput as error:
         yield _withdrawn(str(error))
     except OverBudget as error:
@@ -42,15 +43,6 @@ def _is_complete(known: Reach | None, state: StudioState) -> bool:
         return False
     enough = max(known.samples, known.wanted) >= 1 << state.appearance.level
     return enough or known.cloud.attrs.get("sampler") != "sobol"
-
-
-COMPUTE_REACH = Job(
-    "reach",
-    ("design", "appearance.level"),
-    _compute_reach,
-    makes=("reach", "key", "slopes"),
-)
-"""Cloud, volume and unreachability, coarse and then fine."""
 
 
 def _color_cloud(state: StudioState, found: Found, tools: Tools) -> Results:
@@ -76,14 +68,26 @@ def draw_axes(page: Page, state: StudioState, found: Found) -> None:
         page.scene.draw_axes(found.reach, found.free if state.design.loads is not None else None)
 
 
+COMPUTE_REACH = Job(
+    "reach",
+    ("design", "appearance.level"),
+    _compute_reach,
+    _draw_cloud,
+    makes=("reach", "key", "slopes"),
+    draws=("/cloud", "/unstable", "/slice"),
+    at_once=False,
+)
+"""Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next."""
+
 DRAW_CLOUD = Job(
     "cloud",
     (
-        "found.reach", "appearance.level", "appearance.color", "appearance.slice",
+        "appearance.level", "appearance.color", "appearance.slice",
         "appearance.cloud", "appearance.surface",
     ),
     _color_cloud,
     _draw_cloud,
+    at_once=False,
     doing="coloring the points", draws=("/cloud", "/unstable", "/slice"))  # fmt: skip
 """Points in their colors, and the axes around them."""
 
@@ -115,6 +119,7 @@ DRAW_SURFACE = Job(
     ),
     _color_surface,
     _draw_surface,
+    at_once=False,
     wanted=lambda state: state.appearance.surface, draws=("/surface",))  # fmt: skip
 """The exact boundary."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
 from softreach.studio import markup
+from softreach.studio.captions import told_error
 from softreach.studio.fields import Fields
 from softreach.studio.reach import Reach
 from softreach.studio.shown_parameters import ShownParameter, named_parameters, slider_parameters
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 _HINT = "Keep this design to see what a change of it costs and gains."
 _EQUAL = 1e-9  # relative difference that is rounding
-_FINEST = 1e-6  # error of what is shown: six digits after the point are enough
 _MINUS = "\N{MINUS SIGN}"
 _MOST = 24
 """Rows of parameters; designs that differ in more are other arms altogether."""
@@ -147,7 +147,7 @@ def _change_text(row: Row) -> str:
 def _digits(value: float, error: Value, sign: str = "") -> str:
     """A number to the first digit of its error; to five digits without one."""
     usual = f"{sign}.5g"
-    if error is not None and 0 < (error := max(error, _FINEST)) < math.inf:
+    if error is not None and 0 < error < math.inf:
         usual = f"{sign}.{max(0, -math.floor(math.log10(error)))}f"
     return f"{value:{usual}}".replace("-", _MINUS)
 
@@ -161,7 +161,7 @@ def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
         scale = unit.scale(power) if power else 1.0
         same = [size if size and size.name == name else None for size in sizes]
         values = [None if size is None else size.value / scale for size in same]
-        errors = [None if size is None else size.error / scale for size in same]
+        errors = [None if size is None else told_error(size, now[0]) / scale for size in same]
         title = unit.label(name, power) if power else name
         rows.append(Row(title, values[0], values[1], (errors[0], errors[1])))
     shares = [_finite(100 * reach.unreachability) if reach else None for _, reach in (kept, now)]
