@@ -112,3 +112,21 @@ def test_sheets_of_two_bundles_hang_together():
     assert connected_components(graph, directed=False)[0] == 1
     assert grid.is_torn
     assert grid.lost_share == 0.0
+
+
+@pytest.mark.parametrize("name", ["end", "tool", "middle"])
+def test_the_set_of_a_marker_holds_its_places(name):
+    arm = loaded("lce", 10)
+    markers = (
+        sr.arm.Marker(name="end", station=arm.length),
+        sr.arm.Marker(name="tool", station=arm.length, offset=(0.0, 0.01, 0.02)),
+        sr.arm.Marker(name="middle", station=0.6 * arm.length),
+    )
+    found = reachable_set(arm.replace(markers=markers), accuracy=0.05, point=name)
+    assert isinstance(found, ReachableSolid)
+    places = sr.compute_cloud(found.arm, 2000).tip.values
+    places = places[np.isfinite(places[:, 0])]
+    assert found.contains(places).mean() > 0.95
+    assert found.distance(places).max() < found.image.lattice.cell
+    if name == "end":
+        assert found.volume == pytest.approx(reachable_set(arm, accuracy=0.05).volume, rel=1e-6)

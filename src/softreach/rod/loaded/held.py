@@ -183,7 +183,7 @@ class _Grid:
         exists = self.has_arm[to]
         state, to, column = state[exists], to[exists], column[exists]
         found, share = self._followed(twin, state, to, column)
-        good = found.is_found
+        good = found.is_found.copy()
         numbers = self._put(to[good], found.of(good))
         before = self.shots.of(state)
         leaps = np.linalg.norm(found.tips - before.tips, axis=1) > _LEAP * self.length
