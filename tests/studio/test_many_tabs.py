@@ -141,8 +141,8 @@ def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):
         try:
             calm.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.021})))
             assert calm.settle(PATIENCE)
-            assert calm.reach is not None
-            assert calm.reach.arm == calm.state.design
+            assert calm.found.reach is not None
+            assert calm.found.reach.arm == calm.state.design
         finally:
             stop.set()
             shaking.join(PATIENCE)
