@@ -7,7 +7,7 @@ READY := .venv/.ready
 # Bytecode is kept whatever the environment says, or every process would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-all test-lowest tests all-tests ready kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all test-lowest tests all-tests ready free-kernels loaded-kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -39,7 +39,7 @@ demo: setup
 # Tests side by side, up to four on as many cores.
 TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
 
-# The checks run beside the compiler of the kernels, which has one core, and so does what every
+# The checks run beside the compilers of the kernels, which have a core each, and so does what every
 # process of the tests would else do anew: turn their assertions into ones that tell values.
 test: ready
 	$(MAKE) --no-print-directory tests
@@ -54,11 +54,14 @@ all-tests:
 	$(TESTS) -m "large or not large"
 
 ready: setup
-	$(MAKE) --no-print-directory -j2 --output-sync=target kernels check browser collected
+	$(MAKE) --no-print-directory -j2 --output-sync=target free-kernels loaded-kernels check browser collected
 
 # Compiled once here, and not by every process of the tests.
-kernels: setup
-	$(BIN)/softreach warmup
+free-kernels: setup
+	$(BIN)/softreach warmup --only free
+
+loaded-kernels: setup
+	$(BIN)/softreach warmup --only loaded
 
 collected: setup
 	@$(BIN)/python -m pytest -q -q --collect-only >/dev/null || true  # the tests say why

@@ -87,21 +87,28 @@ def test_a_finer_grid_agrees_to_the_errors(snapping):
     assert finer.hysteresis_share == pytest.approx(snapping.hysteresis_share, abs=0.01)
 
 
-def test_what_is_torn_is_one_surface_of_the_stated_volume_under_six_loads():
-    for each in (
-        *(("lce", 10, "down"), ("lce", 30, "down"), ("lce", 5, "x"), ("lce", 20, "down")),
-        *(("tendon_arm", 50, "down"), ("tendon_arm", 50, "x")),
-    ):
-        found = reachable_set(loaded(*each), accuracy=0.05)
-        assert isinstance(found, ReachableSolid)
-        surface = found.surface()
-        edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        unique, count = np.unique(edges, axis=0, return_counts=True)
-        size = len(surface.vertices)
-        graph = coo_array((np.ones(len(unique)), tuple(unique.T)), shape=(size, size))
-        assert (count == 2).all()
-        assert connected_components(graph, directed=False)[0] <= 3
-        assert surface.volume == pytest.approx(found.volume, rel=0.01)
+@pytest.mark.parametrize(
+    ("name", "grams", "points"),
+    [
+        *(("lce", 30, "down"), ("tendon_arm", 50, "x")),
+        *(
+            pytest.param(*each, marks=pytest.mark.large)
+            for each in (("lce", 10, "down"), ("lce", 5, "x"), ("lce", 20, "down"))
+        ),
+        pytest.param("tendon_arm", 50, "down", marks=pytest.mark.large),
+    ],
+)
+def test_what_is_torn_is_one_surface_of_the_stated_volume(name, grams, points):
+    found = reachable_set(loaded(name, grams, points), accuracy=0.05)
+    assert isinstance(found, ReachableSolid)
+    surface = found.surface()
+    edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    size = len(surface.vertices)
+    graph = coo_array((np.ones(len(unique)), tuple(unique.T)), shape=(size, size))
+    assert (count == 2).all()
+    assert connected_components(graph, directed=False)[0] <= 3
+    assert surface.volume == pytest.approx(found.volume, rel=0.01)
 
 
 def test_sheets_of_two_bundles_hang_together():
@@ -114,7 +121,9 @@ def test_sheets_of_two_bundles_hang_together():
     assert grid.lost_share == 0.0
 
 
-@pytest.mark.parametrize("name", ["end", "tool", "middle"])
+@pytest.mark.parametrize(
+    "name", ["tool", *(pytest.param(n, marks=pytest.mark.large) for n in ("end", "middle"))]
+)
 def test_the_set_of_a_marker_holds_its_places(name):
     arm = loaded("lce", 10)
     markers = (

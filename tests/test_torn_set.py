@@ -192,7 +192,7 @@ def test_places_of_sheets_that_do_not_meet_count_once(cusp):
 
 
 def test_sheets_of_two_bundles_have_the_area_of_all(cusp):
-    surface = reachable_set(Cusp(bounds=Cusp().bounds[:2]))
+    surface = reachable_set(Cusp(bounds=Cusp().bounds[:2]), accuracy=0.02)
     assert isinstance(surface, ReachableSurface)
     assert surface.area == pytest.approx(cusp_area(1.0), abs=surface.area_error + 0.01)
     assert surface.area_error < 0.05 * surface.area

@@ -24,7 +24,7 @@ COMMANDS = {
     "maps": "reach minimal_trunk --accuracy 3e-4 --out reach.stl --out reach.png",
     "sweeps": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000",
     "searches": f"search {EXAMPLES / 'five_places.toml'}",
-    "compiles": "warmup --no-loads",
+    "compiles": "warmup --only free",
     "serves": "studio minimal_trunk --no-open",
 }
 OFTEN = "writes", "compiles", "serves"

@@ -4,33 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from softreach.cli.console import console
 
 
-def warmup(
-    *,
-    loads: Annotated[bool, Parameter(negative="--no-loads")] = True,
-) -> int:
+def warmup(*, only: str | None = None) -> int:
     """Compile all kernels now, so that no later command has to.
 
     They are kept in a cache on disk; if it has them already, this takes seconds.
     Exits with 1 if they cannot be kept.
 
-    Example: softreach warmup --no-loads
+    Example: softreach warmup --only free
 
     Args:
-        loads: Also what arms under loads need, for half a minute more.
+        only: free for what arms without loads need, loaded for the rest; both if left out.
     """
     from softreach.kernels.compiler import not_kept
+    from softreach.support.arguments import as_one_of
     from softreach.support.errors import no_warnings
     from softreach.support.progress import bar
 
+    if only is not None:
+        as_one_of("only", only, [*_JOBS])
     with bar("compiling", None) as done, no_warnings():  # of clouds and grids too coarse
-        for _ in chain(_free(), _loaded() if loads else ()):
+        for _ in chain(*(jobs() for name, jobs in _JOBS.items() if only in (None, name))):
             if not_kept:
                 break
             done(1)
@@ -38,7 +35,7 @@ def warmup(
         reason = f"nothing could be kept: {not_kept[0]}"
         console.error(f"{reason}; set NUMBA_CACHE_DIR to a folder that can be written")
         return 1
-    console.line("all kernels are compiled" + ("" if loads else ", but for those of loads"))
+    console.line(f"all kernels{'' if only is None else f' of {only} arms'} are compiled")
     return 0
 
 
@@ -143,3 +140,6 @@ def _loaded() -> Iterator[object]:
         yield tip_jacobian(arm, [rest])
         yield configuration(arm, rest)
     yield equilibria(weight, pulled)
+
+
+_JOBS = {"free": _free, "loaded": _loaded}

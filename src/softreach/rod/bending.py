@@ -104,21 +104,23 @@ def worst_inputs(
     mixed = np.where(rng.random(faces.shape) < 0.5, faces, inside[: len(faces)])
     every = np.concatenate([inside, some_corners(rod), mixed])
     values = of(every)
-    best, around = [], max(samples // _AROUND, 8)
-    for column in range(values.shape[1]):
-        worst = np.argsort(-values[:, column], kind="stable")[: 4 if samples > _OF_BENDING else 2]
-        gamma, value, width = every[worst], values[worst, column], 0.25
-        row = np.arange(len(gamma))
-        for _ in range(_ROUNDS):
-            tried = box.clip(gamma + rng.normal(size=(around, *gamma.shape)) * width * box.widths)
-            found = of(tried.reshape(around * len(gamma), -1))[:, column].reshape(around, -1)
-            top = found.argmax(axis=0)
-            better = found[top, row] > value
-            gamma = np.where(better[:, None], tried[top, row], gamma)
-            value = np.where(better, found[top, row], value)
-            width *= _SHRINK
-        best.append((gamma[value.argmax()], value.max()))
-    return np.array([each for each, _ in best]), np.array([top for _, top in best])
+    around, columns = max(samples // _AROUND, 8), np.arange(values.shape[1])
+    starts = 4 if samples > _OF_BENDING else 2
+    worst = np.argsort(-values, axis=0, kind="stable")[:starts].T
+    gamma, value = every[worst], values[worst, columns[:, None]]
+    draws = rng.normal(size=(len(columns), _ROUNDS, around, *gamma.shape[1:]))
+    for k in range(_ROUNDS):
+        moved = gamma[:, None] + draws[:, k] * 0.25 * _SHRINK**k * box.widths
+        tried = box.clip(moved.reshape(-1, box.bundles)).reshape(moved.shape)
+        found = of(tried.reshape(-1, box.bundles)).reshape(*moved.shape[:3], -1)
+        found = found[columns, :, :, columns]  # each measure's own, (column, around, start)
+        top = found.argmax(axis=1)[:, None]
+        ahead = np.take_along_axis(found, top, axis=1)[:, 0]
+        place = np.take_along_axis(tried, top[..., None], axis=1)[:, 0]
+        gamma = np.where((ahead > value)[..., None], place, gamma)
+        value = np.maximum(value, ahead)
+    best = value.argmax(axis=1)
+    return gamma[columns, best], value[columns, best]
 
 
 def some_corners(rod: TipMap) -> Array:
