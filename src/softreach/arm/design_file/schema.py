@@ -35,6 +35,16 @@ _TEXT: _Schema = {"type": "string"}
 
 def json_schema() -> dict[str, Any]:
     """The JSON schema (draft 7) of design files of version 2."""
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "softreach design",
+        "description": "An arm: lengths in m, angles in degrees, the unit in every key.",
+        **_object(_top(), ["version", "profile", "rings", "actuators"]),
+        "$defs": _definitions(),
+    }
+
+
+def _definitions() -> dict[str, _Schema]:
     definitions = {
         "material": _table(Material, "Isotropic elastic material", without=("name",)),
         "inline_material": _table(Material, "Material where it is used"),
@@ -55,10 +65,14 @@ def json_schema() -> dict[str, Any]:
     definitions |= {
         name: _table(kind, kind.__doc__ or "", kind=name) for name, kind in kinds.items()
     }
+    return definitions
+
+
+def _top() -> dict[str, _Schema]:
     profile = _any_of(PROFILES, "own_profile", "Length and outer radius along the arm")
     actuator = _any_of(ACTUATORS, "own_actuator", "What drives the arm")
     unit = {"enum": [*UNITS], "description": "Unit of lengths; L is the arm's"}
-    top = {
+    return {
         "version": {"const": 2, "description": "Version of the format"},
         "profile": profile,
         "materials": _by_name(
@@ -83,13 +97,6 @@ def json_schema() -> dict[str, Any]:
             "description": "How the design is shown; it changes nothing about the arm",
             **_object({"unit": unit}, []),
         },
-    }
-    return {
-        "$schema": "http://json-schema.org/draft-07/schema#",
-        "title": "softreach design",
-        "description": "An arm: lengths in m, angles in degrees, the unit in every key.",
-        **_object(top, ["version", "profile", "rings", "actuators"]),
-        "$defs": definitions,
     }
 
 
