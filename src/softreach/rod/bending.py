@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
@@ -109,10 +110,11 @@ def worst_inputs(
     worst = np.argsort(-values, axis=0, kind="stable")[:starts].T
     gamma, value = every[worst], values[worst, columns[:, None]]
     draws = rng.normal(size=(len(columns), _ROUNDS, around, *gamma.shape[1:]))
+    shape = len(columns), around, gamma.shape[1]
     for k in range(_ROUNDS):
-        moved = gamma[:, None] + draws[:, k] * 0.25 * _SHRINK**k * box.widths
-        tried = box.clip(moved.reshape(-1, box.bundles)).reshape(moved.shape)
-        found = of(tried.reshape(-1, box.bundles)).reshape(*moved.shape[:3], -1)
+        moves = draws[:, k] * 0.25 * _SHRINK**k * box.widths
+        tried = box.clip(gamma[:, None] + moves)
+        found = of(tried.reshape(math.prod(shape), box.bundles)).reshape(*shape, -1)
         found = found[columns, :, :, columns]  # each measure's own, (column, around, start)
         top = found.argmax(axis=1)[:, None]
         ahead = np.take_along_axis(found, top, axis=1)[:, 0]
