@@ -65,6 +65,7 @@ def test_my_tendon_arm(installed, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == written
 
 
+@pytest.mark.large  # docs/requirements.md does the same
 def test_a_requirement_is_checked(installed, tmp_path):
     script = EXAMPLES / "requirement_check.py"
     text = printed_by(installed, tmp_path, sys.executable, script, EXAMPLES / "tendon_arm.toml")

@@ -118,7 +118,7 @@ def test_a_second_way_to_every_place_shows_as_its_distance():
 def test_minimal_and_redundant_trunk_differ_as_in_the_paper():
     found = {}
     for design in (designs.minimal_trunk, designs.redundant_trunk):
-        cloud = compute_cloud(design(), n=2_000_000, tol=1e-4)
+        cloud = compute_cloud(design(), n=1_000_000, tol=1e-4)
         distance = activation_distance(cloud, 1 / 60, queries=10_000)
         found[design] = redundancy_summary(cloud, distance)
     minimal, redundant = found.values()
