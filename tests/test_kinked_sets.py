@@ -125,6 +125,7 @@ def test_derivatives_of_a_set_with_dead_zones_are_those_of_the_arm_without():
     assert zone.volume[0] == pytest.approx(both, rel=1e-3)
 
 
+@pytest.mark.large
 def test_a_pretension_that_drives_use_up_adds_the_parts_between_the_kinks():
     # beyond |u| = offset / gain one tendon of the pair is slack: nine boxes without a kink inside
     whole = reachable_set(driven((-0.9, 0.9), offset=0.7))

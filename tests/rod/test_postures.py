@@ -161,6 +161,7 @@ def test_a_stable_equilibrium_is_listed_at_every_activation_of_a_tentacle(payloa
         assert TipStatus.STABLE in sr.equilibria(arm, gamma).status
 
 
+@pytest.mark.large
 def test_the_compliance_under_500_g_is_the_difference_of_tips():
     """To 1e-5 of itself, along eight segments."""
     arm, force, gamma = example("tentacle", 0.5), np.array([3e-3, -2e-3, 4e-3]), [[8.0, 2.0]]
