@@ -88,7 +88,7 @@ def started(storage, count):
 @pytest.mark.parametrize(
     ("name", "each"),
     [
-        ("search.journal", 18),
+        ("search.journal", 12),
         pytest.param("search.journal", 1, marks=pytest.mark.large),
         pytest.param("search.db", 10, marks=pytest.mark.large),
     ],
