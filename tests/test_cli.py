@@ -512,6 +512,7 @@ class TestRestInTheSummary:
         assert facts["sag_at_rest_m"] == known.sag
         assert facts["at_rest"] == "stable"
 
+    @pytest.mark.large
     def test_an_arm_that_cannot_stand_is_said_not_to_be_stable(self, capsys):
         assert self.facts(capsys, "lce_arm", "--payload", "50g")["at_rest"] == "not stable"
 

@@ -330,6 +330,7 @@ def test_with_four_bundles_the_measure_is_the_length_of_the_curve_of_solutions()
         assert found == pytest.approx(total / len(targets), rel=0.1)
 
 
+@pytest.mark.large
 def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
     cloud = compute_cloud(trunk, n=1 << 17, sampler="sobol")
     measure = solution_measure(cloud, cell=0.1).solution_measure

@@ -191,6 +191,7 @@ def test_places_of_sheets_that_do_not_meet_count_once(cusp):
     assert cusp.multiplicity[1] > 0.95 * cusp.volume
 
 
+@pytest.mark.large
 def test_sheets_of_two_bundles_have_the_area_of_all(cusp):
     surface = reachable_set(Cusp(bounds=Cusp().bounds[:2]), accuracy=0.02)
     assert isinstance(surface, ReachableSurface)

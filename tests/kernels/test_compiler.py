@@ -143,6 +143,7 @@ print(*(float(x).hex() for x in sr.tip_positions(arm, gamma).ravel()))
 """
 
 
+@pytest.mark.large
 def test_without_a_private_class_of_numba_kernels_are_compiled_plainly(tmp_path):
     script = [sys.executable, "-c", WITHOUT]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
