@@ -64,6 +64,7 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
     assert sum(best.multiplicity.values()) == pytest.approx(best.volume)
 
 
+@pytest.mark.large
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2

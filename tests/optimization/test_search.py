@@ -105,6 +105,7 @@ def test_a_search_that_was_killed_ends_as_if_it_had_not_been(name, each, tmp_pat
     assert (search.finalists, search.designs) == (alone.finalists, alone.designs)
 
 
+@pytest.mark.large
 def test_searches_of_other_seeds_share_a_storage_and_each_ends_with_the_best_of_all(tmp_path):
     few = dict(designs=6, polish=False, storage=tmp_path / "search.journal")
     alone = heavy(designs=6, polish=False)

@@ -132,6 +132,7 @@ def test_it_says_what_costs_most_and_can_be_passed_on():
     assert data.sizes["number"] == 4
 
 
+@pytest.mark.large
 def test_arms_that_cannot_exist_are_counted():
     ratio = changed(NARROW, {"rings[0].inner_ratio": 0.995})
     result = tolerance(ratio, {"rings[0].inner_ratio": 0.01}, samples=100, checked=4, accuracy=0.2)
