@@ -14,7 +14,7 @@ import softreach as sr
 from softreach.arm import Loads, Manipulator, designs
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Held
-from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace import ReachableSolid, ReachableSurface, reachable_set
 from softreach.workspace.lifted_grid import LiftedGrid
 from softreach.workspace.reach import rasterized_set
 
@@ -139,3 +139,18 @@ def test_the_set_of_a_marker_holds_its_places(name):
     assert found.distance(places).max() < found.image.lattice.cell
     if name == "end":
         assert found.volume == pytest.approx(reachable_set(arm, accuracy=0.05).volume, rel=1e-6)
+
+
+def test_the_area_of_sheets_is_that_of_finer_grids_to_its_error():
+    arm = loaded("lce", 30, "up")
+    two = arm.with_bounds(
+        [*arm.bounds[:2], (-1.5, -1.5)]
+    )  # between forks, which grids meet by luck
+    found = reachable_set(two)
+    assert isinstance(found, ReachableSurface)
+    assert found.area_error < 0.1 * found.area
+    grid = LiftedGrid.of(tip_map(two), 192)
+    corners = grid.tips[grid.cells]
+    sides = np.diff(corners[:, [[0, 1], [0, 3], [0, 2]]], axis=2)[:, :, 0]
+    areas = [np.linalg.norm(np.cross(sides[:, k], sides[:, k + 1]), axis=1) for k in (0, 1)]
+    assert abs(np.sum(areas) / 2.0 - found.area) < found.area_error

@@ -19,7 +19,6 @@ from softreach.workspace.lifted_grid import LiftedGrid
 from softreach.workspace.measure import Estimate
 
 _CELLS = {1: 1024, 2: 128}  # of the grids of a curve and of a surface, for distances and pictures
-_KINKED_SHARE = 3.0  # of what is removed where the error is O(1/n)
 _NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
 
 
@@ -149,14 +148,14 @@ def _measure(rod: TipMap, grid: LiftedGrid) -> Estimate:
     """Length or area of the image, by Gauss nodes where it is one smooth sheet.
 
     Else it is that of cells, as chords or triangles. What these err by, O(1/n²), is removed. Where
-    the map has kinks, or sheets end, it is O(1/n): three times what is removed is stated.
+    the map has kinks, or sheets end, it is O(1/n): the largest change by a finer grid is stated.
     """
     if rod.is_smooth and not grid.is_torn and np.isfinite(smooth := by_nodes(rod)).all():
         return smooth
     fine, times = _size(grid), (2, 3) if grid.is_torn else (2,)
-    changes = [(fine - _size(grid.coarser(rod, k))) / (k - 1) for k in times]
-    removed = max(changes, key=abs) / 3.0
-    return Estimate(fine + removed, _KINKED_SHARE * abs(removed))
+    changes = [fine - _size(grid.coarser(rod, k)) for k in times]
+    removed = max((c / (k - 1) for k, c in zip(times, changes, strict=True)), key=abs) / 3.0
+    return Estimate(fine + removed, max(map(abs, changes)))
 
 
 def _size(grid: LiftedGrid) -> float:
