@@ -174,15 +174,16 @@ def _of_three(
 ) -> ReachableSolid:
     most = np.cbrt(_MOST_VERTICES) - 1.0
     cells = max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
+    before: _Grid | None = None
     while True:
         grid = _Grid.of(rod, cells, progress)
         fine = grid.image(grid.lattice(cell, accuracy), progress)
         if rod.is_smooth and not rod.supports_unstable and grid.is_one_to_one(fine):
             return _by_faces(rod, grid, fine)
-        solid = _by_raster(rod, grid, fine, accuracy)
+        solid = _by_raster(rod, grid, fine, accuracy, before)
         if not is_worthwhile(solid, accuracy):
             return solid
-        cells *= 2
+        cells, before = 2 * cells, grid
 
 
 def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
@@ -206,9 +207,21 @@ def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
     )
 
 
-def _by_raster(rod: TipMap, grid: _Grid, fine: Image, accuracy: float) -> ReachableSolid:
-    """The solid of any image; without the integral over the box where it has several sheets."""
-    coarse = grid.coarser(rod).image(fine.lattice)
+def _by_raster(
+    rod: TipMap, grid: _Grid, fine: Image, accuracy: float, before: _Grid | None = None
+) -> ReachableSolid:
+    """The solid of any image; without the integral over the box where it has several sheets.
+
+    Args:
+        rod: The tip map.
+        grid: The grid.
+        fine: Its image.
+        accuracy: Relative error allowed.
+        before: The grid of half as many cells, if it is known.
+    """
+    if before is None or not grid.lifted.is_torn:
+        before = grid.coarser(rod)
+    coarse = before.image(fine.lattice)
     volume, convex = measure.Estimate(np.nan, np.nan), measure.convex_volume(fine, coarse)
     if not grid.lifted.is_torn:
         volume = measure.solid_volume(rod, fine, coarse, accuracy)
