@@ -10,11 +10,12 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.activation_box import ActivationBox, damped_steps
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import ReachableSolid, reachable_set
 from softreach.workspace.redundant import smallest_memory
+from softreach.workspace.wrap import damped_steps
 
 
 def family(revolution: float, extent: float, offset: float, bundles: int) -> FiberArchitecture:

@@ -14,14 +14,13 @@ from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots
 from softreach.kernels.box.box_newton import box_steps
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.search import Nearest
 
 Evaluate = Callable[[Index, Array], tuple[Array, Array]]
 """(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
 
-_FEW = BLOCK // 8
 _MOST_NEWTON_STEPS = 80
 _DIFFERENCE = 1e-6  # step of the differences of gradients, in ranges
 _STEP_TOL = 1e-10  # step at which a search has converged, in ranges
@@ -85,7 +84,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
             direction_weight=part.direction_weight,
         )
         gamma[rows] = minimize(lagrangian, gamma[rows], rod.box)[0]
-        error = (linearized(rod, gamma[rows])[0] - part.targets) / rod.length
+        error = (rod.tips_and_slopes(gamma[rows])[0] - part.targets) / rod.length
         multiplier[rows] += penalty * error  # theory (40)
         residual[rows] = np.linalg.norm(error, axis=1) * rod.length
     ends = descend(rod, request.targets, gamma, request.residual)
@@ -94,7 +93,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
 
 def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:
     """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
-    slopes = linearized(rod, gamma)[1] / rod.length
+    slopes = rod.tips_and_slopes(gamma)[1] / rod.length
     slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
     inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
     return -np.einsum("nij,nj->ni", inverse, gamma - request.near)
@@ -177,18 +176,6 @@ class Objective:
         turn = np.cross(motions.directions, wanted)
         gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
         return value, gradient
-
-
-def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
-    """Tips [m] and ∂r/∂γ [m] as `TipMap.tips_and_slopes`, for the steps of a search.
-
-    Their activations are arrays already: few of a rod without loads go past checks and threads.
-    """
-    if rod.supports_unstable or len(gamma) > _FEW:
-        return rod.tips_and_slopes(gamma)
-    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, gamma.shape[1]))
-    rod.fill(np.ascontiguousarray(gamma), tips, slopes)
-    return tips, slopes
 
 
 class _Expansion(NamedTuple):

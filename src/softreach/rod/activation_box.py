@@ -1,4 +1,4 @@
-"""The activation box: bounds of the bundles, its map from the unit cube, and steps within it."""
+"""The activation box: bounds of the bundles, and its map from the unit cube."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.kernels.box.box_projection import project
 from softreach.support.arrays import as_rows, labeled, read_only
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
@@ -162,25 +161,3 @@ class ActivationBox:
         """All corners, shape (2^bundles, bundles), the last bundle varying fastest."""
         upper = np.indices((2,) * self.bundles).reshape(self.bundles, 2**self.bundles).T
         return np.where(upper, self.high, self.low)
-
-
-def damped_steps(
-    box: ActivationBox, gamma: Array, miss: Array, slopes: Array, damping: Array
-) -> tuple[Array, Array]:
-    """Minimize |miss + J d|² + μ |d|² inside the bounds, with d measured in ranges (Levenberg).
-
-    Args:
-        box: The bounds.
-        gamma: Beginnings of the steps, inside the bounds [-], shape (n, m).
-        miss: Tips minus targets, in any unit, shape (n, 3).
-        slopes: ∂r/∂γ in that unit, shape (n, 3, m).
-        damping: μ > 0, the square of that unit, shape (n,).
-
-    Returns:
-        Ends of the steps, never outside the bounds, and the |miss + J d| that is left, shape (n,).
-    """
-    step, multiplier = np.empty_like(gamma), np.zeros((len(gamma), 3))
-    low, high = (box.low - gamma) / box.scales, (box.high - gamma) / box.scales
-    project(np.zeros_like(gamma), slopes * box.scales, -miss, damping, low, high, step, multiplier)
-    # Where the step is the least, miss + J d is μ times the multiplier.
-    return box.clip(gamma + step * box.scales), damping * np.linalg.norm(multiplier, axis=1)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from softreach.geometry.surface import Surface, corner_areas, level_set
-from softreach.rod.activation_box import damped_steps
+from softreach.kernels.box.box_projection import project
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
@@ -149,3 +150,25 @@ def wrapped(flood: Flood) -> Wrap:
         gamma=gamma,
         tight_volume=Surface(vertices=tips, faces=faces).volume,
     )
+
+
+def damped_steps(
+    box: ActivationBox, gamma: Array, miss: Array, slopes: Array, damping: Array
+) -> tuple[Array, Array]:
+    """Minimize |miss + J d|² + μ |d|² inside the bounds, with d measured in ranges (Levenberg).
+
+    Args:
+        box: The bounds.
+        gamma: Beginnings of the steps, inside the bounds [-], shape (n, m).
+        miss: Tips minus targets, in any unit, shape (n, 3).
+        slopes: ∂r/∂γ in that unit, shape (n, 3, m).
+        damping: μ > 0, the square of that unit, shape (n,).
+
+    Returns:
+        Ends of the steps, never outside the bounds, and the |miss + J d| that is left, shape (n,).
+    """
+    step, multiplier = np.empty_like(gamma), np.zeros((len(gamma), 3))
+    low, high = (box.low - gamma) / box.scales, (box.high - gamma) / box.scales
+    project(np.zeros_like(gamma), slopes * box.scales, -miss, damping, low, high, step, multiplier)
+    # Where the step is the least, miss + J d is μ times the multiplier.
+    return box.clip(gamma + step * box.scales), damping * np.linalg.norm(multiplier, axis=1)

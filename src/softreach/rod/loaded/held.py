@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from softreach.kernels.lanes import LANES
 from softreach.rod.loaded.flood import Flood, are_same, smooth_edges
 from softreach.rod.loaded.following import follow
-from softreach.rod.loaded.postures import FloodedPostures, Postures
-from softreach.rod.loaded.shooting import Equilibria, Shots, turn_between
+from softreach.rod.loaded.postures import FloodedPostures, Postures, polished
+from softreach.rod.loaded.shooting import Equilibria, Shots
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.tip_map import BLOCK, Held, TipStatus
 from softreach.support import parallel
@@ -218,10 +218,8 @@ class _Grid:
             branch = follow(twin, begin, end, start.of(some), slopes[some], shortest=_END)
             shots, share[some] = branch.shots, branch.share
             arrived = np.flatnonzero(shots.is_found)
-            polished = self.solver.careful(end[arrived], shots.frame[arrived])
-            good = polished.is_found & (polished.margin > 0.0)
-            good &= turn_between(polished.frame, shots.frame[arrived]) < _POLISHED
-            shots.put(arrived[good], polished.of(good))
+            of_arm = polished(self.solver, end[arrived], shots.of(arrived), _POLISHED)
+            shots.put(arrived[of_arm.is_found], of_arm.of(of_arm.is_found))
             out.put(some, shots)
 
         size = max(8 * LANES, len(state) // 4)

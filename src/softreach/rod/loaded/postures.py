@@ -150,11 +150,8 @@ class Postures:
         self, gamma: Array, rows: NDArray[np.intp], followed: Followed, equilibria: Equilibria
     ) -> None:
         """Put down the postures of the arm beside those of its twin."""
-        on_twin = followed.shots
-        shots = self.solver.careful(gamma[rows], on_twin.frame)
-        good = on_twin.is_found & shots.is_found & (shots.margin > 0.0)
-        good &= turn_between(shots.frame, on_twin.frame) < _POLISHED
-        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
+        shots = polished(self.solver, gamma[rows], followed.shots, _POLISHED)
+        self.solver.put(gamma, rows, shots, equilibria)
 
     def _unstable(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
         """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
@@ -203,6 +200,13 @@ class Postures:
             return self
         flood = Flood.over(self.twin, self.box, sizes, self.rest_activation[0], self.rest)
         return FloodedPostures(self.solver, self.box, self.side, flood=flood)
+
+
+def polished(solver: Solver, gamma: Array, on_twin: Shots, within: float) -> Shots:
+    """Stable equilibria of an arm beside those of its twin; found where they are so near [rad]."""
+    shots = solver.careful(gamma, on_twin.frame)
+    good = on_twin.is_found & shots.is_found & (shots.margin > 0.0)
+    return shots._replace(is_found=good & (turn_between(shots.frame, on_twin.frame) < within))
 
 
 @dataclass(frozen=True, eq=False)
