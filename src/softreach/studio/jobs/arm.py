@@ -32,7 +32,7 @@ def _draw_arm(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]
     if found.held is not None:
         design, dragged = found.held
         if design == state.design and dragged.activation == state.activation:
-            rod = dragged.rod  # in its posture
+            rod = dragged.tip_map  # in its posture
     tip = page.scene.draw_arm(state.design, state.activation, rod=rod)
     known = {"tip": tip if np.isfinite(tip).all() else None, "pointing": page.scene.pointing}
     if not rod.supports_unstable:
