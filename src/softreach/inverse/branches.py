@@ -13,8 +13,8 @@
 5. Damped Newton with the exact Jacobian leads from each start to a root
    (`kernels.branches.newton`).
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
-   opposite, along the null direction of the Jacobian (`newton.second_preimages`), and is searched as
-   well.
+   opposite, along the null direction of the Jacobian (`newton.second_preimages`), and is searched
+   as well.
 7. Roots between which the tip hardly leaves the target are one.
 8. A root beyond a bound is one on the bound if the tip misses no more there than the error of the
    map leaves open.
