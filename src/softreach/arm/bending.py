@@ -120,7 +120,7 @@ def _reached(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array, tuple
     mean, half = 0.5 * (low + high), 0.5 * (high - low)
     plane, rates = table.curvature[:, :2] @ inputs, table.extension @ inputs
     center, halves = plane @ mean, np.swapaxes(plane * half, 1, 2)
-    if table.growth is table.extension:
+    if not table.has_forces:
         vertices = _vertices(center, halves)
         return center, halves, (vertices, np.roll(vertices, -1, axis=1))
     moving = np.flatnonzero(half)

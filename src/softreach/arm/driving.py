@@ -97,7 +97,7 @@ class Driving:
             return False
         if not self.has_length_tendons:
             return True
-        if self.arm.loads is not None or law.has_growth:
+        if self.arm.loads is not None or law.changes_rest_length:
             return False
         low, high = self.driven.input_bounds.T
         tensions = law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))

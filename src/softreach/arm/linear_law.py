@@ -53,7 +53,7 @@ def pull_error(arm: Manipulator) -> float:
     shares = np.rint(2.0 * np.random.default_rng(0).random((_SAMPLES, arm.inputs))) / 2.0
     low, high = arm.input_bounds.T
     gamma = Driving(arm).activations(np.unique(low + shares * (high - low), axis=0))
-    zeta, eta = 1.0 + gamma @ table.extension.T, 1.0 + gamma @ table.growth.T
+    zeta, eta = 1.0 + gamma @ table.extension.T, 1.0 + gamma @ table.rest_length_factor.T
 
     def moments(omega: Array, zeta: Array) -> Array:
         one, two, three = (omega[..., k, None] for k in range(3))

@@ -42,7 +42,7 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     gamma, body = Driving(arm).activations(gamma), body_of(arm)
     table = tables(body, quadrature(body)[0])
     zeta = 1.0 + gamma @ table.extension.T
-    eta = zeta if table.growth is table.extension else 1.0 + gamma @ table.growth.T
+    eta = 1.0 + gamma @ table.rest_length_factor.T if table.has_forces else zeta
     turn = eta[..., None] * np.einsum("nb,scb->nsc", gamma, table.curvature)
 
     return lengths_of_strains(arm, turn, zeta)

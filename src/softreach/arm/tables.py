@@ -53,9 +53,14 @@ class Tables:
     """z = dζ/dγ [-], shape (station, bundle)."""
     curvature: Array
     """U = du/dγ [1/m], per length of η, in the directors, shape (station, 3, bundle)."""
-    growth: Array
+    rest_length_factor: Array
     """dη/dγ [-]: z of bundles that change the length of matter at rest, 0 of those that are forces;
     shape (station, bundle). Of fibers and muscles alone it is `extension` itself."""
+
+    @property
+    def has_forces(self) -> bool:
+        """True if some bundles are forces, so that η is not ζ."""
+        return self.rest_length_factor is not self.extension
 
 
 def tables(arm: Body, stations: ArrayLike) -> Tables:
@@ -81,8 +86,8 @@ def tables(arm: Body, stations: ArrayLike) -> Tables:
         if isinstance(actuator, RestStrains):
             curvature[..., k] = actuator.curvature(arm.profile, z)
     is_force = [actuator.is_force for actuator in arm.bundle_actuators]
-    growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
-    return Tables(z, extension, curvature, growth)
+    resting = np.where(is_force, 0.0, extension) if any(is_force) else extension
+    return Tables(z, extension, curvature, resting)
 
 
 def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
@@ -141,7 +146,10 @@ def check_extension(arm: Body) -> None:
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
-    for rates, of in ((table.extension, ""), (table.growth, " of matter itself, without forces")):
+    for rates, of in (
+        (table.extension, ""),
+        (table.rest_length_factor, " of matter itself, without forces"),
+    ):
         smallest, _ = range_of_extension(arm, rates)
         if smallest <= 0:
             allowed = (
@@ -196,7 +204,7 @@ def jumps(arm: Body) -> tuple[float, ...]:
     sides = np.concatenate([breaks, np.nextafter(breaks, 0.0)])
     table, stiffness = tables(arm, sides), arm.stiffness_at(sides)
     jumping = np.zeros(len(breaks), bool)
-    for values in (table.extension, table.growth, table.curvature, *stiffness):
+    for values in (table.extension, table.rest_length_factor, table.curvature, *stiffness):
         after, before = np.reshape(values, (2, len(breaks), -1))
         largest = np.abs(values).max(initial=0.0)
         jumping |= (np.abs(after - before) > _JUMP * largest).any(axis=1)

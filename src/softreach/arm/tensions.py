@@ -68,7 +68,7 @@ class LengthLaw:
         return [tendon for tendon in each if isinstance(tendon, LengthTendon)]
 
     @property
-    def has_growth(self) -> bool:
+    def changes_rest_length(self) -> bool:
         """True if bundles change the length of matter, so that s is not linear in γ."""
         return len(self._growing) > 0
 
@@ -103,8 +103,8 @@ class LengthLaw:
         table = tables(self.arm, z)
         bent = np.einsum("sct,scb->stb", moment, table.curvature)
         axial = np.einsum("st,sb->tb", force, table.extension)
-        growth = table.growth[:, self._growing]
-        return axial + bent.sum(axis=0), np.einsum("stb,sg->tbg", bent, growth)
+        eta = table.rest_length_factor[:, self._growing]
+        return axial + bent.sum(axis=0), np.einsum("stb,sg->tbg", bent, eta)
 
     def shortening(self, inner: Array) -> Array:
         """s of the path of each tendon [m] at activations with tensions, shape (n, tendon)."""

@@ -68,7 +68,7 @@ def _add(factor, a, out):
 
 
 @inline
-def _rates_of_places(growth, stretch, thrust, d3, force, work):
+def _rates_of_places(rest_length, stretch, thrust, d3, force, work):
     """Write ρ' = (η/K0 d3 (d3 × n)ᵀ - ζ d3 ×) θ into `work`, shape (3, 3)."""
     _skew(d3, work)
     across = (
@@ -78,18 +78,20 @@ def _rates_of_places(growth, stretch, thrust, d3, force, work):
     )
     for a in range(3):
         for b in range(3):
-            work[a, b] = growth * thrust * d3[a] * across[b] - stretch * work[a, b]
+            work[a, b] = rest_length * thrust * d3[a] * across[b] - stretch * work[a, b]
 
 
 @inline
-def _sources(growth, stretch, thrust, d, force, turning, pushing, yielding, hat, climb, source):
+def _sources(
+    rest_length, stretch, thrust, d, force, turning, pushing, yielding, hat, climb, source
+):
     """Write what the tables alone change: of ρ' into `climb`, of θ' and μ' into `source`."""
     columns = pushing.shape[0]
     climb[:] = 0.0
     source[:] = 0.0
     for c in range(columns):
         pull = yielding[0, c] * d[2, 0] + yielding[1, c] * d[2, 1] + yielding[2, c] * d[2, 2]
-        grown = pushing[c] + growth * thrust * pull
+        grown = pushing[c] + rest_length * thrust * pull
         for a in range(3):
             climb[a, 3 + c] = d[2, a] * grown
     _product(1.0, d.T, turning, source[:3, 3:])
@@ -100,13 +102,13 @@ def _sources(growth, stretch, thrust, d, force, turning, pushing, yielding, hat,
 
 
 @inline
-def _law(growth, resistance, d, moment, force, rise, hat, local):
+def _law(rest_length, resistance, d, moment, force, rise, hat, local):
     """Write the law of θ' and μ' by θ and μ into `local`, shape (6, 6)."""
     local[:] = 0.0
     for a in range(3):
         for b in range(3):
             for e in range(3):
-                local[a, 3 + b] += growth * d[e, a] * resistance[e] * d[e, b]
+                local[a, 3 + b] += rest_length * d[e, a] * resistance[e] * d[e, b]
     _skew(moment, hat)
     _product(1.0, local[:3, 3:], hat, local[:3, :3])
     _skew(force, hat)
@@ -222,7 +224,7 @@ def _moment_at_base(state, lever, weight, tipping, excess, unknown):
 
 @kernel
 def respond(
-    growth,
+    rest_length,
     stretch,
     resistance,
     thrust,
@@ -244,7 +246,7 @@ def respond(
     """Movements of one rod at boundaries of its steps, and works along it, for all columns.
 
     Args:
-        growth: η dZ of the nodes [m], shape (step, 3).
+        rest_length: η dZ of the nodes [m], shape (step, 3).
         stretch: ζ dZ [m], likewise.
         resistance: 1/K1, 1/K1, 1/K3 [1/(N m²)], shape (step, 3, 3); zero without loads.
         thrust: 1/K0 [1/N], shape (step, 3).
@@ -263,7 +265,7 @@ def respond(
         turns: Result, θ, likewise.
         works: Result, shape (work, column).
     """
-    steps, columns = growth.shape[0], turning.shape[3]
+    steps, columns = rest_length.shape[0], turning.shape[3]
     every = columns + 3
     loaded = thrust.max() > 0.0
     state, place = np.zeros((6, every)), np.zeros((3, every))  # θ and μ, ρ
@@ -278,10 +280,10 @@ def respond(
     for k in range(steps):
         for i in range(3):
             d, n, s = directors[k, i], force[k, i], stretch[k, i]
-            _rates_of_places(growth[k, i], s, thrust[k, i], d[2], n, rise[i])
+            _rates_of_places(rest_length[k, i], s, thrust[k, i], d[2], n, rise[i])
             source = rates[6 * i : 6 * i + 6]
             _sources(
-                growth[k, i],
+                rest_length[k, i],
                 s,
                 thrust[k, i],
                 d,
@@ -293,7 +295,7 @@ def respond(
                 climb[i],
                 source,
             )
-            _law(growth[k, i], resistance[k, i], d, moment[k, i], n, rise[i], hat, local[i])
+            _law(rest_length[k, i], resistance[k, i], d, moment[k, i], n, rise[i], hat, local[i])
         if loaded:
             _collocate(local, state, system, rates)
         for i in range(3):
