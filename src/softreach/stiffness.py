@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
@@ -16,7 +16,7 @@ from softreach.rod.rods import of_tip, tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
-from softreach.support.arrays import as_directions, as_floats
+from softreach.support.arrays import Array, as_directions, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ __all__ = [
     "stiffness_along",
     "tip_compliance",
 ]
-
-Array = NDArray[np.float64]
 
 
 def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:

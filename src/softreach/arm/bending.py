@@ -14,11 +14,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
+from softreach.support.arrays import Array, Mask
 
 __all__ = [
     "Extreme",
@@ -29,8 +30,6 @@ __all__ = [
     "sharpest_bending",
     "smallest_bending",
 ]
-
-Array = NDArray[np.float64]
 
 _STATIONS = 101
 _PER_TURN = 24  # stations for each turn of one bundle relative to another
@@ -145,7 +144,7 @@ def _vertices(center: Array, halves: Array) -> Array:
     return center[:, None] + np.concatenate([side, -side], axis=1)
 
 
-def _holds_origin(center: Array, halves: Array) -> NDArray[np.bool_]:
+def _holds_origin(center: Array, halves: Array) -> Mask:
     """Zonogons that hold the origin: no line along an edge or across the center separates them.
 
     The last is what remains to be asked where all edges are parallel or of no length.

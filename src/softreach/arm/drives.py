@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.number import MOST, Number, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import as_given, plain
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidInput, Range
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from softreach.arm.section import Section
 
 __all__ = ["BundleNumbers", "Drive", "drive_faults"]
-
-Array = NDArray[np.float64]
 
 _FINITE = Range(-MOST, MOST)
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import quadrature, tables
 from softreach.support.arguments import as_number
-from softreach.support.arrays import as_rows
+from softreach.support.arrays import Array, as_rows
 from softreach.support.errors import Range
 
 __all__ = ["lengths_of_strains", "limit_shortening", "line_lengths", "line_strains", "places"]
-
-Array = NDArray[np.float64]
 
 _STEP = 1e-5  # of a piece, for derivatives along the arm
 _HALVINGS = 52

@@ -8,7 +8,7 @@ from os import PathLike
 from typing import Any, Self, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
@@ -30,7 +30,7 @@ from softreach.support.arguments import (
     as_text,
     plain,
 )
-from softreach.support.arrays import read_only
+from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.text import write_text
 from softreach.support.lazy import lazy
@@ -39,8 +39,6 @@ from softreach.support.units import UNITS, LengthUnit, as_unit, handy_unit
 Made = TypeVar("Made")
 
 __all__ = ["Manipulator", "a_manipulator"]
-
-Array = NDArray[np.float64]
 
 _NAMES = 6  # of bundles that `repr` lists
 

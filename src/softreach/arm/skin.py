@@ -19,6 +19,7 @@ from softreach.arm.stations import Marker
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
 
@@ -36,8 +37,6 @@ __all__ = [
     "inside",
     "marker_points",
 ]
-
-Array = NDArray[np.float64]
 
 _LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
@@ -305,7 +304,7 @@ def _skins(arm: Body, line: Centerline, sector: Callable[[_Span], Surface]) -> l
     ]
 
 
-def _spans(arm: Body, line: Centerline, acts: NDArray[np.bool_]) -> Iterator[Iterator[_Span]]:
+def _spans(arm: Body, line: Centerline, acts: Mask) -> Iterator[Iterator[_Span]]:
     """The spans of each bundle; `acts` tells of each piece between stations."""
     outline, radius = arm.outline(line.z), arm.profile.radius(line.z)
 
@@ -325,7 +324,7 @@ def _spans(arm: Body, line: Centerline, acts: NDArray[np.bool_]) -> Iterator[Ite
     yield from (of(k) for k in range(arm.bundles))
 
 
-def _runs(acts: NDArray[np.bool_]) -> list[slice]:
+def _runs(acts: Mask) -> list[slice]:
     """Stations from the start to the end of each run of pieces that act."""
     change = np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))
     pairs = zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True)

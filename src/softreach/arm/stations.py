@@ -131,12 +131,10 @@ class Span(Located):
     """
 
     start_over_length: float = number(
-        "Z0/L", "", "where it begins", low=0.0, high=1.0, open_high=True, default=0.0
+        "Z0/L", "", "where it begins", low=0.0, below=1.0, default=0.0
     )
     """Z0/L, where along the arm it begins [-]."""
-    end_over_length: float = number(
-        "Z1/L", "", "where it ends", low=0.0, high=1.0, open_low=True, default=1.0
-    )
+    end_over_length: float = number("Z1/L", "", "where it ends", above=0.0, high=1.0, default=1.0)
     """Z1/L, where it ends [-]."""
     start: float | str | None = number(
         "Z0",
@@ -152,8 +150,7 @@ class Span(Located):
         "Z1",
         "m",
         "where it ends",
-        low=0.0,
-        open_low=True,
+        above=0.0,
         named=True,
         instead_of="end_over_length",
         default=None,

@@ -14,12 +14,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.body import Body, RestStrains
 from softreach.arm.number import fields_of
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [
@@ -34,8 +35,6 @@ __all__ = [
     "strain_stations",
     "tables",
 ]
-
-Array = NDArray[np.float64]
 
 _STATIONS = 101
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)

@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import LengthTendon
 from softreach.arm.body import Body, RestStrains
 from softreach.arm.tables import quadrature, tables
+from softreach.support.arrays import Array, Mask
 from softreach.support.lazy import lazy
 
 __all__ = ["LengthLaw", "Tensions"]
-
-Array = NDArray[np.float64]
 
 
 class Tensions(NamedTuple):
@@ -31,7 +30,7 @@ class Tensions(NamedTuple):
 
     tension: Array
     """τ >= 0 [N], shape (n, tendon)."""
-    is_taut: NDArray[np.bool_]
+    is_taut: Mask
     """Tendons whose tension follows the displacements, shape (n, tendon)."""
 
 
@@ -175,7 +174,7 @@ class LengthLaw:
         inner[:, self.columns] = tension
         return inner
 
-    def slopes(self, inner: Array, is_taut: NDArray[np.bool_], of_strains: Array) -> Array:
+    def slopes(self, inner: Array, is_taut: Mask, of_strains: Array) -> Array:
         """∂(activations with tensions)/∂(activations with displacements), on the taut tendons.
 
         Args:

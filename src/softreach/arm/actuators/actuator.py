@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.along import AlongArm
 from softreach.arm.number import MOST, Number, as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import Fault, InvalidDesign, Range
 
 __all__ = [
@@ -28,8 +29,6 @@ __all__ = [
     "Resultants",
     "bounds_faults",
 ]
-
-Array = NDArray[np.float64]
 Bounds = tuple[float, float] | tuple[tuple[float, float], ...]
 
 MOST_TURN = 200 * math.pi
@@ -69,7 +68,7 @@ class Outline:
     """Outer radius of each bundle over R2 [-], shape (station, bundle)."""
     shape: tuple[str, ...]
     """"sector" of a ring, "line" along the arm, or round "lumen", for each bundle."""
-    acts: NDArray[np.bool_]
+    acts: Mask
     """Stations at which each bundle acts, shape (station, bundle)."""
 
     @property
@@ -209,7 +208,7 @@ class Actuator(Span, ABC):
         """Stations inside (0, L) where its load jumps or is not smooth [m]."""
         return tuple(z for z in self.span(profile.length) if 0.0 < z < profile.length)
 
-    def acts(self, profile: Profile, z: Array) -> NDArray[np.bool_]:
+    def acts(self, profile: Profile, z: Array) -> Mask:
         """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
 
         Returns:

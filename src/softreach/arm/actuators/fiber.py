@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.actuators.ring_integrals import RingIntegrals
@@ -20,10 +20,9 @@ from softreach.arm.along import AlongArm, Pieces
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
+from softreach.support.arrays import Array
 
 __all__ = ["FiberArchitecture", "ObliqueMuscle", "RadialMuscle", "helical_rotation"]
-
-Array = NDArray[np.float64]
 
 # Enough for machine precision between two samples of an angle.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -54,10 +53,8 @@ class FiberArchitecture(SectorActuator):
         "α",
         "rad",
         "helical angle at the outer radius",
-        low=-math.pi / 2,
-        high=math.pi / 2,
-        open_low=True,
-        open_high=True,
+        above=-math.pi / 2,
+        below=math.pi / 2,
         along=AlongArm,
         instead_of="revolution",
         hint=" (0 for a longitudinal fiber)",
@@ -172,13 +169,7 @@ class ObliqueMuscle(SectorActuator):
     )
 
     helical_angle: float = number(
-        "α",
-        "rad",
-        "angle of its fibers",
-        low=-math.pi / 2,
-        high=math.pi / 2,
-        open_low=True,
-        open_high=True,
+        "α", "rad", "angle of its fibers", above=-math.pi / 2, below=math.pi / 2
     )
     """α of its fibers from the axis, at the outer radius of the ring [rad]; 0 is longitudinal."""
 

@@ -10,18 +10,16 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.actuators.actuator import MOST_TURN, Outline, PolarActuator, Resultants
 from softreach.arm.along import AlongArm, Samples
 from softreach.arm.number import as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault
 
 __all__ = ["Chamber", "LengthTendon", "Tendon"]
-
-Array = NDArray[np.float64]
 
 
 class _Route(NamedTuple):
@@ -180,7 +178,7 @@ class LengthTendon(Tendon):
     slack: float = number("q0", "m", "pulled in by so much before it is taut", default=0.0)
     """q0, pulled in by so much before it is taut [m]; negative where it is pretensioned."""
     tendon_stiffness: float | None = number(
-        "k", "N/m", "stiffness of tendon and drive in series", low=0.0, open_low=True, default=None
+        "k", "N/m", "stiffness of tendon and drive in series", above=0.0, default=None
     )
     """k, stiffness of tendon and drive in series [N/m]; None for one that does not stretch."""
     pretension: float = number("τ0", "N", "tension at q0 of the straight arm", low=0.0, default=0.0)
@@ -247,21 +245,15 @@ class Chamber(PolarActuator):
     )
     """ρc over the outer radius R2(Z) [-]."""
     radius: float | None = number(
-        "a",
-        "m",
-        "radius of the channel",
-        low=0.0,
-        open_low=True,
-        instead_of="radius_ratio",
-        default=None,
+        "a", "m", "radius of the channel", above=0.0, instead_of="radius_ratio", default=None
     )
     """a, radius of the channel [m]."""
     radius_ratio: float | None = number(
-        "a/R2", "", "radius of the channel over R2", low=0.0, open_low=True, default=None
+        "a/R2", "", "radius of the channel over R2", above=0.0, default=None
     )
     """a over the outer radius R2(Z) [-]."""
     area_factor: float = number(
-        "A/πa²", "", "effective over geometric area", low=0.0, open_low=True, default=1.0
+        "A/πa²", "", "effective over geometric area", above=0.0, default=1.0
     )
     """Effective area over π a² [-], from a measurement; 1 where the channel does not widen."""
 

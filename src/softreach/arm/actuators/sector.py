@@ -15,20 +15,17 @@ from softreach.arm.actuators.ring_integrals import RingIntegrals, ring_integrals
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Ring, Section
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
 __all__ = ["SectorActuator", "cone_integrals", "ring_name_faults"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class SectorActuator(PolarActuator):
     """Equidistant bundles of one extent in one ring; γ < 0 contracts."""
 
-    extent: float = number(
-        "σ", "rad", "angular extent of a bundle", low=0.0, high=2 * math.pi, open_low=True
-    )
+    extent: float = number("σ", "rad", "angular extent of a bundle", above=0.0, high=2 * math.pi)
     """σ, angular extent of every bundle [rad]; 0 < σ ≤ 2π."""
     ring: int | str = 0
     """Ring of the section that it is in: index or name."""
