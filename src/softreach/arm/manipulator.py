@@ -221,13 +221,20 @@ class Manipulator(Body):
         """
         count = as_integer("count", count, 1, 1000)
         keep_extent = as_flag("keep_extent", keep_extent)
-        index = self._fiber_index(fiber)
-        original = self.actuators[index]
-        assert isinstance(original, SectorActuator)
-        parts = original.split(count, keep_extent=keep_extent)
-        return self.replace(
-            actuators=(*self.actuators[:index], *parts, *self.actuators[index + 1 :])
+        index, original = self._sector(fiber)
+        if original.bundles != 1:
+            hint = "its bundles are independent already"
+            raise InvalidInput(f"{original.name}.bundles", original.bundles, "1 to be split", hint)
+        if count == 1:
+            return self
+        extent = original.extent if keep_extent else original.extent / count
+        places = (original.offset + (k - (count - 1) / 2) * extent for k in range(count))
+        parts = (
+            original.replace(name=f"{original.name} {k}", offset=place, extent=extent)
+            for k, place in enumerate(places, start=1)
         )
+        others = self.actuators[:index], self.actuators[index + 1 :]
+        return self.replace(actuators=(*others[0], *parts, *others[1]))
 
     @classmethod
     def from_toml(cls, text: str, source: str = "design") -> Self:
@@ -348,21 +355,16 @@ class Manipulator(Body):
 
         return arm_card(self, self.base)
 
-    def _fiber_index(self, fiber: str | int) -> int:
-        names = {
-            k: actuator.name
-            for k, actuator in enumerate(self.actuators)
-            if isinstance(actuator, SectorActuator)
-        }
-        key = plain(fiber)
-        if isinstance(key, int) and not isinstance(key, bool) and key in names:
-            return key
-        for index, name in names.items():
-            if isinstance(key, str) and name == key:
-                return index
-        listed = ", ".join(f"{k} ({name})" for k, name in names.items())
+    def _sector(self, which: str | int) -> tuple[int, SectorActuator]:
+        """An architecture by its name or index, and its index."""
+        key, sectors = plain(which), [*enumerate(self.actuators)]
+        sectors = [(k, each) for k, each in sectors if isinstance(each, SectorActuator)]
+        for k, each in sectors:
+            if type(key) in (int, str) and key in (k, each.name):
+                return k, each
+        listed = ", ".join(f"{k} ({each.name})" for k, each in sectors)
         allowed = f"the name or index of one architecture: {listed}"
-        raise InvalidInput("fiber", as_given(fiber), allowed)
+        raise InvalidInput("fiber", as_given(which), allowed)
 
 
 def a_manipulator(name: str, value: object) -> Manipulator:

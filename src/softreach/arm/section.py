@@ -58,12 +58,6 @@ class Measured(Part):
         """K0, K1 and K3, each None where it was not measured."""
         return self.axial_stiffness, self.bending_stiffness, self.torsion_stiffness
 
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Z/L inside (0, 1) where one of them is not smooth."""
-        values = (*self.stiffnesses, self.mass_per_length)
-        return tuple(x for value in values if isinstance(value, AlongArm) for x in value.breaks)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Ring(Part):

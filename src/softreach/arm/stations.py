@@ -56,7 +56,6 @@ class Stations(Mapping[str, float]):
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
         """Z [m]."""
-        del profile, section
         return (self[name],)
 
     def replace(self, **places: float) -> Stations:

@@ -76,19 +76,6 @@ class Outline:
         """Radius of the middle line of each bundle over R2 [-], shape (station, bundle)."""
         return 0.5 * (self.inner_ratio + self.outer_ratio)
 
-    @classmethod
-    def empty(cls, stations: int) -> Outline:
-        """The outline of a passive rod at so many stations."""
-        nowhere = np.empty((stations, 0))
-        return cls(
-            center=nowhere,
-            extent=np.empty(0),
-            inner_ratio=nowhere,
-            outer_ratio=nowhere,
-            shape=(),
-            acts=np.empty((stations, 0), bool),
-        )
-
 
 @dataclass(frozen=True, kw_only=True)
 class Actuator(Span, ABC):
@@ -206,7 +193,8 @@ class Actuator(Span, ABC):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations inside (0, L) where its load jumps or is not smooth [m]."""
-        return tuple(z for z in self.span(profile.length) if 0.0 < z < profile.length)
+        places = (*self.span(profile.length), *(profile.length * x for x in self.breaks))
+        return tuple(z for z in places if 0.0 < z < profile.length)
 
     def acts(self, profile: Profile, z: Array) -> Mask:
         """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
@@ -220,7 +208,6 @@ class Actuator(Span, ABC):
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
         """Faults that keep it from driving an arm with this profile and section."""
-        del profile, section
         return []
 
     def _faults(self) -> list[Fault]:

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.actuators.actuator import MOST_TURN
-from softreach.arm.actuators.ring_integrals import RingIntegrals
-from softreach.arm.actuators.sector import SectorActuator, cone_integrals
+from softreach.arm.actuators.sector import RingIntegrals, SectorActuator, cone_integrals
 from softreach.arm.along import AlongArm, Pieces
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
@@ -61,11 +60,6 @@ class FiberArchitecture(SectorActuator):
         default=None,
     )
     """α, from the axis, at the outer radius of the ring [rad]; |α| < π/2; may change along Z."""
-
-    def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        angle = self.helical_angle
-        breaks = angle.breaks if isinstance(angle, AlongArm) else ()
-        return (*super().breakpoints(profile), *(profile.length * x for x in breaks))
 
     def helical_angle_on(self, profile: Profile, section: Section) -> float | AlongArm:
         """α at the outer radius of the ring [rad], which the revolution fixes."""
@@ -185,7 +179,6 @@ class ObliqueMuscle(SectorActuator):
         return cone_integrals(section.ring(self.ring), profile.slope(z), angle)
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        del profile, section
         return np.zeros(len(z))
 
 
@@ -210,7 +203,6 @@ class RadialMuscle(SectorActuator):
 
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0 = -ν (1 - ρ²)/2, I1 = -ν (1 - ρ³)/3, I3 = 0 [-]."""
-        del profile
         ring = section.ring(self.ring)
         nu, rho, each = ring.material.poisson_ratio, ring.radius_ratio, np.ones(len(z))
         return RingIntegrals(
@@ -218,5 +210,4 @@ class RadialMuscle(SectorActuator):
         )
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        del profile, section
         return np.zeros(len(z))
