@@ -145,25 +145,16 @@ def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
         axes = principal_compliances(matrices[rows])
         largest[rows], smallest[rows] = axes.largest, axes.smallest
         soft[rows] = axes.displacements[:, 0]
-    named = {"units": "m/N", "scale": "log"}
+    each, size = ("sample", "axis"), {"units": "m/N", "scale": "log"}
+    most, least = ({"long_name": f"{which} compliance"} for which in ("largest", "smallest"))
+    whole = {"units": "m/N", "long_name": "compliance of the tip"}
+    along = {"units": "1", "long_name": "direction of the largest compliance"}
     return xr.Dataset(
         {
-            "compliance": (
-                ("sample", "axis", "force"),
-                matrices,
-                {"units": "m/N", "long_name": "compliance of the tip"},
-            ),
-            "largest_compliance": ("sample", largest, named | {"long_name": "largest compliance"}),
-            "smallest_compliance": (
-                "sample",
-                smallest,
-                named | {"long_name": "smallest compliance"},
-            ),
-            "softest_direction": (
-                ("sample", "axis"),
-                soft,
-                {"units": "1", "long_name": "direction of the largest compliance"},
-            ),
+            "compliance": ((*each, "force"), matrices, whole),
+            "largest_compliance": ("sample", largest, size | most),
+            "smallest_compliance": ("sample", smallest, size | least),
+            "softest_direction": (each, soft, along),
         },
         {"axis": list(AXES), "force": list(AXES)},
         cloud.attrs,
