@@ -65,15 +65,13 @@ def minimal_trunk(
     matter = named_material(material) if isinstance(material, str) else material
     if matter is not None:
         as_instance("material", matter, Material, "a Material, its name, or None")
-    helices = (
-        _fiber("left", 66, revolution=-revolution),
-        _fiber("right", 114, revolution=revolution),
-    )
+    left = _fiber("left", 66, revolution=-revolution)
+    right = _fiber("right", 114, revolution=revolution)
     profile = LinearTaper(length=length, outer_radius=length / 16, taper=taper)
     if tip_radius is not None:
         profile = profile.replace(tip_radius=tip_radius)
     ring = Ring(inner_ratio=radius_ratio, material=Material() if matter is None else matter)
-    return _arm(profile, (*helices, _fiber("longitudinal", 270, helical_angle=0.0)), ring)
+    return _arm(profile, (left, right, _fiber("longitudinal", 270, helical_angle=0.0)), ring)
 
 
 def redundant_trunk(
