@@ -120,7 +120,6 @@ class Growth:
 
     @cached_property
     def _begun(self) -> TipResponse:
-        """The tip near its place, without force."""
         return self.pushing.respond(self.box.clip(self.start), 0.0)
 
     @cached_property
@@ -196,14 +195,12 @@ class Growth:
         return share, False
 
     def _is_too_coarse(self, fixed: FixedTip) -> bool:
-        """True if steps along the arm err too much to go on where stability is about to be lost."""
         if fixed.response.margin > _NEAR_LOSS or self.pushing.is_finest:
             return False
         return self.pushing.error(*fixed) > 0.5 * self.allowed
 
     @property
     def _shortest(self) -> float:
-        """The step below which nothing is gained by further ones."""
         return _LOCAL if self.box.dimension > 3 else _TURNING
 
     def _end(self, path: list[FixedTip], best: _Program, stop: Stop | None = None) -> Grown:

@@ -104,7 +104,6 @@ class _Best(NamedTuple):
 def _starts(
     rod: TipMap, places: ArrayLike | None, start: ArrayLike | None
 ) -> tuple[Array, list[Array]]:
-    """Places, and activations (k, bundles) to start from for each."""
     if start is None:
         if places is None:
             raise InvalidInput("places", None, "given, or `start`")

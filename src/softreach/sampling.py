@@ -71,7 +71,6 @@ def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
 
 
 def _nothing(first: int, count: int) -> Array:
-    """The only point of a cube without dimensions, again and again."""
     return np.empty((count, 0))
 
 

@@ -147,7 +147,6 @@ def a_cloud(name: str, value: object) -> xr.Dataset:
 
 
 def _along_axes(name: str, cloud: xr.Dataset) -> xr.Dataset:
-    """The cloud itself, if its axes are labeled x, y, z or not at all."""
     labels = tuple(map(str, cloud["axis"].values))
     if "axis" in cloud.coords and labels != AXES:
         raise InvalidInput(f"{name}.axis", ", ".join(labels), "x, y, z in this order")

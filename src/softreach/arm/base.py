@@ -117,7 +117,6 @@ class Base(Part):
 
 
 def _as_rotation(points: Any) -> Array | str:
-    """The matrix, or what is allowed instead."""
     if isinstance(points, str):
         return np.array(POINTS[points]) if points in POINTS else _ALLOWED
     numbers = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)

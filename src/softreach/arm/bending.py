@@ -157,7 +157,6 @@ def _holds_origin(center: Array, halves: Array) -> Mask:
 
 
 def _distance_to_edges(start: Array, end: Array) -> Array:
-    """Distance of the origin to the nearest segment, shape (station,)."""
     edges = end - start
     square = (edges**2).sum(axis=-1)
     along = -(start * edges).sum(axis=-1)
@@ -213,7 +212,6 @@ def bending_stations(arm: Manipulator) -> Array:
 
 
 def _turns(arm: Manipulator) -> float:
-    """Turns about the axis that some bundle makes relative to another."""
     center = arm.outline(np.linspace(0.0, arm.length, _STATIONS)).center
     relative = np.abs(np.diff(center - center[:, :1], axis=0)).sum(axis=0)
     return float(relative.max(initial=0.0)) / (2 * np.pi)

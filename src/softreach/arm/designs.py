@@ -102,7 +102,7 @@ def redundant_trunk(
     return arm.replace(actuators=(*arm.actuators[:2], *pair))
 
 
-def _fiber(name: str, offset_deg: float, **winding: float) -> FiberArchitecture:
+def _fiber(name: str, offset_deg: float, **winding: Any) -> FiberArchitecture:
     return FiberArchitecture(
         name=name, offset=math.radians(offset_deg), extent=math.radians(48), **winding
     )
@@ -277,7 +277,6 @@ def elephant_trunk() -> Manipulator:
 
 
 def _muscles() -> Iterator[Actuator]:
-    """Each group on the right and, mirrored at x = 0, on the left."""
     for group, ring, (start, end), angle in _TRUNK_GROUPS:
         middle = (start + end) / 2
         for side, offset, hand in (("right", middle, 1), ("left", (180.0 - middle) % 360.0, -1)):

@@ -155,7 +155,6 @@ class Driving:
 
     @lazy
     def _pulls(self) -> Mask:
-        """Bundles that drives cannot push: tendons driven by tension, shape (inner bundle,)."""
         pulls = np.zeros(self.law.arm.bundles, bool)
         for k, actuator in enumerate(self.arm.bundle_actuators):
             by_tension = isinstance(actuator, Tendon) and not isinstance(actuator, LengthTendon)

@@ -16,7 +16,7 @@ from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence
 from softreach.arm.drives import Drive, drive_faults
-from softreach.arm.load_number import scale_warnings
+from softreach.arm.loads import mass
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section, name_faults
@@ -38,9 +38,11 @@ from softreach.support.units import UNITS, LengthUnit, as_unit, handy_unit
 
 Made = TypeVar("Made")
 
-__all__ = ["Manipulator", "a_manipulator"]
+__all__ = ["Manipulator", "a_manipulator", "scale_warnings"]
 
 _NAMES = 6  # of bundles that `repr` lists
+_LONG, _WIDE = 10.0, 1.0  # m, length and outer radius from which mm may be meant
+_SLENDER = 5.0  # least L/R2(0) of a slender arm
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -356,7 +358,6 @@ class Manipulator(Body):
         return arm_card(self, self.base)
 
     def _sector(self, which: str | int) -> tuple[int, SectorActuator]:
-        """An architecture by its name or index, and its index."""
         key, sectors = plain(which), [*enumerate(self.actuators)]
         sectors = [(k, each) for k, each in sectors if isinstance(each, SectorActuator)]
         for k, each in sectors:
@@ -378,3 +379,25 @@ def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Mad
     except InvalidDesign as error:
         faults += error.faults
         return None
+
+
+def scale_warnings(arm: Manipulator) -> tuple[str, ...]:
+    """One line for a length that looks like one in mm, and one for an arm that is not slender."""
+    length, radius = arm.length, float(arm.profile.radius(0.0))
+    warnings: list[str] = []
+    if length >= _LONG:
+        known = not arm.section.density_faults("")
+        heavy = f" and weighs {mass(arm):.3g} kg" if known else ""
+        warnings.append(
+            f"the arm is {length:g} m long{heavy}; if that is meant in mm: lengths are in m, "
+            f"{length:g} mm are {length / 1e3:g}"
+        )
+    if (slenderness := length / radius) < _SLENDER:
+        meant = f"lengths are in m, {radius:g} mm are {radius / 1e3:g}"
+        cause = f"if that is meant in mm: {meant}" if radius >= _WIDE else "is it a diameter?"
+        warnings.append(
+            f"the arm is {slenderness:.3g} times as long as its outer radius at the base, "
+            f"{radius:g} m, and the theory is one of slender arms, {_SLENDER:g} times or more; "
+            f"{cause}"
+        )
+    return tuple(warnings)

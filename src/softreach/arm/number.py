@@ -13,7 +13,7 @@ import dataclasses
 import inspect
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass
 from functools import cache
 from types import MappingProxyType
@@ -27,6 +27,7 @@ from softreach.support.errors import Fault, InvalidInput, Range
 
 __all__ = [
     "MOST",
+    "NamedFloats",
     "Number",
     "Shape",
     "Station",
@@ -114,6 +115,28 @@ class Station(float):
 
     def __hash__(self) -> int:
         return hash((self.name, float(self)))
+
+
+class NamedFloats(Mapping[str, float]):
+    """Numbers by name; frozen."""
+
+    def __init__(self, numbers: Mapping[str, float] = {}) -> None:
+        self._numbers = {str(name): float(value) for name, value in numbers.items()}
+
+    def __getitem__(self, name: str) -> float:
+        return self._numbers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._numbers.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -365,7 +388,6 @@ def _own_fields(owner: type) -> list[dataclasses.Field[Any]]:
 
 
 def _plain_number(owner: type, field: dataclasses.Field[Any]) -> Number | None:
-    """The number that a field outside softreach is by its type, if it is one."""
     typed = field.type.__name__ if isinstance(field.type, type) else str(field.type)
     plain = _PLAIN.fullmatch(typed.replace(" ", ""))
     if plain is None or not field.init:

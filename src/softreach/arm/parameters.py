@@ -430,7 +430,6 @@ def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
 def _assembled(
     arm: Manipulator, new: Mapping[PartKey, Any], inside: Mapping[str, float]
 ) -> Manipulator:
-    """Of the section, other numbers than those of its parts are `inside`."""
     rings = tuple(
         new["rings", k].replace(material=new["rings", k, "material"])
         for k in range(len(arm.section.rings))
@@ -446,7 +445,6 @@ def _assembled(
 
 
 def _as_asked(fault: Fault, edits: _Edits) -> Fault:
-    """A fault of a part or of the arm under the parameters that asked for it."""
     by = [
         edit
         for path in fault.path.split(", ")
@@ -496,7 +494,6 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
 
 
 def _shortened(names: Iterable[str]) -> list[str]:
-    """The names, of a series its first and its last number."""
     places: dict[str, list[str]] = {}
     for name in names:
         element = _ELEMENT.match(name)

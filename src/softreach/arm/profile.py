@@ -105,12 +105,10 @@ class Profile(Part, ABC):
 
     @lazy
     def _knots(self) -> Array:
-        """Base, breakpoints and tip [m]."""
         return np.array([0.0, *self.breakpoints, self.length])
 
     @lazy
     def _slender_knots(self) -> Array:
-        """S at the knots [-]."""
         gaps = self._slender_gap(np.arange(len(self._knots) - 1), np.diff(self._knots))
         return np.concatenate([[0.0], np.cumsum(gaps)])
 
@@ -214,7 +212,6 @@ class LinearTaper(Profile):
 
 
 def _taper_to(tip_radius: Any, length: Any, outer_radius: Any, taper: Any) -> float:
-    """φ [rad] by which a cone ends with a radius; 0 if the cone is wrong anyway."""
     positive = Range(0.0, unit="m", open_low=True)
     if not positive.admits(tip_radius):
         raise InvalidDesign([Fault("tip_radius", tip_radius, positive)])

@@ -351,7 +351,6 @@ def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
 
 
 def _allowed_name(name: str, path: str) -> str:
-    """Requirement that the name of an actuator or a ring breaks; "" for a good one."""
     if not is_path_name(name):
         return "must be one line without dots and brackets, and without spaces around it"
     if path == "actuators" and name in _RESERVED:

@@ -259,7 +259,6 @@ def arm_card(arm: Body, base: Base) -> str:
 
 
 def _drawn_line(arm: Body, shape: Shape) -> Centerline:
-    """With stations where the radius has kinks and where bundles begin and end."""
     return Centerline.of(shape).with_stations(arm.breakpoints)
 
 
@@ -270,7 +269,6 @@ def _skins(arm: Body, line: Centerline, sector: Callable[[_Span], Surface]) -> l
 
 
 def _spans(arm: Body, line: Centerline) -> list[list[_Span]]:
-    """The spans of each bundle."""
     outline, radius = arm.outline(line.z), arm.profile.radius(line.z)
     acts = arm.outline(0.5 * (line.z[1:] + line.z[:-1])).acts
     return [
@@ -299,7 +297,6 @@ def _runs(acts: Mask) -> list[slice]:
 
 
 def _line_tube(span: _Span, radius: float) -> Surface:
-    """A thin tube, round across its own direction."""
     curve = span.curve()
     along = _unit(np.gradient(curve, axis=0))
     spoke = span.points(span.center[:, None], np.ones(len(curve)))[:, 0] - span.position
@@ -314,7 +311,6 @@ def _lumen(span: _Span) -> Surface:
 
 
 def _across(vector: Array, along: Array) -> Array:
-    """Vectors without their part along unit vectors."""
     return vector - np.sum(vector * along, axis=1, keepdims=True) * along
 
 

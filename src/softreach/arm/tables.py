@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +23,6 @@ from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [
-    "Compliance",
     "Tables",
     "both_sides",
     "check_extension",
@@ -103,27 +101,19 @@ def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
     return Resultants(np.where(acts, load.force, 0.0), np.where(acts[:, None], load.moment, 0.0))
 
 
-class Compliance(NamedTuple):
-    """Compliance of sections, one value for each station."""
+def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
+    """1/K0 [1/N], 1/K1 = 1/K2 and 1/K3 [1/(N m²)] at stations Z [m]; 0 in rigid pieces.
 
-    axial: Array
-    """1/K0 [1/N]."""
-    bending: Array
-    """1/K1 = 1/K2 [1/(N m²)]."""
-    torsion: Array
-    """1/K3 [1/(N m²)]."""
-
-
-def compliance(arm: Body, stations: ArrayLike) -> Compliance:
-    """1/K0, 1/K1 and 1/K3 at stations Z [m]; 0 in rigid pieces.
+    Returns:
+        One value for each station, shape (station,) each.
 
     Raises:
         InvalidDesign: A material without Young's modulus.
     """
     if faults := arm.section.modulus_faults("where loads act"):
         raise InvalidDesign(faults)
-    stiffness = arm.stiffness_at(stations)
-    return Compliance(*(1.0 / value for value in stiffness))
+    axial, bending, torsion = arm.stiffness_at(stations)
+    return 1.0 / axial, 1.0 / bending, 1.0 / torsion
 
 
 @lru_cache(maxsize=64)
@@ -145,15 +135,12 @@ def check_extension(arm: Body) -> None:
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
-    for rates, of in (
-        (table.extension, ""),
-        (table.rest_length_factor, " of matter itself, without forces"),
-    ):
+    matter = table.rest_length_factor, " of matter itself, without forces"
+    for rates, of in ((table.extension, ""), matter):
         smallest, _ = range_of_extension(arm, rates)
         if smallest <= 0:
-            allowed = (
-                f"reaches extension ζ = {smallest:.4g}{of}; must keep ζ > 0: narrow the bounds"
-            )
+            kept = "must keep ζ > 0: narrow the bounds"
+            allowed = f"reaches extension ζ = {smallest:.4g}{of}; {kept}"
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
 
 

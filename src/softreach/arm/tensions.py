@@ -73,7 +73,6 @@ class LengthLaw:
 
     @lazy
     def _growing(self) -> NDArray[np.intp]:
-        """Bundles that change the length of matter at rest."""
         return np.flatnonzero([not each.is_force for each in self.arm.bundle_actuators])
 
     def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:

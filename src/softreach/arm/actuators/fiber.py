@@ -77,7 +77,6 @@ class FiberArchitecture(SectorActuator):
         return float(self.rotation(profile, section, end)[0])
 
     def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
-        """Of Ω and α, the one not given follows from the other."""
         if field == "revolution":
             return self.revolution_on(profile, section)
         if field == "helical_angle":

@@ -247,8 +247,9 @@ def _written(path: str, places: Mapping[str, Place]) -> tuple[str, Any]:
 
 def in_file_units(allowed: Range | str) -> Range | str:
     """The same range of an angle in degrees; anything else as it is."""
-    is_angle = isinstance(allowed, Range) and allowed.unit == "rad"
-    return allowed.in_degrees() if is_angle else allowed
+    if isinstance(allowed, Range) and allowed.unit == "rad":
+        return allowed.in_degrees()
+    return allowed
 
 
 def _shown_degrees(value: object) -> object:

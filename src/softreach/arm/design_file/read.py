@@ -152,7 +152,6 @@ class _Reader(FaultReader):
         return {name: value for name, value in fields.items() if value is not None}
 
     def _alone(self, name: str, kind: type[Part]) -> Any:
-        """The part of a table at the top, if there is one."""
         raw = self._document.get(name)
         return self._any(kind, raw, name) if isinstance(raw, dict) else None
 
@@ -189,7 +188,6 @@ class _Reader(FaultReader):
     def _part(
         self, kind: type[Part], raw: Any, path: str, without: tuple[str, ...] = (), **others: Any
     ) -> Any:
-        """The part that a table and other fields describe; None for a faulty one."""
         values, wrong = self._values(kind, raw, path, without)
         return self._made(kind, Place(path, field_keys(kind), raw), values | others, wrong)
 
@@ -285,7 +283,6 @@ class _Reader(FaultReader):
         return WRONG if made is None else made
 
     def _material(self, raw: Any, path: str, of: str) -> Material | None:
-        """A material by its name or its values, of the core or of a ring."""
         if isinstance(raw, dict):
             made = self._part(Material, raw, path)
             self.places[of] = self.places[path]
@@ -314,7 +311,6 @@ class _Reader(FaultReader):
         return self._made(Section, place, values | {"rings": tuple(rings)}, wrong)
 
     def _display_unit(self) -> Any:
-        """The unit that the arm is to be shown in; whether there is such a one the arm judges."""
         raw = self._at_top("display")
         for key in (key for key in raw if key != "unit"):
             self._refuse(f"display.{key_text(key)}", raw[key], unknown_key(key, {"unit": "unit"}))
@@ -341,12 +337,10 @@ class _Reader(FaultReader):
             self._refuse(key_text(key), self._document[key], said)
 
     def _at_top(self, key: str) -> dict[str, Any]:
-        """A table at the top; an empty one if there is none, or something else."""
         value = self._document.get(key)
         return value if isinstance(value, dict) else {}
 
     def _listed(self, key: str) -> list[tuple[str, dict[str, Any]]]:
-        """The tables of a list at the top, by their paths."""
         raw = self._document.get(key)
         tables = [
             (f"{key}[{k}]", each) for k, each in enumerate(raw if isinstance(raw, list) else ())
@@ -372,7 +366,6 @@ def _in_radians(value: Any) -> Any:
 
 
 def _home(key: str) -> str:
-    """Hint where a key belongs that is not one of the top."""
     if (kind := key.removesuffix("s")) in KINDS[Actuator]:
         return f'write [[actuators]] with kind = "{kind}"'
     homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
