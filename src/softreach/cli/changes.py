@@ -176,7 +176,7 @@ def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
 
 def say_limits(arm: Manipulator) -> None:
     """Warn where the design leaves what the linear law covers."""
-    from softreach.arm.linear_law import law_warning
+    from softreach.arm.lines import law_warning
 
     if text := law_warning(arm):
         warn(text)

@@ -73,7 +73,7 @@ def plot_cross_section(
     arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
     half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
     if legend is None:  # where colors alone leave open what is what
-        plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.bundle_courses) == {"along"}
+        plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.fiber_directions) == {"along"}
         legend = not plain or len(_section_materials(arm.section)) > 1
     legend = as_flag("legend", legend)
     if not 0 <= z <= arm.length:
@@ -223,7 +223,7 @@ def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> lis
     outline = arm.outline(z)
     sizes = (outline.center[0], outline.extent, outline.inner_ratio[0], outline.outer_ratio[0])
     return [
-        _Placed(k, outline.shape[k], arm.bundle_courses[k], *(float(size[k]) for size in sizes))
+        _Placed(k, outline.shape[k], arm.fiber_directions[k], *(float(size[k]) for size in sizes))
         for k in bundles
         if outline.acts[0, k]
     ]

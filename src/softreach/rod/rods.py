@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.driving import inner_arm
-from softreach.arm.load_number import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.arm.loads import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
 from softreach.kernels.rod.frames import move, turn

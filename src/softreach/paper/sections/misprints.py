@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach.arm.actuators.ring_integrals import ring_integrals
+from softreach.arm.actuators.sector import ring_integrals
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
 from softreach.paper import printed

@@ -81,9 +81,10 @@ def load_phase(
         swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
         table = tables(arm, z)
         longest, grown = (
-            1.0 + ends_over(part, arm.bounds).T for part in (table.extension, table.growth)
+            1.0 + ends_over(part, arm.bounds).T
+            for part in (table.extension, table.rest_length_factor)
         )
-        relative = grown[1] / longest[0] if table.growth is not table.extension else 1.0
+        relative = grown[1] / longest[0] if table.has_forces else 1.0
         squeeze = float((force * axial * relative).max())
         rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
     steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS

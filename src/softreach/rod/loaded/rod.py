@@ -320,10 +320,10 @@ class LoadedRod(ArmRod):
     def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
         """The strains at stations Z [m], from m and n in the directors of the shapes there."""
         axial, bending, torsion = _compliance_at(self.body, z.tobytes())
-        u, extension, growth = linear_strains(tables_at(self.arm, z), gamma)
-        extension = extension + growth * shapes.force[..., 2] * axial
+        u, extension, eta = linear_strains(tables_at(self.arm, z), gamma)
+        extension = extension + eta * shapes.force[..., 2] * axial
         yielded = np.stack([bending, bending, torsion], axis=1)
-        return per_length(u + shapes.moment * yielded, extension, growth)
+        return per_length(u + shapes.moment * yielded, extension, eta)
 
 
 @lru_cache(maxsize=64)

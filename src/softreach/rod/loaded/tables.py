@@ -221,7 +221,7 @@ class LoadTables:
             rest_frames.pack_lengths(
                 measure,
                 at.extension.reshape(*z.shape, bundles),
-                at.growth.reshape(*z.shape, bundles),
+                at.rest_length_factor.reshape(*z.shape, bundles),
             ),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
@@ -236,11 +236,11 @@ class LoadTables:
         gauss = s[:, 1:].ravel()[:, None] + wide[:, None] * np.array(magnus.NODES)
         z = profile.station(gauss)
         at = tables(self.arm, z.ravel())
-        growth = at.growth.reshape(*z.shape, bundles)  # whose rotations alone are asked for
+        resting = at.rest_length_factor.reshape(*z.shape, bundles)  # only rotations are needed
         pieces = rod.pack(
             wide[:, None] * profile.radius(z),
-            growth,
-            growth,
+            resting,
+            resting,
             at.curvature.reshape(*z.shape, 3, bundles),
         )
         pieces[:, 3::4, -1] += self.twist  # u3 at rest
