@@ -6,33 +6,31 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import tables
 from softreach.geometry.sphere_maps import Map
 from softreach.kernels.loaded.response import TRACE
 from softreach.rod.free import linear_strains
-from softreach.rod.loaded.shapes import LoadedShapes, shapes_of
 from softreach.rod.loaded.shooting import (
     ALL_LOADS,
     MARGIN_ALONE,
     QUICK,
     Equilibria,
+    LoadedShapes,
     Response,
-    Shots,
     base_directions,
+    shapes_of,
     shoot,
     units,
     walk,
 )
 from softreach.rod.loaded.tables import LoadTables, StepTables
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import TipStatus, has_tip
+from softreach.rod.tip_map import Status, TipStatus
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
-
-Array = NDArray[np.float64]
 
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
@@ -72,11 +70,11 @@ class Solver:
         steps = max(2 * self.steps, enough_for_all_breaks(self.tables.arm))
         return Solver(self.tables, steps, self.tol)
 
-    def quick(self, gamma: Array, guesses: Array | None) -> Shots:
+    def quick(self, gamma: Array, guesses: Array | None) -> Equilibria:
         """Searches from frames as in `Equilibria`, or from the unloaded arm."""
         return shoot(gamma, self.tables, guesses, self._steps, self._tiny, QUICK)
 
-    def careful(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Shots:
+    def careful(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Equilibria:
         """The same under shares of the loads, to follow a branch."""
         return shoot(gamma, self.tables, guesses, self._steps, self._tiny, shares=shares)
 
@@ -91,32 +89,21 @@ class Solver:
         return equilibria
 
     def put(
-        self,
-        gamma: Array,
-        rows: slice | NDArray[np.intp],
-        shots: Shots,
-        equilibria: Equilibria,
+        self, gamma: Array, rows: slice | Index, found: Equilibria, equilibria: Equilibria
     ) -> None:
         """Put down what is found at some rows of all activations."""
-        tips, frame, margin, good = shots
-        stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
-        equilibria.tips[rows] = np.where(good[:, None], tips, np.nan)
-        equilibria.frame[rows], equilibria.margin[rows] = frame, margin
-        equilibria.status[rows] = np.where(good, stable, TipStatus.UNDECIDED)
+        equilibria.put(rows, found.without_lost_tips())
         if self.tables.phase.squeeze >= 1.0:
-            self._give_up_squeezed(gamma, rows, equilibria)
+            self._give_up_squeezed(gamma, np.arange(len(gamma))[rows], equilibria)
 
-    def _give_up_squeezed(
-        self, gamma: Array, rows: slice | NDArray[np.intp], equilibria: Equilibria
-    ) -> None:
+    def _give_up_squeezed(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out."""
-        squeezed = np.arange(len(gamma))[rows]
         edges = self.tables.edges(np.array([]), self.steps)[::-1]
         z = self.tables.arm.profile.station(edges)
-        force = self.shapes(gamma[squeezed], z, equilibria.of(squeezed)).force[..., 2]
-        _, extension, growth = linear_strains(tables(self.tables.arm, z), gamma[squeezed])
+        force = self.shapes(gamma[rows], z, equilibria.of(rows)).force[..., 2]
+        _, extension, growth = linear_strains(tables(self.tables.arm, z), gamma[rows])
         extension = extension + growth * force * self.tables.body.compliance(z)[0]
-        squeezed = squeezed[(extension <= 0.0).any(axis=1)]
+        squeezed = rows[(extension <= 0.0).any(axis=1)]
         equilibria.tips[squeezed] = np.nan
         equilibria.status[squeezed] = TipStatus.NO_EQUILIBRIUM
 
@@ -176,7 +163,7 @@ class Solver:
             compliance: Whether to tell ∂r/∂F.
             directors: Whether to tell the directors of the tips.
         """
-        lost = ~has_tip(known.status)
+        lost = ~known.is_found
         rows = np.where(lost, lost.argmin(), np.arange(len(gamma)))  # none is walked in vain
         answers = {"slopes": True, "compliance": compliance, "trace": directors}
         walked = walk(gamma[rows], self.tables, known.frame[rows], self._steps, **answers)
@@ -188,15 +175,10 @@ class Solver:
             at, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
             shapes = shapes_of(tips, walked.trace, at, self._force_at(self._steps, at), at_tip)
             at_tips = shapes.frames.directors[:, 0]
-        return Response(tips, walked.slopes, walked.compliance, at_tips, known.status)
+        return Response(tips, walked.slopes, walked.compliance, at_tips)
 
     def shapes(
-        self,
-        gamma: Array,
-        stations: Array,
-        known: Equilibria,
-        *,
-        status: NDArray[np.int8] | None = None,
+        self, gamma: Array, stations: Array, known: Equilibria, status: Status | None = None
     ) -> LoadedShapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
 
@@ -213,7 +195,7 @@ class Solver:
 
         def fill(block: slice) -> None:
             equilibria = known.of(block)
-            lost = ~has_tip(equilibria.status)
+            lost = ~equilibria.is_found
             tips, trace = self._traced(gamma[block], equilibria.frame, lost, table)
             shapes.put(block, shapes_of(tips, trace, rows, self._force_at(table, rows), stations))
             if status is not None:
@@ -224,7 +206,7 @@ class Solver:
         return shapes
 
     def _traced(
-        self, gamma: Array, frame: Array, lost: NDArray[np.bool_], table: StepTables
+        self, gamma: Array, frame: Array, lost: Mask, table: StepTables
     ) -> tuple[Array, Array]:
         """Tips and sections of arms near known ones on the steps of a table."""
         at = np.where(lost, lost.argmin(), np.arange(len(gamma)))
@@ -232,7 +214,7 @@ class Solver:
         trace = walk(gamma[at], self.tables, shots.frame, table, trace=True).trace
         return np.where((lost | ~shots.is_found)[:, None], np.nan, shots.tips), trace
 
-    def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
+    def _force_at(self, table: StepTables, rows: Index) -> Array:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
         at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
         return at_ends[rows]
