@@ -32,7 +32,7 @@ from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shooting import Equilibria, LoadedShapes, turn_between
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, Body, LoadPhase, LoadTables
+from softreach.rod.loaded.tables import ArmBody, LoadPhase, LoadTables
 from softreach.rod.response import (
     NodeTables,
     linear_response,
@@ -94,7 +94,7 @@ class LoadedRod(ArmRod):
         return loads.seen_from(self.arm.base)
 
     @property
-    def body(self) -> Body:
+    def body(self) -> ArmBody:
         """Compliance and weight of the arm."""
         return ArmBody(self.arm)
 
@@ -330,7 +330,7 @@ class LoadedRod(ArmRod):
 
 
 @lru_cache(maxsize=64)
-def _compliance_at(body: Body, stations: bytes) -> tuple[Array, Array, Array]:
+def _compliance_at(body: ArmBody, stations: bytes) -> tuple[Array, Array, Array]:
     return body.compliance(np.frombuffer(stations))
 
 

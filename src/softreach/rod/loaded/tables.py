@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,23 @@ _MOST_PHASE = math.pi / 2.0
 _MOST_STEPS = 1 << 16
 _STATIONS = 65
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+@dataclass(frozen=True)
+class ArmBody:
+    """The body of an arm; it weighs nothing where nothing falls."""
+
+    arm: Manipulator
+
+    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
+        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
+        return compliance(self.arm, z)
+
+    def mass_per_length(self, z: Array) -> Array:
+        """[kg/m], before activation."""
+        if self.arm.loads is None or not any(self.arm.loads.gravity):
+            return np.zeros(np.shape(z))
+        return self.arm.section.mass_per_length_at(self.arm.profile, z)
 
 
 class LoadPhase(NamedTuple):
@@ -65,23 +82,17 @@ class LoadPhase(NamedTuple):
         return max(2, math.ceil(min(self.steepest / _MOST_PHASE, _MOST_STEPS)))
 
 
-def load_phase(
-    arm: Manipulator, loads: Loads, compliance: tuple[Array, Array, Array], mass: Array
-) -> LoadPhase:
-    """The phase that loads give the tangents at most.
+def load_phase(arm: Manipulator, loads: Loads, body: ArmBody) -> LoadPhase:
+    """The phase that loads give the tangents of an arm at most.
 
     Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the sizes of
     all forces and moments beyond, added whatever their directions, and ζ̂ the largest within bounds,
     or η where that is larger.
-
-    Args:
-        arm: The design.
-        loads: Loads on it.
-        compliance: 1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)] at `phase_stations`.
-        mass: Per length there [kg/m].
     """
-    z = phase_stations(arm)
-    axial, bending, torsion = compliance
+    even = np.linspace(0.0, arm.profile.slender_length, _STATIONS)
+    z = both_sides(arm, arm.profile.station(even))
+    axial, bending, torsion = body.compliance(z)
+    mass = body.mass_per_length(z)
     with np.errstate(over="ignore"):
         force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
         swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
@@ -95,12 +106,6 @@ def load_phase(
     steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
     along = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(z)))
     return LoadPhase(float(along[-1]), float(steepest.max()), squeeze, z, along)
-
-
-def phase_stations(arm: Manipulator) -> Array:
-    """Z [m], even in S, and both sides of every breakpoint."""
-    profile = arm.profile
-    return both_sides(arm, profile.station(np.linspace(0.0, profile.slender_length, _STATIONS)))
 
 
 def _force(loads: Loads, z: Array, mass: Array) -> Array:
@@ -120,35 +125,6 @@ def _moment(loads: Loads) -> float:
     moments = [loads.tip_moment, loads.follower_moment]
     moments += [load.moment for load in loads.point_loads]
     return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*moment) for moment in moments)
-
-
-class Body(Protocol):
-    """Compliance and weight of an arm, at stations Z [m]."""
-
-    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
-        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
-        ...
-
-    def mass_per_length(self, z: Array) -> Array:
-        """[kg/m], before activation."""
-        ...
-
-
-@dataclass(frozen=True)
-class ArmBody:
-    """The body of an arm; it weighs nothing where nothing falls."""
-
-    arm: Manipulator
-
-    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
-        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
-        return compliance(self.arm, z)
-
-    def mass_per_length(self, z: Array) -> Array:
-        """[kg/m], before activation."""
-        if self.arm.loads is None or not any(self.arm.loads.gravity):
-            return np.zeros(np.shape(z))
-        return self.arm.section.mass_per_length_at(self.arm.profile, z)
 
 
 class StepTables(NamedTuple):
@@ -174,7 +150,7 @@ class LoadTables:
 
     arm: Manipulator
     loads: Loads
-    body: Body
+    body: ArmBody
     longest: float = field(default=PHASE_OF_SEGMENT, kw_only=True)
     """Phase of the longest segment between nodes [rad]."""
     twist: float = field(default=0.0, kw_only=True)
@@ -214,10 +190,7 @@ class LoadTables:
         Without gravity that of the largest dead force, so that a tip force alone needs no more than
         one direction.
         """
-        forces = [self._at_tip, *(np.array(load.force) for load in self.loads.point_loads)]
-        forces = [np.array(self.loads.gravity), np.array(self.loads.force_per_length), *forces]
-        last = np.array([0.0, 0.0, -1.0]) if self.direction is None else self.direction
-        first = next((f for f in forces if np.any(f)), last)
+        first = next((f for f in self._dead_forces if f.any()), np.array([0.0, 0.0, -1.0]))
         first = first / np.linalg.norm(first)
         other = np.eye(3)[np.argmin(np.abs(first))]
         second = np.cross(first, other)
@@ -227,12 +200,9 @@ class LoadTables:
     @lazy
     def one_direction(self) -> bool:
         """True if all forces are dead and along the first axis, so that two unknowns are enough."""
-        loads = self.loads
-        dead = [self._at_tip, loads.gravity, loads.force_per_length]
-        dead += [load.force for load in loads.point_loads]
-        dead += [] if self.direction is None else [self.direction]
-        across = np.array(dead) @ self.axes[1:].T
-        size = np.abs(np.array(dead)).max(axis=1, keepdims=True)
+        loads, dead = self.loads, self._dead_forces
+        across = dead @ self.axes[1:].T
+        size = np.abs(dead).max(axis=1, keepdims=True)
         moments = [loads.tip_moment, loads.follower_force]
         moments += [load.moment for load in loads.point_loads]
         return bool((np.abs(across) <= 1e-14 * size).all()) and not np.any(moments)
@@ -259,12 +229,19 @@ class LoadTables:
     def _at_tip(self) -> Array:
         return self._weight + np.array(self.loads.tip_force)
 
+    @property
+    def _dead_forces(self) -> Array:
+        """Along which dead forces act, shape (force, 3)."""
+        loads, last = self.loads, [] if self.direction is None else [self.direction]
+        points = [load.force for load in loads.point_loads]
+        return np.array(
+            [loads.gravity, loads.force_per_length, self._at_tip, *points, *last], float
+        )
+
     @lazy
     def phase(self) -> LoadPhase:
         """Phase that the loads give the tangents."""
-        z = phase_stations(self.arm)
-        mass = self.body.mass_per_length(z)
-        return load_phase(self.arm, self.loads, self.body.compliance(z), mass)
+        return load_phase(self.arm, self.loads, self.body)
 
     @lazy
     def _made(self) -> dict[int, StepTables]:
