@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softreach.kernels.loaded.grid_values import interpolate
+from softreach.kernels.loaded.grid_values import UNEVEN, interpolate
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.loaded.shooting import ALL_LOADS, Equilibria, turn_between, units
 from softreach.rod.loaded.solver import Solver
@@ -31,7 +31,8 @@ _NODES = {1: 33, 2: 33, 3: 17}
 """Nodes per free bundle: at most a few thousand postures."""
 _SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
-_UNEVEN = 1e3  # roughness of whole cells beside others
+CUT = 1e6
+"""Roughness of cells that are cut."""
 PARTS = 64  # of a line, at which it is asked for cuts
 
 
@@ -127,16 +128,15 @@ class Flood:
     """True for cells whose edges are all on one branch, shape of the cells."""
 
     def at(self, gamma: Array) -> tuple[Array, Array]:
-        """Frames to begin from, and the roughness of cells; infinite where no frame is known."""
-        free, of_nodes, rough = self.box.is_free, self.held.frame, self._rough
+        """Frames to begin from, and the roughness of cells; `CUT` where no frame is known."""
+        free, of_nodes = self.box.is_free, self.held.frame
         sizes, places = np.array(self.sizes)[free], self._in_cells(gamma)[:, free]
         fill = 3 - len(sizes)
         places = np.pad(places, ((0, 0), (fill, 0)))
         sizes = np.pad(sizes, (fill, 0), constant_values=1)
-        frames = np.empty((len(gamma), of_nodes.shape[1]))
-        interpolate(of_nodes, rough.ravel() < _UNEVEN, places, sizes, frames)
-        rough = rough[self.cells_at(gamma)]
-        frames[np.isinf(rough)] = of_nodes[self.held.is_found.argmax()]
+        frames, rough = np.empty((len(gamma), of_nodes.shape[1])), np.empty(len(gamma))
+        interpolate(of_nodes, self._rough.ravel(), places, sizes, frames, rough)
+        frames[rough == CUT] = of_nodes[self.held.is_found.argmax()]
         return frames, rough
 
     @lazy
@@ -150,7 +150,7 @@ class Flood:
                 smooth = np.logical_and.reduce([smooth.take(first + k, axis) for k in range(3)])
                 jumps = np.abs(np.diff(frames, 3, axis)).max(axis=-1).take(first, axis)
                 rough = np.maximum(rough, over_cells(jumps, np.maximum, axis))
-        return np.where(self.is_whole, np.where(smooth, rough, _UNEVEN), np.inf)
+        return np.where(self.is_whole, np.where(smooth, rough, UNEVEN), CUT)
 
     def nearest(self, gamma: Array) -> tuple[Array, Equilibria]:
         """The nearest nodes, and their postures."""

@@ -22,7 +22,7 @@ from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.kernels.lanes import LANES
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded.flood import PARTS, Flood, Flooding, Followed, follow, grid_sizes
+from softreach.rod.loaded.flood import CUT, PARTS, Flood, Flooding, Followed, follow, grid_sizes
 from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
@@ -39,6 +39,7 @@ _AT_ONCE, _BY_LINE = BLOCK // 8, 32 * LANES  # samples per task
 _TWIST = 1e-4  # [rad], of the twin over its length
 _OF_TWIN = 1e-3  # [L], its tolerance, as postures are polished on the arm
 _DOUBTFUL = 0.02  # margin below which what is found from the unloaded arm may not be its posture
+_BESIDE = 0.03  # [rad], by which the arm differs from its twin but near a pitchfork
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
@@ -221,7 +222,10 @@ class Postures:
         sizes = grid_sizes(self.box)
         if sizes is None or not self.is_held_at_rest:
             return self
-        flood = Flooding(self.twin, self.box, sizes).run(self.rest_activation, self.rest)
+        grid = Flooding(self.twin, self.box, sizes)
+        flood = grid.run(self.rest_activation, self.rest)
+        on_arm = polished(self.solver, grid.gamma, flood.held, _BESIDE)
+        flood.held.put(np.flatnonzero(on_arm.is_found), on_arm.of(on_arm.is_found))
         return FloodedPostures(self.solver, self.box, self.side, flood=flood)
 
 
@@ -251,7 +255,7 @@ class FloodedPostures(Postures):
     def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
         """Those of uncut cells, rough ones last: lanes wait for the slowest among them."""
         frames, rough = self.flood.at(gamma)
-        order = np.argsort(rough, kind="stable")[: np.isfinite(rough).sum()]
+        order = np.argsort(rough, kind="stable")[: (rough < CUT).sum()]
         return order, frames[order]
 
     def followed(self, gamma: Array) -> Followed:

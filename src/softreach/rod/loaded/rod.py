@@ -54,7 +54,7 @@ from softreach.rod.tip_map import (
     position_slopes,
 )
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
@@ -187,22 +187,12 @@ class LoadedRod(ArmRod):
         twists: Array | None = None,
         status: Status | None = None,
         directions: Array | None = None,
+        known: Equilibria | None = None,
     ) -> None:
         """Put tips, and what else is asked for, into place; each equilibrium is found once."""
-        known = self.postures.find(gamma)
+        known = known or self.postures.find(gamma)
         if status is not None:
             status[:] = known.status
-        self._fill(gamma, known, tips, slopes, twists, directions)
-
-    def _fill(
-        self,
-        gamma: Array,
-        known: Equilibria,
-        tips: Array,
-        slopes: Array | None = None,
-        twists: Array | None = None,
-        directions: Array | None = None,
-    ) -> None:
         is_moving = slopes is not None or twists is not None
         if self.end < self.length:
             shapes = self._shape_solver.shapes(gamma, np.array([self.end]), known)
@@ -243,25 +233,23 @@ class LoadedRod(ArmRod):
 
     def _points(self, gamma: Array, known: Equilibria) -> Array:
         """Places of the point that stands for the tip [m], shape (n, 3)."""
-        points, known = (
-            np.empty((len(gamma), 3)),
-            known._replace(status=np.zeros_like(known.status)),
-        )
+        points, stable = np.empty((len(gamma), 3)), np.zeros(len(gamma), np.int8)
+        known = known._replace(status=stable)
         for rows in parallel.blocks(len(gamma), _BLOCK):
-            self._fill(gamma[rows], known.of(rows), points[rows])
+            self.fill(gamma[rows], points[rows], known=known.of(rows))
         return points
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
         self.prepare()
         gamma, solver = self.box.check(activations), self.solver
-        compliance = np.empty((len(gamma), 3, 3))
+        known, compliance = self.postures.find_all(gamma), np.empty((len(gamma), 3, 3))
 
-        def fill(block: slice) -> None:
-            known = self.postures.find(gamma[block])
-            compliance[block] = solver.respond(gamma[block], known, compliance=True).compliance
+        def fill(rows: slice) -> None:
+            response = solver.respond(gamma[rows], known.of(rows), compliance=True)
+            compliance[rows] = response.compliance
 
-        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
+        parallel.run(partial(fill, rows) for rows in parallel.blocks(len(gamma), _BLOCK))
         return compliance
 
     def leans(self, activations: ArrayLike) -> Mask:
@@ -270,16 +258,10 @@ class LoadedRod(ArmRod):
         With the other twist it leans to the other.
         """
         self.prepare()
-        gamma, sides = self.box.check(activations), (self.postures, self._mirrored)
-        leans = np.empty(len(gamma), bool)
-
-        def fill(block: slice) -> None:
-            here, there = (side.find(gamma[block]) for side in sides)
-            leans[block] = has_tip(here.status) & has_tip(there.status)
-            leans[block] &= turn_between(here.frame, there.frame) > _SIDES
-
-        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
-        return leans
+        gamma = self.box.check(activations)
+        here, there = (side.find_all(gamma) for side in (self.postures, self._mirrored))
+        apart = turn_between(here.frame, there.frame) > _SIDES
+        return here.is_found & there.is_found & apart
 
     def shapes(
         self,
@@ -293,31 +275,29 @@ class LoadedRod(ArmRod):
         Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
         """
         gamma = self.box.check(activations)
-        z, at, found = np.asarray(framed, float), np.asarray(strained, float), self._found(gamma)
-        framed_shapes = strained_shapes = self._walked(found, z, status)
+        z, at, known = (
+            np.asarray(framed, float),
+            np.asarray(strained, float),
+            self.equilibria(gamma),
+        )
+        framed_shapes = strained_shapes = self._walked(gamma, known, z, status)
         if not np.array_equal(z, at):
-            strained_shapes = self._walked(found, at, status)
+            strained_shapes = self._walked(gamma, known, at, status)
         return Shapes(*framed_shapes.frames, *self.strains_under(gamma, at, strained_shapes))
 
     def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
-        shapes = self._walked(self._found(gamma), z, status)
+        shapes = self._walked(gamma, self.equilibria(gamma), z, status)
         return shapes.frames, shapes.moment
 
-    def _found(self, gamma: Array) -> tuple[Array, Index, Equilibria]:
-        gamma, lost = self.with_arms(gamma)
-        return gamma, lost, self.equilibria(gamma)
-
     def _walked(
-        self, found: tuple[Array, Index, Equilibria], z: Array, status: Status | None
+        self, gamma: Array, known: Equilibria, z: Array, status: Status | None
     ) -> LoadedShapes:
-        gamma, lost, known = found
         if not len(z):
             return LoadedShapes.empty(len(gamma), 0)
-        shapes = self._shape_solver.shapes(gamma, z, known, status=status)
+        shapes = self._shape_solver.shapes(gamma, z, known)
         if status is not None:
-            gone = np.isnan(shapes.frames.position[:, 0, 0])
-            status[gone & has_tip(status)] = TipStatus.UNDECIDED
-        drop(lost, status, *shapes.frames, shapes.moment, shapes.force)
+            gone = known.is_found & np.isnan(shapes.frames.position[:, 0, 0])
+            status[:] = np.where(gone, TipStatus.UNDECIDED, known.status)
         return shapes
 
     def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:

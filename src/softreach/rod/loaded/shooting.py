@@ -84,17 +84,6 @@ MARGIN_ALONE = Search(np.inf, np.inf, (1, 0))
 """One walk from where it is."""
 
 
-class Walked(NamedTuple):
-    """What arms in equilibrium say, where it is asked for."""
-
-    slopes: Array
-    """(v, ω) of the tips per activation, shape (n, 6, bundles) or (0, 6, bundles)."""
-    compliance: Array
-    """∂r/∂F [m/N], shape (n, 3, 3) or (0, 3, 3)."""
-    trace: Array
-    """Sections between steps, tip first, shape (n, step + 1, `TRACE`) or (0, step + 1, `TRACE`)."""
-
-
 def shoot(
     gamma: Array,
     tables: LoadTables,
@@ -136,16 +125,21 @@ def walk(
     slopes: bool = False,
     compliance: bool = False,
     trace: bool = False,
-) -> Walked:
-    """One walk along arms in equilibrium; see `respond`."""
+) -> tuple[Array, Array, Array]:
+    """One walk along arms in equilibrium; see `respond`.
+
+    Returns:
+        Where they are asked for, else of length 0: (v, ω) of the tips per activation, shape (n, 6,
+        bundles); ∂r/∂F [m/N], shape (n, 3, 3); sections between steps, tip first, shape (n, step +
+        1, `TRACE`).
+    """
     n, columns = len(gamma), _columns(gamma)
-    answers = (
-        np.zeros((n if slopes else 0, 6, columns.shape[1])),
-        np.zeros((n if compliance else 0, 3, 3)),
-        np.zeros((n if trace else 0, len(steps.lengths) + 1, TRACE)),
-    )
-    respond(columns, tables.at_tip, np.ascontiguousarray(frames), tuple(steps), *answers)
-    return Walked(answers[0][:, :, : gamma.shape[1]], *answers[1:])
+    twists = np.zeros((n if slopes else 0, 6, columns.shape[1]))
+    yields = np.zeros((n if compliance else 0, 3, 3))
+    sections = np.zeros((n if trace else 0, len(steps.lengths) + 1, TRACE))
+    walked = columns, tables.at_tip, np.ascontiguousarray(frames), tuple(steps)
+    respond(*walked, twists, yields, sections)
+    return twists[:, :, : gamma.shape[1]], yields, sections
 
 
 def base_directions(
@@ -165,8 +159,6 @@ def _columns(gamma: Array) -> Array:
 class Response(NamedTuple):
     """Derivatives of tips along activations and forces."""
 
-    tips: Array
-    """r [m], shape (n, 3)."""
     twists: Array
     """(v, ω) per activation, shape (n, 6, bundles)."""
     compliance: Array
