@@ -79,17 +79,17 @@ def test_designs_with_more_bundles_share_the_activations_of_the_others(tmp_path)
 
 
 def test_best_designs_are_the_best_that_meet_the_constraints(paper):
-    found = best_designs(paper, "volume", where={"taper": (None, 0.01)}, count=3)
+    found = best_designs(paper, "volume", where="taper<=0.01", count=3)
     truth = np.sort(paper.volume.sel(taper=0.0).values)[::-1]
     np.testing.assert_array_equal(found.volume, truth[:3])
-    for where in (["taper_deg<=0.57"], "taper<=0.01", {"taper_deg": (None, 0.57)}):
+    for where in (["taper_deg<=0.57"], "taper_deg<0.57"):
         assert best_designs(paper, "volume", where=where, count=3).identical(found)
     between = best_designs(paper, "volume", where=["taper_deg>=0.9", "taper_deg<=2.1"], count=99)
     taper = np.degrees(between.taper)
     assert 0.9 < taper.min() <= taper.max() < 2.1  # both constraints of one name
     least = best_designs(paper, "unreachability", smallest=True)
     np.testing.assert_allclose(least.unreachability, [paper.unreachability.min()])
-    assert best_designs(paper, "volume", where={"volume": (9.0, None)}).sizes["rank"] == 0
+    assert best_designs(paper, "volume", where=["volume>=9"]).sizes["rank"] == 0
     with pytest.raises(InvalidInput, match="metric = volumes: must be one of"):
         best_designs(paper, "volumes")
 

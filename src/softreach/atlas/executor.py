@@ -62,28 +62,18 @@ def an_executor(name: str, value: Any) -> Any:
     """
     if value is None or isinstance(value, Executor) or hasattr(value, "get_executor"):
         return value
-    allowed = "a concurrent.futures executor, or a Dask client"
-    raise InvalidInput(name, as_given(value), allowed)
+    raise InvalidInput(name, as_given(value), "a concurrent.futures executor, or a Dask client")
 
 
 def run_designs(
-    store: AtlasStore,
-    indices: Sequence[int],
-    executor: ExecutorLike,
-    on_outcome: OnOutcome,
+    store: AtlasStore, indices: Sequence[int], executor: ExecutorLike, on_outcome: OnOutcome
 ) -> None:
-    """Compute designs and store them.
-
-    Args:
-        store: Where they go.
-        indices: Which designs.
-        executor: None for the threads of this process; else what runs the designs, one a task.
-        on_outcome: Called with each outcome as it comes.
+    """Compute and store designs, one a task; each outcome is reported as it comes.
 
     Raises:
         InvalidInput: A metric that worker processes cannot get.
         StoreFailed: The store cannot be written.
-        SoftreachError: A worker died, and with it the executor.
+        NotPossible: A worker died, and with it the executor.
     """
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.

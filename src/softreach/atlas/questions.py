@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -20,13 +20,10 @@ from softreach.rod.rods import tip_map, with_unstable
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
     as_flag,
-    as_given,
     as_integer,
-    as_mapping,
     as_names,
     as_number,
     as_text,
-    plain,
 )
 from softreach.support.errors import InvalidInput, did_you_mean
 from softreach.support.quantity import columns, numbers_in
@@ -40,7 +37,6 @@ if TYPE_CHECKING:
 
 _QUICK = 3e8  # bytes of tips
 _MOST_MESSAGES = 10
-Interval = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,7 +162,7 @@ def best_designs(
     metric: str,
     *,
     smallest: bool = False,
-    where: Mapping[str, Interval] | Iterable[str] | None = None,
+    where: str | Sequence[str] = (),
     count: int = 1,
 ) -> xr.Dataset:
     """The designs with the largest or smallest metric among those that meet the constraints.
@@ -175,9 +171,8 @@ def best_designs(
         atlas: A store, or a dataset from `open_atlas`.
         metric: What to compare.
         smallest: Whether smaller values are better.
-        where: Metric or parameter -> (lowest, highest) allowed; None leaves an end open. Or texts
-            like `unreachability<=0.4`; parameters are called by their names, or with the units
-            of the command line, as in `taper_deg<=1`.
+        where: Constraints that all hold, such as `unreachability<=0.4`; parameters are called by
+            their names, or with the units of the command line, as in `taper_deg<=1`.
         count: How many designs at most.
 
     Returns:
@@ -188,7 +183,7 @@ def best_designs(
     """
     metric, smallest = as_text("metric", metric), as_flag("smallest", smallest)
     count, opened = as_integer("count", count, 1), opened_atlas(atlas)
-    limits = list(_limits(where, opened))
+    limits = list(_limits(as_names("where", where), opened))
     dims = opened["status"].dims
     numbers = [name for name in opened.data_vars if opened[name].dims == dims]
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
@@ -203,40 +198,25 @@ def best_designs(
     return stacked.isel(rank=order[allowed[order]][:count])
 
 
-def _limits(
-    where: Mapping[str, Interval] | Iterable[str] | None, atlas: xr.Dataset
-) -> Iterator[tuple[str, float, float]]:
+def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, float, float]]:
     """Variable, lowest and highest value allowed, in SI units."""
-    if isinstance(where, Mapping):
-        pairs = as_mapping("where", where, _interval).items()
-    else:
-        pairs = map(_constraint, as_names("where", () if where is None else where))
     written = {
         written_name(str(name), unit): (str(name), unit)
         for name, values in atlas.variables.items()
         if (unit := values.attrs.get("units", "1"))
     }
-    for text, (low, high) in pairs:
+    for text, low, high in map(_constraint, where):
         name, unit = written.get(text, (text, "1"))
         yield name, from_written(low, unit), from_written(high, unit)
 
 
-def _interval(name: str, value: object) -> tuple[float, float]:
-    if not isinstance(value, tuple | list) or len(value) != 2:
-        raise InvalidInput(name, as_given(value), "(lowest, highest), of which one may be None")
-    low, high = (
-        end if x is None or plain(x) == end else as_number(name, x)
-        for x, end in zip(value, (-math.inf, math.inf), strict=True)
-    )
-    return low, high
-
-
-def _constraint(text: str) -> tuple[str, tuple[float, float]]:
+def _constraint(text: str) -> tuple[str, float, float]:
     """`taper_deg<=1` -> its name, and the numbers between which it is."""
-    name, sign, number = re.fullmatch(r"(.*?)([<>]=?|$)(.*)", text, re.DOTALL).groups()
+    name, sign, number = (*re.split("([<>]=?)", text, maxsplit=1), "", "")[:3]
     if (values := numbers_in(number, 1)) is None:
         raise InvalidInput("where", text or "''", "a name, <= or >=, and a finite number")
-    return name.strip(), (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)
+    low, high = (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)
+    return name.strip(), low, high
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:

@@ -224,7 +224,8 @@ def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str
 
 def _write_npz(table: CloudTable, file: BufferedWriter) -> None:
     described = {key: np.array(value) for key, value in table.metadata.items()}
-    np.savez(file, **described, **_arrays(table), bundle=np.array(table.bundles))
+    arrays: dict[str, Any] = {**described, **_arrays(table), "bundle": np.array(table.bundles)}
+    np.savez(file, **arrays)
 
 
 def _write_mat(table: CloudTable, file: BufferedWriter) -> None:

@@ -43,7 +43,7 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
     turns = np.radians(np.linspace(0, 108, settings.designs))
     tapers = np.radians(np.linspace(0, 3, settings.designs))
     space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
-    sizes = {"alpha_over_length": settings.alpha, "accuracy": settings.accuracy}
+    sizes: dict[str, Any] = {"alpha_over_length": settings.alpha, "accuracy": settings.accuracy}
     store = notes.folder.parent / _STORE
     atlas = build_atlas(space, store, settings.samples, settings.seed, **sizes)
     for name, figure in atlas_figures(atlas, settings.panels):

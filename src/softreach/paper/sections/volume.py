@@ -24,16 +24,16 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
     sizes = (settings.samples // 16, settings.samples)
     clouds = {n: compute_cloud(arm, n, seed=settings.seed).tip for n in sizes}
     curves = {f"{n:,} tips": volume_curve(tips, _CURVE) for n, tips in clouds.items()}
-    known = {"length": arm.length, "exact": reached.volume, "convex": reached.convex_volume}
+    known: dict[str, Any] = {"exact": reached.volume, "convex": reached.convex_volume}
     words = (
         "Volume of the α-shape of the paper's design against its radius, which the paper does not "
         "state, beside the exact volume of the reachable set and of its convex hull."
     )
-    notes.draw("", "alpha_dependence", words, plot_volume_curve(curves, _CURVE, **known))
+    ax = plot_volume_curve(curves, _CURVE, length=arm.length, **known)
+    notes.draw("", "alpha_dependence", words, ax)
     return {
-        "exact": reached.volume,
+        **known,
         "exact_error": reached.volume_error,
-        "convex": reached.convex_volume,
         "radii": _RADII,
         "volumes": {str(n): volume_curve(t, np.array(_RADII)).tolist() for n, t in clouds.items()},
     }
