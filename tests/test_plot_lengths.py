@@ -215,20 +215,19 @@ def plot_arm(of):
     yield from space(plot.plot_arm(of.arm, view=OBLIQUE), of.rest)
 
 
-@case(may_not_know=False)
-def plot_check(of):
-    """At the tip of the arm at rest, inside a box around it."""
+def checked(of):
+    """The arm at rest, inside a box around it, and that box."""
     needs = sr.requirements
     box = needs.Box(*(of.rest.min(axis=0) - 0.01, of.rest.max(axis=0) + 0.01))
-    check = sr.check(
-        of.arm,
-        sr.Requirements(
-            targets=[needs.Target([0.0, 0.0, LENGTH])],
-            keeps=[needs.Keep(box, True)],
-        ),
-    )
-    yield from plane(plot.plot_check(check, view="side"), box.bounds)
-    yield from space(plot.plot_check(check), box.bounds)
+    target = needs.Target([0.0, 0.0, LENGTH])
+    return sr.check(of.arm, sr.Requirements(targets=[target], keeps=[needs.Keep(box, True)])), box
+
+
+@case(may_not_know=False)
+def plot_check(of):
+    check, box = checked(of)
+    yield from plane(plot.plot_check(check, view="side", unit="L"), box.bounds)
+    yield from space(plot.plot_check(check, unit="L"), box.bounds)
 
 
 @case(may_not_know=False)
@@ -350,6 +349,14 @@ def texts() -> list[str]:
 
     figures = map(plt.figure, plt.get_fignums())
     return [text.get_text() for figure in figures for text in figure.findobj(Text)]
+
+
+def test_a_check_is_drawn_in_the_unit_that_its_design_is_shown_in(everything):
+    plt.close("all")
+    ax = plot.plot_check(checked(everything)[0], view="side")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("y [mm]", "z [mm]")
+    assert ax.get_ylim()[1] > 1e3 * LENGTH
+    assert not any(re.search(r"\bL\b", text) for text in texts())
 
 
 def test_numbers_along_a_box_stand_where_they_say(everything):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,11 +41,7 @@ _OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": MISSED, "linewidths": 0
 _MOST_LINES = 200
 
 
-class _HasDataset(Protocol):
-    def to_dataset(self) -> xr.Dataset: ...
-
-
-def _dataset_of(name: str, result: _HasDataset, maker: str, variable: str) -> xr.Dataset:
+def _dataset_of(name: str, result: Any, maker: str, variable: str) -> xr.Dataset:
     of_maker = hasattr(result, "to_dataset") and not isinstance(result, type)
     data = result.to_dataset() if of_maker else None
     if data is None or variable not in getattr(data, "variables", {}):
@@ -53,9 +49,7 @@ def _dataset_of(name: str, result: _HasDataset, maker: str, variable: str) -> xr
     return data
 
 
-def plot_calibration(
-    calibration: _HasDataset, *, view: View = "oblique", unit: Unit = None
-) -> Figure:
+def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = None) -> Figure:
     """Draw how far measured and predicted places of the markers are apart.
 
     In space, with a line from each measured place to the predicted one; the distances by marker, in
@@ -65,7 +59,7 @@ def plot_calibration(
     Args:
         calibration: What `calibrate` returned.
         view: The direction of sight of the picture in space, as in `plot_cloud`.
-        unit: Unit of lengths, m, cm, mm or L; None for mm, or m for arms from 1 m.
+        unit: Unit of lengths, m, cm, mm or L; None for that of the design, as in the report.
 
     Raises:
         InvalidInput: Unknown view or unit, or no calibration.
@@ -73,8 +67,8 @@ def plot_calibration(
     """
     data = _dataset_of("calibration", calibration, "calibrate", "residual")
     view_angles(view)
-    length = float(data.attrs["length"])
-    shown = _Errors(data, unit_for(length, handy_unit(length) if unit is None else unit))
+    arm = calibration.arm
+    shown = _Errors(data, unit_for(arm.length, arm.length_unit if unit is None else unit))
     inputs = shown.moving_inputs
     rows = math.ceil(len(inputs) / _COLUMNS)
     with figure_style():
@@ -191,7 +185,7 @@ def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
     shown.frame(ax)
 
 
-def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
+def plot_search(search: Any, *, unit: Unit = None) -> Figure:
     """Draw what a search came to: designs that were judged, and the best in their ranges.
 
     Of one objective, its value against the designs that were looked at, with the best so far, and
@@ -200,7 +194,8 @@ def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
 
     Args:
         search: What `search` returned.
-        unit: Unit of lengths and volumes, m, cm, mm or L; None for mm, or m for arms from 1 m.
+        unit: Unit of lengths and volumes, m, cm, mm or L; None for that of the design, as in the
+            report.
 
     Raises:
         InvalidInput: Unknown unit, or no search.
