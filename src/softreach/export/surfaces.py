@@ -20,6 +20,7 @@ from softreach.export.formats import (
     write_vtu,
 )
 from softreach.geometry.surface import SurfaceMesh, parted
+from softreach.geometry.tube import joined
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points
@@ -164,11 +165,12 @@ def export_arm(
 
 
 def _write_ply(scene: Scene, file: BufferedWriter) -> None:
-    vertices, faces = _joined(scene.parts)
+    surface = joined(scene.parts)
     colors = np.concatenate([_colors(part) for part in scene.parts])
-    columns = dict(zip("xyz", vertices.T, strict=True))
+    columns = dict(zip("xyz", surface.vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    write_ply(file, len(vertices), [columns], {"units": scene.unit.name}, faces)
+    units = {"units": scene.unit.name}
+    write_ply(file, len(surface.vertices), [columns], units, surface.faces)
 
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
@@ -208,19 +210,14 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
 
 
 def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
-    vertices, faces = _joined(scene.parts)
+    surface = joined(scene.parts)
     number = np.repeat(np.arange(len(scene.parts)), [len(part.faces) for part in scene.parts])
-    write_vtu(file, vertices, [("triangle", faces)], cell_data={"part": [number]})
+    cells = [("triangle", surface.faces)]
+    write_vtu(file, surface.vertices, cells, cell_data={"part": [number]})
 
 
 def _said_unit(scene: Scene) -> str:
     return f"softreach, lengths in {scene.unit.name}"
-
-
-def _joined(parts: Sequence[Part]) -> tuple[Array, Faces]:
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-    return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
 
 
 def _colored(part: Part) -> Any:

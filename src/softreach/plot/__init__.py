@@ -1,4 +1,4 @@
-"""The figures of softreach: they take data and draw it, and compute nothing.
+"""The figures of softreach: they take data and draw it.
 
 What draws one panel takes `ax=None` and returns the axes; what draws several returns the figure.
 """

@@ -283,11 +283,10 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
     ax.scatter(*shown.values[way].T, edgecolors=MET, label="on the way", zorder=3, **_COARSE)
     rows = np.flatnonzero(shown.front & shown.feasible)
     if len(rows):
-        rows = rows[np.argsort(shown.values[rows, 0])]
         points, errors = shown.values[rows].T, shown.errors[rows].T
         # Between two designs nothing is known to be better than the worse one of each value.
         where = "post" if shown.senses[0] < 0 else "pre"
-        ax.step(*points, where=where, color=BEST, lw=0.9, zorder=2)
+        ax.step(*points[:, points[0].argsort()], where=where, color=BEST, lw=0.9, zorder=2)
         ax.errorbar(*points, *errors[::-1], **_BARS)
         ax.scatter(*points, label="front, full accuracy", **_FINAL)
     words = [
