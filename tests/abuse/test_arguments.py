@@ -90,7 +90,7 @@ OF_OBJECTS = {
     "Requirements.save": sr.Requirements().save,
     "TipMap.tips": sr.rod.as_tip_map(ARM).tips,
 }
-SHEETS = {"box_over_length", "plot_cloud_sheet", "plot_hull_sheet", "plot_metric_map", "sheet_axes"}
+SHEETS = {"atlas_figures", "plot_cloud_sheet", "plot_hull_sheet", "plot_metric_map"}
 """Functions of an atlas, whose arguments are checked where they are used."""
 
 PUBLIC = {

@@ -109,7 +109,7 @@ def _design(
     unit: str | None,
 ) -> list[Path]:
     if out.suffix == ".jl":
-        from softreach.exchange.activefilaments.definition import FILAMENT_SCRIPT, write_design
+        from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
 
         refuse("on a filament's definition, which has none", activation=activation)
         refuse(_OTHER, unit=unit)
