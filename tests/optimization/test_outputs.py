@@ -207,7 +207,7 @@ def test_the_exit_code_says_whether_the_best_meets_all(folder, capsys):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--free", "taper_deg=3:0"], "free taper_deg = '3:0': must be a range with low < high"),
+        (["--free", "taper_deg=3:0"], "free taper_deg = '3:0': must be a range (low, high) with l"),
         (["--free", "taper_deg"], "free = taper_deg: must be NAME=LOW:HIGH"),
         (["--maximize", "luck"], "maximize = 'luck': must be one of exact_volume"),
         (["--choice", "bundles=0"], "choices bundles = '0': must be whole numbers of 1 or more"),

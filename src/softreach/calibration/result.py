@@ -32,7 +32,7 @@ from softreach.support.arrays import Array, Index, Mask, as_rows
 from softreach.support.errors import counted
 from softreach.support.files.text import write_text
 from softreach.support.quantity import quantity
-from softreach.support.report import Report, Section
+from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit, as_unit, readable_unit
 from softreach.support.versions import versions
 
@@ -71,7 +71,7 @@ class ErrorRow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration:
+class Calibration(Reported):
     """A calibrated arm, the numbers that were fitted, and all that the data says of them."""
 
     arm: Manipulator
@@ -379,9 +379,6 @@ class Calibration:
                 Section(title="The calibrated design", text=arm.to_toml()),
             ],
         )
-
-    def __repr__(self) -> str:
-        return str(self.report())
 
 
 def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:

@@ -12,7 +12,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
 from softreach.optimization.deviations import TOL, FirstOrder, region_places
-from softreach.requirements.requirements import Requirements, Target, with_payload
+from softreach.requirements.requirements import Target, with_payload
 from softreach.rod.rods import tip_map
 from softreach.sampling import sample_cube
 from softreach.support import parallel
@@ -75,34 +75,25 @@ class _Made(NamedTuple):
     """Of each region."""
 
 
-class ArmsMade(NamedTuple):
-    """All arms that were made."""
-
-    made: list[_Made]
-    impossible: int
-    error_of_kept: float
-
-
-def arms_made(first: FirstOrder, count: int, seed: int, progress: Progress) -> ArmsMade:
-    """Arms with the first of the changes, each asked what it keeps."""
+def arms_made(
+    first: FirstOrder, count: int, seed: int, progress: Progress
+) -> tuple[list[_Made], float]:
+    """Arms with the first of the changes that can exist, and the error of what they keep."""
     if not count:
-        return ArmsMade([], 0, math.nan)
+        return [], 0.0
     followed = _Followed.of(first, seed)
     starts = [
         _starts(first, places[tried(len(places))])
-        for target in with_places(first.needs)
+        for target in first.targets
         if (places := target.places) is not None
     ]
     tasks = (partial(_made, first, followed, starts, change) for change in first.changes[:count])
-    made, impossible = [], 0
+    made = []
     for each in parallel.in_order(tasks):
         progress(1)
-        if each is None:
-            impossible += 1
-        else:
-            made.append(each)
-    kept = float(np.mean([each.kept for each in made])) if made else math.nan
-    return ArmsMade(made, impossible, followed.error(kept))
+        made += [] if each is None else [each]
+    kept = [each.kept for each in made]
+    return made, followed.error(float(np.mean(kept))) if made else 0.0
 
 
 def _made(
@@ -121,9 +112,9 @@ def _made(
                 solid.unreachability,
                 tuple(
                     _reached(arm, first, target, start)
-                    for target, start in zip(with_places(first.needs), starts, strict=True)
+                    for target, start in zip(first.targets, starts, strict=True)
                 ),
-                tuple(_share(arm, solid, first, t) for t in with_region(first.needs)),
+                tuple(_share(arm, solid, first, t) for t in first.regions),
             )
         except InvalidDesign:
             return None
@@ -131,16 +122,6 @@ def _made(
             if error.name != "loads":
                 raise
             return None
-
-
-def with_places(needs: Requirements) -> list[Target]:
-    """Targets that are places."""
-    return [target for target in needs.targets if target.places is not None]
-
-
-def with_region(needs: Requirements) -> list[Target]:
-    """Targets that are regions."""
-    return [target for target in needs.targets if target.region is not None]
 
 
 def tried(count: int) -> Index:

@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.optimization.deviations import FirstOrder, Spread, deviations_of
-from softreach.optimization.monte_carlo import ArmsMade, arms_made, tried, with_places, with_region
+from softreach.optimization.monte_carlo import arms_made, tried
 from softreach.requirements.requirements import Requirements
 from softreach.rod.rods import tip_map
 from softreach.schema import provenance
@@ -100,9 +100,9 @@ def tolerance(
         found = counted(count, "free bundle")
         raise NotPossible(f"a tolerance needs three free bundles or more, and this arm has {found}")
     with no_warnings():
-        first = FirstOrder(deviations, needs, accuracy, deviations.draws(samples, seed))
-        arms = arms_made(first, checked, seed, progress)
-        return _tolerance(first, arms)
+        shape = samples, len(deviations.sigmas)
+        changes = np.random.default_rng(seed).standard_normal(shape) * deviations.sigmas
+        return _tolerance(FirstOrder(deviations, needs, accuracy, changes), checked, seed, progress)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -201,14 +201,15 @@ def _target_text(target: TargetTolerance) -> str:
     return f"{target.name} reached  {text}{which}"
 
 
-def _tolerance(first: FirstOrder, arms: ArmsMade) -> Tolerance:
-    made, deviations = arms.made, first.deviations
+def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
+    deviations = first.deviations
+    made, error_of_kept = arms_made(first, checked, seed, progress)
 
     def column(name: str) -> Array:
         return np.array([getattr(each, name) for each in made], float)
 
     targets = []
-    for k, target in enumerate(with_places(first.needs)):
+    for k, target in enumerate(first.targets):
         probability = first.probability(target)
         share = np.full(len(probability), np.nan)
         if made:
@@ -219,7 +220,7 @@ def _tolerance(first: FirstOrder, arms: ArmsMade) -> Tolerance:
         parameters=deviations.names,
         units=tuple(each.unit for each in deviations.parameters),
         sigmas=deviations.sigmas,
-        kept=first.kept().with_made(column("kept"), arms.error_of_kept if made else 0.0),
+        kept=first.kept().with_made(column("kept"), error_of_kept),
         volume=first.of_set("volume", "m3", 1.0).with_made(column("volume")),
         unreachability=first.of_set("unreachability", "1", -1.0).with_made(
             column("unreachability")
@@ -227,9 +228,9 @@ def _tolerance(first: FirstOrder, arms: ArmsMade) -> Tolerance:
         targets=tuple(targets),
         regions=tuple(
             first.covered(target).with_made(np.array([each.covered[k] for each in made], float))
-            for k, target in enumerate(with_region(first.needs))
+            for k, target in enumerate(first.regions)
         ),
         costs=first.costs(),
         made=len(made),
-        impossible=arms.impossible,
+        impossible=checked - len(made),
     )

@@ -133,16 +133,7 @@ def _best(rules: PoseRules, solutions: Solutions) -> Posed:
 def _ranked(
     rules: PoseRules, places: Array, owner: Index, gamma: Array, gaps: Array, nearest: Array
 ) -> Posed:
-    """Of each place the pose that breaks the rules least, then that of least effort.
-
-    Args:
-        rules: Regions and limits of poses.
-        places: Shape (place, 3).
-        owner: Place of each pose; each place has one at least.
-        gamma: Inputs of the poses.
-        gaps: Distances from their tips to the places [m].
-        nearest: Their tips.
-    """
+    """Of each place the best of the poses that it owns, one at least."""
     lost = ~np.isfinite(gamma).all(axis=1)
     gamma[lost] = rules.rod.box.low
     judged = rules.judged(gamma)
