@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.optimization.design_point import DesignPoint
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.objectives import goals
 from softreach.optimization.polish import point_of
 from softreach.optimization.problem import Problem
-from softreach.optimization.program import Point, stacked, stacked_slopes
+from softreach.optimization.program import DesignPoint, Point, stacked, stacked_slopes
 from softreach.requirements import Box, Keep, Limits, Requirements, Sphere, Target
 
 ARM = sr.designs.minimal_trunk(revolution=np.radians(40), taper=np.radians(2))
@@ -101,7 +100,7 @@ def test_rooms_are_differentiated(start):
 
 def test_coverage_of_a_region_is_differentiated_by_what_the_boundary_sweeps(monkeypatch):
     # as many places as the differences need
-    monkeypatch.setattr("softreach.optimization.design_point._PLACES", 1 << 16)
+    monkeypatch.setattr("softreach.optimization.program._PLACES", 1 << 16)
     needs = Requirements(targets=[Target(region=Sphere(tuple(PLACES[0]), 0.3), share=0.1)])
     of = problem(needs, {"length": (0.8, 1.2), "lower": (-2.0, -1.0)}, maximize="coverage")
     values = {"length": 1.0, "lower": -5.0 / 3.0}

@@ -263,14 +263,14 @@ def test_no_tip_is_farther_than_the_longest_arm():
 
 
 def test_many_places_are_met_in_blocks_that_change_nothing(monkeypatch):
-    from softreach.requirements import chosen_poses
+    from softreach.requirements import poses
 
     tips = sr.tip_positions(ARM, np.random.default_rng(0).uniform(-1.6, 0, (64, 3)))
     needs = Requirements(targets=[Target(tips * 1.1)], limits=Limits(bending=0.3))
     done = []
     one = sr.check(ARM, needs, progress=done.append)
     assert sum(done) == 64
-    monkeypatch.setattr(chosen_poses, "_BLOCK", 10)
+    monkeypatch.setattr(poses, "_PLACES", 10)
     other = sr.check(ARM, needs)
     np.testing.assert_array_equal(one.poses, other.poses)
     np.testing.assert_array_equal(one.gaps, other.gaps)

@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.optimization.design_point import DesignPoint
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import Part, Point, stacked, stacked_slopes
+from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
 from softreach.requirements.parts import POSE_LIMITS
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap

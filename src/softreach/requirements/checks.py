@@ -11,7 +11,6 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.requirements.advice import advice
-from softreach.requirements.chosen_poses import TOL, Chooser, Posed, chosen, descended, solved
 from softreach.requirements.findings import (
     Finding,
     Verdict,
@@ -22,7 +21,16 @@ from softreach.requirements.findings import (
     verdict_of,
 )
 from softreach.requirements.parts import Keep, Target
-from softreach.requirements.poses import PoseRules, worst_pose
+from softreach.requirements.poses import (
+    TOL,
+    Chooser,
+    Posed,
+    PoseRules,
+    chosen,
+    descended,
+    solved,
+    worst_pose,
+)
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.bending import bending_over_bounds
