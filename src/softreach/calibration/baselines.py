@@ -11,7 +11,7 @@ from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.measurements import Measurements
-from softreach.calibration.model import marker_stations
+from softreach.calibration.model import marker_places, marker_stations
 from softreach.support.arrays import Array, Mask
 from softreach.support.progress import Progress, silent
 
@@ -20,14 +20,9 @@ _PENALTIES = np.logspace(-8, 2, 21)
 
 
 def ridge(features: Array, target: Array) -> Callable[[Array], Array]:
-    """Linear law of features with the penalty of least generalized cross-validation.
+    """Linear law of features (n, feature) with the penalty of least generalized cross-validation.
 
-    Args:
-        features: Shape (n, feature).
-        target: Shape (n, number).
-
-    Returns:
-        Predictor of other rows of features.
+    It predicts targets (n, number) of other rows of features.
     """
     middle, size = features.mean(axis=0), features.std(axis=0)
     size = np.where(size > 0, size, 1.0)
@@ -108,8 +103,7 @@ class _Arcs(NamedTuple):
     @classmethod
     def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:
         stations, offsets = marker_stations(arm)
-        names = [marker.name for marker in arm.markers] or ["tip"]
-        measured = [names.index(name) for name in data.marker_names]
+        measured = marker_places(arm, data.marker_names)
         ends = [part.span(arm.length)[1] for part in arm.actuators]
         whole = np.unique(np.round([*ends, arm.length], 9))
         middles = 0.5 * (np.append(0.0, whole[:-1]) + whole)
