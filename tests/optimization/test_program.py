@@ -7,9 +7,8 @@ import pytest
 
 import softreach as sr
 from softreach.optimization.free_parameters import free_parameters
-from softreach.optimization.objectives import goals
 from softreach.optimization.polish import point_of
-from softreach.optimization.problem import Problem
+from softreach.optimization.problem import Problem, goals
 from softreach.optimization.program import DesignPoint, Point, stacked, stacked_slopes
 from softreach.requirements import Box, Keep, Limits, Requirements, Sphere, Target
 

@@ -14,8 +14,15 @@ from softreach.arm.load_number import mass
 from softreach.arm.parameters import changed, find_parameter
 from softreach.optimization import sensitivity
 from softreach.optimization.free_parameters import free_parameters
-from softreach.optimization.objectives import DesignCase, Goal, Objective, Value, goals
-from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.problem import (
+    Candidate,
+    DesignCase,
+    Goal,
+    Objective,
+    Problem,
+    Value,
+    goals,
+)
 from softreach.requirements import Limits, Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidInput, NotPossible

@@ -12,8 +12,7 @@ from softreach.arm.load_number import load_number, mass
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameters, parameters_by_every_name
 from softreach.optimization.free_parameters import Values
-from softreach.optimization.objectives import SETS, DesignCase, Goal
-from softreach.optimization.problem import Problem
+from softreach.optimization.problem import SETS, DesignCase, Goal, Problem
 from softreach.requirements.poses import PoseRules, effort_scales
 from softreach.requirements.regions import Region
 from softreach.rod.rods import effective, in_steps, refined, tip_map

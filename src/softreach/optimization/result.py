@@ -17,8 +17,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import unit_suffix
 from softreach.arm.written import with_suffix
 from softreach.optimization.free_parameters import FreeParameter
-from softreach.optimization.objectives import Goal, Value
-from softreach.optimization.problem import NEAR, Candidate, Problem
+from softreach.optimization.problem import NEAR, Candidate, Goal, Problem, Value
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance

@@ -13,7 +13,7 @@ from softreach.arm.parameters import unknown_parameter
 from softreach.arm.written import Written
 from softreach.atlas.space_file import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
-from softreach.optimization.objectives import goals, known_objective
+from softreach.optimization.problem import goals, known_objective
 from softreach.optimization.study import SAMPLERS
 from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_flag, as_integer, as_number, as_one_of

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from softreach.atlas.metric import MetricFailed
-from softreach.optimization.objectives import SETS, Goal
 from softreach.optimization.polish import point_of
-from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.problem import SETS, Candidate, Goal, Problem
 from softreach.optimization.program import Point, stacked_slopes
 from softreach.optimization.result import Search
 from softreach.support import parallel
