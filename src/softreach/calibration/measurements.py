@@ -157,7 +157,7 @@ def read_measurements(
     sources = _input_columns(arm, [name for name in columns if name not in taken], columns_of)
     values = _inputs(table, sources, arm.input_units)
     places = _places(table, {name: triples[start] for name, start in chosen.items()})
-    seen = np.isfinite(places).any(axis=(0, 2))
+    seen = np.asarray(np.isfinite(places).any(axis=(0, 2)))
     if lost := [name for name, own in zip(chosen, seen, strict=True) if not own]:
         warn(f"markers that were never seen are left out: {', '.join(lost)}")
         places, chosen = places[:, seen], {k: x for k, x in chosen.items() if k not in lost}

@@ -270,8 +270,8 @@ class FirstOrder:
 
 def _spread_of(name: str, shares: Array, nominal: float, mean: float, error: float) -> Spread:
     low, deviation = max(0.0, float(np.quantile(shares, _QUANTILE))), float(shares.std())
-    own = {"nominal": nominal, "mean": mean, "deviation": deviation, "quantile": low}
-    return Spread(name=name, unit="1", error=error, **own)
+    first = dict(nominal=nominal, mean=mean, deviation=deviation, quantile=low, error=error)
+    return Spread(name=name, unit="1", **first)  # pyright: ignore[reportArgumentType]
 
 
 def region_places(target: Target) -> Array:

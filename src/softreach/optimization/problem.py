@@ -327,15 +327,6 @@ class Candidate:
         return cls(**{**record, "objectives": objectives, "undecided": (*record["undecided"],)})
 
 
-class Score(NamedTuple):
-    """Order of candidates of one goal, or of none: the least first."""
-
-    bound: bool
-    """True of what bounds alone have judged: its excess is no less, so that it beats nothing."""
-    excess: float
-    cost: float
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
     """Everything that decides which design is best."""
@@ -408,11 +399,8 @@ class Problem:
             # Nothing stable under these loads, or a number that this kind of arm does not have.
             fault = str(error)
             return Candidate(values=values, excess=math.inf, fidelity=fidelity, fault=fault)
-        lacking = [
-            goal.name
-            for goal, value in zip(self.goals, objectives, strict=True)
-            if not math.isfinite(value.value)
-        ]
+        pairs = zip(self.goals, objectives, strict=True)
+        lacking = [goal.name for goal, (value, _) in pairs if not math.isfinite(value)]
         fault = f"no {', '.join(lacking)}" if lacking else ""
         return Candidate(objectives=objectives, fault=fault, **known)
 
@@ -421,11 +409,14 @@ class Problem:
         pairs = zip(self.goals, candidate.objectives, strict=True)
         return tuple(-goal.sense * value.value for goal, value in pairs)
 
-    def score(self, candidate: Candidate) -> Score:
-        """Place among others: what is missed first, then the only goal."""
+    def score(self, candidate: Candidate) -> tuple[bool, float, float]:
+        """Place among others, the least first: by what is missed, then by the only goal.
+
+        What bounds alone have judged misses no less than they say, so that it beats nothing.
+        """
         if not candidate.is_feasible:
-            return Score(candidate.fidelity == "bounds", candidate.excess or math.inf, 0.0)
-        return Score(False, 0.0, self.costs(candidate)[0] if self.goals else 0.0)
+            return candidate.fidelity == "bounds", candidate.excess or math.inf, 0.0
+        return False, 0.0, self.costs(candidate)[0] if self.goals else 0.0
 
     def front(self, candidates: Iterable[Candidate]) -> list[Candidate]:
         """Feasible designs that no other one beats in every goal; the best alone for one goal.
@@ -437,11 +428,10 @@ class Problem:
         if not feasible or len(self.goals) < 2:
             return [min(feasible or every, key=self.score)] if every else []
         costs = np.array([self.costs(each) for each in feasible])
-        kept = [
-            k
-            for k, own in enumerate(costs)
-            if not ((costs <= own).all(axis=1) & (costs < own).any(axis=1)).any()
-            and not (costs[:k] == own).all(axis=1).any()
-        ]
-        kept.sort(key=lambda k: tuple(costs[k]))
-        return [feasible[k] for k in kept]
+
+        def is_beaten(k: int) -> bool:
+            no_worse, better = (costs <= costs[k]).all(axis=1), (costs < costs[k]).any(axis=1)
+            return bool((no_worse & better).any() or (costs[:k] == costs[k]).all(axis=1).any())
+
+        kept = (k for k in range(len(costs)) if not is_beaten(k))
+        return [feasible[k] for k in sorted(kept, key=lambda k: tuple(costs[k]))]

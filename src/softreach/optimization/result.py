@@ -26,7 +26,7 @@ from softreach.support.errors import SoftreachError, counted
 from softreach.support.files.atomic import check_place
 from softreach.support.files.text import write_table, write_text
 from softreach.support.report import Report, Reported, Section, check_libraries
-from softreach.support.units import LengthUnit, as_unit, handy_unit, readable, readable_unit
+from softreach.support.units import LengthUnit, as_unit, readable, readable_unit
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
@@ -164,7 +164,9 @@ class Search(Reported):
         """
         import xarray as xr
 
-        every, free, goals = self.every, self.problem.parameters.free, self.goals
+        every, free = self.every, self.problem.parameters.free
+        goals, arm = self.goals, self.shown
+        shown = {"length": arm.length, "display_unit": arm.display_unit or ""}
         places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
         coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
         values = [[p.number(each.values[p.name]) for p in free] for each in every]
@@ -194,17 +196,16 @@ class Search(Reported):
                 "objective_unit": ("objective", [goal.objective.unit for goal in goals]),
                 "sense": ("objective", [goal.sense for goal in goals]),
             },
-            {**self.attributes, **self.provenance, "finalists": len(self.finalists)},
+            {**provenance(arm), **shown, **self.provenance, "finalists": len(self.finalists)},
         )
 
     @property
-    def attributes(self) -> dict[str, object]:
-        """Length of the best and the unit that it is shown in; those of the base without one."""
+    def shown(self) -> Manipulator:
+        """The design of the best; its base where no such arm can exist."""
         try:
-            arm = self.arm
+            return self.arm
         except SoftreachError:
-            arm = next(iter(self.problem.parameters.bases.values()))
-        return {**provenance(arm), "length": arm.length, "display_unit": arm.display_unit or ""}
+            return next(iter(self.problem.parameters.bases.values()))
 
     def save(
         self, folder: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
@@ -244,11 +245,11 @@ class Search(Reported):
         self.report(unit).save(place / "report.html", overwrite=overwrite)
 
     def _design_text(self, each: Candidate) -> str:
-        arm = self.problem.parameters.arm(each.values)
+        arm, unit = self.problem.parameters.arm(each.values), self.shown.length_unit
         pairs = zip(self.goals, each.objectives, strict=bool(each.objectives))
         lines = [
             f"{_FOUND}{'' if each.is_feasible else '; it does not meet all requirements'}.",
-            *(f"# {goal.name}: {_value_text(goal, value, self.unit)}" for goal, value in pairs),
+            *(f"# {goal.name}: {_value_text(goal, value, unit)}" for goal, value in pairs),
             *(f"# {key}: {text}" for key, text in self.provenance.items()),
         ]
         return "\n".join(lines) + f"\n\n{arm.file_text}"
@@ -262,7 +263,7 @@ class Search(Reported):
         """
         import pandas as pd
 
-        length = as_unit(unit, self._length)
+        length = as_unit(unit, self.shown.length)
         designs = self.every if as_flag("every", every) else self.front
         columns: dict[str, Any] = {
             "design": range(1, len(designs) + 1),
@@ -292,7 +293,8 @@ class Search(Reported):
         Args:
             unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
         """
-        shown = self.unit if unit is None else as_unit(unit, self._length)
+        arm = self.shown
+        shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
         missed = sorted((x for x in self.findings if not x.met), key=lambda each: -each.excess)
         fault = self.best.fault.splitlines()[:1] if self.best.fault else map(str, missed)
         try:
@@ -323,16 +325,6 @@ class Search(Reported):
                 Section(title="The requirements", text=self.problem.requirements.to_toml()),
             ],
         )
-
-    @property
-    def unit(self) -> LengthUnit:
-        """Unit of lengths that the design is shown in, or one that is handy."""
-        shown = str(self.attributes["display_unit"]) or handy_unit(self._length)
-        return as_unit(shown, self._length)
-
-    @property
-    def _length(self) -> float:
-        return float(str(self.attributes["length"]))
 
     @property
     def every(self) -> tuple[Candidate, ...]:
