@@ -147,8 +147,12 @@ class Tolerance:
     @property
     def agrees(self) -> bool:
         """True if the arms made agree with the first order in every number."""
-        spreads = (self.kept, self.volume, self.unreachability, *self.regions)
-        return self.made > 1 and all(each.agrees for each in (*spreads, *self.targets))
+        return self.made > 1 and all(each.agrees for each in (*self.spreads, *self.targets))
+
+    @property
+    def spreads(self) -> tuple[Spread, ...]:
+        """All that is but one number, regions last."""
+        return self.kept, self.volume, self.unreachability, *self.regions
 
     @property
     def worst_parameter(self) -> str:
@@ -159,7 +163,7 @@ class Tolerance:
         """All numbers, labeled: to first order and of arms made."""
         import xarray as xr
 
-        spreads = [self.kept, self.volume, self.unreachability, *self.regions]
+        spreads = self.spreads
         fields = ("nominal", "mean", "deviation", "quantile", "level", "error", "agrees")
         fields += ("made_mean", "made_error", "made_deviation", "deviation_error")
         fields += ("made_quantile", "quantile_error")
@@ -213,38 +217,54 @@ def _target_text(target: TargetTolerance) -> str:
 
 
 def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
-    deviations = first.deviations
-    made, error_of_kept = arms_made(first, checked, seed, progress)
-
-    def column(name: str) -> Array:
-        return np.array([getattr(each, name) for each in made], float)
-
-    targets = []
-    for k, target in enumerate(first.targets):
-        probability = first.probability(target)
-        share = np.full(len(probability), np.nan)
-        if made:
-            share[tried(len(share))] = np.mean([each.reached[k] for each in made], axis=0)
-        targets.append(TargetTolerance(target.name, probability, share, len(made)))
+    """Numbers to first order, and of arms that are made with the first of the changes."""
+    deviations, followed = first.deviations, _Followed.of(first, seed) if checked else None
+    numbers: list[tuple[Spread, _Asked]] = [
+        (first.kept(), lambda arm, solid: followed.kept(solid) if followed else math.nan),
+        (first.of_set("volume", "m3", 1.0), lambda arm, solid: solid.volume),
+        (first.of_set("unreachability", "1", -1.0), lambda arm, solid: solid.unreachability),
+        *((first.covered(target), partial(_share, first, target)) for target in first.regions),
+    ]
+    starts = [_starts(first, target) for target in first.targets] if checked else []
+    asked = [ask for _, ask in numbers]
+    tasks = (partial(_made, first, asked, starts, change) for change in first.changes[:checked])
+    made: list[tuple[list[float], list[Mask]]] = []
+    for each in parallel.in_order(tasks):
+        progress(1)
+        made += [] if each is None else [each]
+    values = np.array([row for row, _ in made]).reshape(len(made), len(numbers)).T.copy()
+    errors = np.zeros(len(numbers))
+    if made and followed:
+        errors[0] = followed.error(float(values[0].mean()))
+    spreads = zip(numbers, values, errors.tolist(), strict=True)
+    kept, volume, unreachability, *regions = (
+        spread.with_made(own, error) for (spread, _), own, error in spreads
+    )
     return Tolerance(
         arm=deviations.arm,
         parameters=deviations.names,
         units=tuple(each.unit for each in deviations.parameters),
         sigmas=deviations.sigmas,
-        kept=first.kept().with_made(column("kept"), error_of_kept),
-        volume=first.of_set("volume", "m3", 1.0).with_made(column("volume")),
-        unreachability=first.of_set("unreachability", "1", -1.0).with_made(
-            column("unreachability")
+        kept=kept,
+        volume=volume,
+        unreachability=unreachability,
+        targets=tuple(
+            _target(first, target, [reached[k] for _, reached in made])
+            for k, target in enumerate(first.targets)
         ),
-        targets=tuple(targets),
-        regions=tuple(
-            first.covered(target).with_made(np.array([each.covered[k] for each in made], float))
-            for k, target in enumerate(first.regions)
-        ),
+        regions=tuple(regions),
         costs=first.costs(),
         made=len(made),
         impossible=checked - len(made),
     )
+
+
+def _target(first: FirstOrder, target: Target, reached: list[Mask]) -> TargetTolerance:
+    probability = first.probability(target)
+    share = np.full(len(probability), np.nan)
+    if reached:
+        share[_tried(len(share))] = np.mean(reached, axis=0)
+    return TargetTolerance(target.name, probability, share, len(reached))
 
 
 class _Followed(NamedTuple):
@@ -267,10 +287,10 @@ class _Followed(NamedTuple):
         parts = pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED]
         return cls(parts, (float(near.mean()), float((~near).mean())))
 
-    def kept(self, contains: Callable[[Array], Mask]) -> float:
+    def kept(self, solid: ReachableSolid) -> float:
         """Share of the volume that another set contains."""
         return sum(
-            share * float(contains(part).mean())
+            share * float(solid.contains(part).mean())
             for part, share in zip(self.places, self.shares, strict=True)
             if len(part)
         )
@@ -282,57 +302,22 @@ class _Followed(NamedTuple):
         return share * math.sqrt(lost * (1.0 - lost) / count)
 
 
-class _Made(NamedTuple):
-    kept: float
-    volume: float
-    unreachability: float
-    reached: tuple[Mask, ...]
-    """Of the places tried, for each target that has places."""
-    covered: tuple[float, ...]
-    """Of each region."""
-
-
-def arms_made(
-    first: FirstOrder, count: int, seed: int, progress: Progress
-) -> tuple[list[_Made], float]:
-    """Arms with the first of the changes that can exist, and the error of what they keep."""
-    if not count:
-        return [], 0.0
-    followed = _Followed.of(first, seed)
-    starts = [
-        _starts(first, places[tried(len(places))])
-        for target in first.targets
-        if (places := target.places) is not None
-    ]
-    tasks = (partial(_made, first, followed, starts, change) for change in first.changes[:count])
-    made = []
-    for each in parallel.in_order(tasks):
-        progress(1)
-        made += [] if each is None else [each]
-    kept = [each.kept for each in made]
-    return made, followed.error(float(np.mean(kept))) if made else 0.0
+_Asked = Callable[[Manipulator, ReachableSolid], float]
+"""A number of an arm that is made, and of its reachable set."""
 
 
 def _made(
-    first: FirstOrder, followed: _Followed, starts: list[list[Array]], change: Array
-) -> _Made | None:
-    """An arm with deviations; None if there is no such arm."""
+    first: FirstOrder, asked: list[_Asked], starts: list[list[Array]], change: Array
+) -> tuple[list[float], list[Mask]] | None:
+    """Numbers of an arm with deviations, and the places that it reaches; None without one."""
     with parallel.undivided(), no_warnings():
         try:
             arm = first.deviations.made(change)
             solid = reachable_set(arm, accuracy=first.accuracy)
             if not isinstance(solid, ReachableSolid):
                 return None
-            return _Made(
-                followed.kept(solid.contains),
-                solid.volume,
-                solid.unreachability,
-                tuple(
-                    _reached(arm, first, target, start)
-                    for target, start in zip(first.targets, starts, strict=True)
-                ),
-                tuple(_share(arm, solid, first, t) for t in first.regions),
-            )
+            pairs = zip(first.targets, starts, strict=True)
+            return [ask(arm, solid) for ask in asked], [_reached(arm, first, *x) for x in pairs]
         except InvalidDesign:
             return None
         except InvalidInput as error:
@@ -341,15 +326,20 @@ def _made(
             return None
 
 
-def tried(count: int) -> Index:
+def _tried(count: int) -> Index:
     """Numbers of the places that arms are made for, evenly spread over all."""
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_TRIED)).astype(np.int64))
 
 
-def _starts(first: FirstOrder, places: Array) -> list[Array]:
+def _places(target: Target) -> Array:
+    assert target.places is not None
+    return target.places[_tried(len(target.places))]
+
+
+def _starts(first: FirstOrder, target: Target) -> list[Array]:
     """Places of the cube to search from: of all solutions of the design, and of a grid."""
-    box, count = tip_map(first.deviations.arm).box, len(places)
-    solutions = solve_inverse(first.deviations.arm, places)
+    arm, places = first.deviations.arm, _places(target)
+    box, solutions = tip_map(arm).box, solve_inverse(arm, places)
     rows = [solutions.nearest_activations]
     for number in range(int(solutions.counts.max(initial=0))):
         has = solutions.counts > number
@@ -358,13 +348,12 @@ def _starts(first: FirstOrder, places: Array) -> list[Array]:
         rows.append(row)
     known = [np.nan_to_num(box.to_cube(row)[:, box.free], nan=0.5) for row in rows]
     grid = sample_cube("sobol", _STARTS, box.dimension)
-    return [*known, *(np.tile(start, (count, 1)) for start in grid)]
+    return [*known, *(np.tile(start, (len(places), 1)) for start in grid)]
 
 
 def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[Array]) -> Mask:
     """Places that an arm reaches under every payload, of those that are tried: by searches."""
-    assert target.places is not None
-    places = target.places[tried(len(target.places))]
+    places = _places(target)
     within, held = max(target.within, TOL * arm.length), np.ones(len(places), bool)
     for payload in first.needs.payloads or (None,):
         rod, gaps = tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
@@ -378,7 +367,7 @@ def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[A
     return held
 
 
-def _share(arm: Manipulator, solid: ReachableSolid, first: FirstOrder, target: Target) -> float:
+def _share(first: FirstOrder, target: Target, arm: Manipulator, solid: ReachableSolid) -> float:
     places, share = region_places(target), 1.0
     for payload in first.needs.payloads or (None,):
         loaded = with_payload(arm, payload)
