@@ -284,13 +284,13 @@ class Point:
 
     def _rules(self) -> Iterator[Part]:
         needs = self.design.problem.requirements
-        keeps = [keep for keep in needs.keeps if keep.when == "targets"]
+        keeps = tuple(keep for keep in needs.keeps if keep.when == "targets")
 
         def rules_of(arm: Manipulator, number: int) -> PoseRules:
             laden = needs.under_payloads(arm)[number]
             like = self.design.rods[number]
             rod = like if arm is self.design.case.arm else in_steps(laden, like.steps, like)
-            return PoseRules.of(laden, keeps, needs.limits, np.inf, rod)
+            return PoseRules(laden, keeps, needs.limits.of_poses, np.inf, rod)
 
         for number, (_, cube) in enumerate(self._by_payload()):
             rules = rules_of(self.design.case.arm, number)

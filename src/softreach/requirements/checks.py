@@ -289,12 +289,12 @@ def checked(
 ) -> Check:
     """As `check`, with reachable sets to its accuracy, and poses that are chosen for places."""
     payloads = needs.payloads or (None,)
-    keeps = [keep for keep in needs.keeps if keep.when == "targets" and needs.targets]
+    keeps = tuple(keep for keep in needs.keeps if keep.when == "targets" and needs.targets)
     every: list[PoseRules] = []
     posed: list[Posed] = []
     coverages: list[Coverage] = []
     for payload, loaded in zip(payloads, needs.under_payloads(arm), strict=True):
-        rules = PoseRules.of(loaded, keeps, needs.limits, 0.1 * accuracy * arm.length)
+        rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
         if choose is descended:  # on the way, with shapes in no more steps than tips
             rod = tip_map(loaded, _ROUGH_TOL)

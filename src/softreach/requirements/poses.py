@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.prepared import prepared_map
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
-from softreach.requirements.parts import POSE_LIMITS, Keep, Limits
+from softreach.requirements.parts import Keep
 from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
@@ -65,19 +65,6 @@ class PoseRules:
     """Error that is allowed in how far a region is missed [m]."""
     known_rod: TipMap | None = None
     """Tip map of the arm, if it is to be another than to the usual tolerance."""
-
-    @classmethod
-    def of(
-        cls,
-        arm: Manipulator,
-        keeps: Sequence[Keep],
-        limits: Limits,
-        tolerance: float,
-        rod: TipMap | None = None,
-    ) -> PoseRules:
-        """The rules for single poses among regions and limits."""
-        poses = {name: x for name, x in limits.given.items() if name in POSE_LIMITS}
-        return cls(arm, tuple(keeps), poses, tolerance, rod)
 
     @property
     def rooms(self) -> tuple[Array, Array]:
