@@ -104,6 +104,13 @@ def test_bands_are_those_of_the_arms_that_are_as_likely():
     np.testing.assert_allclose(spread, sigma, rtol=0.3, atol=1e-6)
 
 
+def test_a_row_that_names_no_run_leaves_the_others_theirs():
+    arm = hanging_tentacle()
+    data = measured(arm, 12, runs=3)
+    data["run"][4] = None
+    assert {"run 0", "run 1", "run 2"} < {*read_measurements(arm, data).run_names}
+
+
 def test_a_run_left_out_is_predicted_by_the_others():
     arm = hanging_tentacle()
     errors = leave_one_run_out(arm, measured(arm, 12, noise=1e-3, runs=3), free=[MODULUS])
