@@ -375,12 +375,8 @@ def _chosen_markers(
     arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
 ) -> dict[str, str]:
     names = [marker.name for marker in arm.markers] or ["tip"]
-    chosen = _given("marker", names, given, list(triples))
-    simple = {_simple(start): start for start in triples}
-    free = [name for name in names if name not in chosen]
-    by_name = {name: simple[_simple(name)] for name in free if _simple(name) in simple}
-    if by_name or given:
-        return {name: (chosen | by_name)[name] for name in names if name in chosen | by_name}
+    if chosen := _matched("marker", names, given, dict(zip(triples, triples, strict=True))):
+        return chosen
     if len(names) != len(triples):
         listed = ", ".join(start or "x, y, z" for start in triples)
         own = f"{counted(len(names), 'marker')} ({', '.join(names)})"
@@ -390,31 +386,29 @@ def _chosen_markers(
     return dict(zip(names, triples, strict=True))
 
 
-def _given(
-    what: str, names: Sequence[str], given: Mapping[str, str], columns: list[str]
+def _matched(
+    what: str, names: Sequence[str], given: Mapping[str, str], columns: Mapping[str, str]
 ) -> dict[str, str]:
-    """Columns that the user names for some markers or inputs."""
+    """Columns of markers or inputs, of those with such names: as given, else by their names."""
+
+    def simple(name: str) -> str:
+        return re.sub(r"[\s_\-.]+", "", name).lower()
+
     for name, column in given.items():
         if name not in names:
             hint = did_you_mean(name, names)
             raise InvalidInput(f"{what}s", name, f"one of {', '.join(names)}", hint)
-        if column not in columns:
-            raise _missing(f"columns of {what} {name}", column, [x for x in columns if x])
-    return dict(given)
-
-
-def _simple(name: str) -> str:
-    return re.sub(r"[\s_\-.]+", "", name).lower()
+        if column not in columns and (column or what == "marker"):
+            raise _missing(f"columns of {what} {name}", column, list(columns))
+    known = {simple(name): column for column, name in columns.items()}
+    found = {name: given.get(name, known.get(simple(name))) for name in names}
+    return {name: column for name, column in found.items() if column is not None}
 
 
 def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:
     """Column of each input; "" for one that stays at zero."""
-    chosen = _given("input", arm.input_names, given, ["", *columns])
+    chosen = _matched("input", arm.input_names, given, {c: _unit(c)[0] for c in columns})
     units = dict(zip(arm.input_names, arm.input_units, strict=True))
-    simple = {_simple(_unit(column)[0]): column for column in columns}
-    for name in arm.input_names:
-        if name not in chosen and _simple(name) in simple:
-            chosen[name] = simple[_simple(name)]
     left = [name for name in arm.input_names if name not in chosen]
     for unit in dict.fromkeys(units[name] for name in left):
         wanting = [name for name in left if units[name] == unit]
