@@ -14,7 +14,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed
-from softreach.cli.app import app, run
+from softreach.cli.app import _COMMANDS, app, run
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.rod.summary import describe
@@ -23,7 +23,7 @@ from softreach.rod.summary import describe
 pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 
 COMMANDS = [name for name in app if not name.startswith("-")]
-MODULES = {"import": "import_file", "list": "listing", "plan-poses": "plan_poses"}
+MODULES = {name: module for names in _COMMANDS.values() for name, module in names.items()}
 HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}
 
 
@@ -55,7 +55,7 @@ def test_help_of_every_command_teaches_with_an_example_that_parses(command, caps
     words = example.split()
     assert words[0] == command
     function, bound, *_ = app.parse_args(words, exit_on_error=False, print_error=False)
-    assert function.__module__ == f"softreach.cli.{MODULES.get(command, command)}"
+    assert function.__module__ == f"softreach.cli.{MODULES[command]}"
     assert bound.arguments
 
 
@@ -403,7 +403,7 @@ def asked_for(*arguments):
     ("options", "loads"),
     [
         (["--payload", "2g"], {"payload": 0.002}),
-        (["--gravity", "hanging"], {"gravity": (0, 0, 9.81)}),
+        (["--gravity", "up"], {"gravity": (0, 0, 9.81)}),
         (["--gravity", "sideways"], {"gravity": (9.81, 0, 0)}),
         (["--gravity", "0, 0, -1.62 m/s2"], {"gravity": (0, 0, -1.62)}),
         (
@@ -490,7 +490,7 @@ def test_a_place_below_a_hanging_arm_is_reached(capsys):
 
 
 def test_a_loaded_cloud_counts_its_stable_samples(folder, capsys):
-    options = ["--n", "64", "--payload", "2g", "--gravity", "hanging", "--json"]
+    options = ["--n", "64", "--payload", "2g", "--gravity", "up", "--json"]
     assert run(["cloud", "lce_arm", *options]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert (facts["stable"], facts["unstable"], facts["no_equilibrium"]) == (64, 0, 0)
@@ -528,7 +528,7 @@ class TestRestInTheSummary:
         assert facts["at_rest_upright"] == "stable"
 
     def test_loads_beyond_the_verified_ones_are_warned_of_once(self, capsys, tmp_path):
-        arm = ["lce_arm", "--payload", "71g", "--gravity", "hanging"]
+        arm = ["lce_arm", "--payload", "71g", "--gravity", "up"]
         assert run(["design", *arm]) == 0
         assert capsys.readouterr().err.count("load number is") == 1
         assert run(["cloud", *arm, "--n", "8", "--out", str(tmp_path / "a.zarr")]) == 0
@@ -546,7 +546,7 @@ def test_loads_ask_in_one_line_for_what_the_arm_lacks(options, lacking, capsys):
     assert run(["design", "minimal_trunk", *options]) == 2
     text = capsys.readouterr().err
     assert text.count("\n") == 1
-    asked = text.partition("must be on an arm with ")[2].partition(";")[0]
+    asked = text.partition("loads need ")[2].partition(":")[0]
     assert asked == " and ".join(f"rings[0].material.{name}" for name in lacking)
     assert all(f"--set rings[0].material.{name}=" in text for name in lacking)
 

@@ -18,20 +18,30 @@ from softreach.support.errors import NotPossible, NotWritten, SoftreachError, ch
 from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
-_COMMANDS = (
-    (Group("Design", sort_key=-6), ("design", "check", "search", "list", "studio")),
-    (Group("Bench", sort_key=-5.5), ("plan-poses", "calibrate")),
-    (Group("Reach", sort_key=-5), ("reach", "cloud", "volume", "payload", "gradient")),
-    (Group("Places", sort_key=-4), ("solve", "track", "equilibria")),
-    (Group("Output", sort_key=-3), ("show", "export", "import")),
-    (Group("Families", sort_key=-2), ("atlas",)),
-    (_MORE, ("demo", "paper", "warmup")),
-)
-_OBJECTS = {
-    "import": "import_file",
-    "list": "listing",
-    "plan-poses": "plan_poses",
-}  # where Python needs the name itself
+_COMMANDS = {
+    Group("Design", sort_key=-6): {
+        "design": "design",
+        "check": "search",
+        "search": "search",
+        "list": "listing",
+        "studio": "studio",
+    },
+    Group("Bench", sort_key=-5.5): {"plan-poses": "bench", "calibrate": "bench"},
+    Group("Reach", sort_key=-5): {
+        "reach": "reach",
+        "cloud": "cloud",
+        "volume": "cloud",
+        "payload": "reach",
+        "gradient": "reach",
+    },
+    Group("Places", sort_key=-4): {"solve": "places", "track": "places", "equilibria": "places"},
+    Group("Output", sort_key=-3): {"show": "cloud", "export": "convert", "import": "convert"},
+    Group("Families", sort_key=-2): {"atlas": "atlas"},
+    _MORE: {"demo": "demo", "paper": "demo", "warmup": "warmup"},
+}
+"""Commands and their modules, by group."""
+_FUNCTIONS = {"import": "import_file", "list": "listing", "plan-poses": "plan_poses"}
+"""Of commands that Python cannot call by their names."""
 
 
 def _shown_default(value: object) -> Any:
@@ -74,11 +84,11 @@ Start with
     console=cast(Any, HelpConsole()),
     default_parameter=Parameter(negative=(), show_default=_shown_default),
 )
-_NAMES = {name for _, names in _COMMANDS for name in names}
-for _group, _names in _COMMANDS:
-    for _place, _name in enumerate(_names):
-        _object = _OBJECTS.get(_name, _name)
-        app.command(f"softreach.cli.{_object}:{_object}", name=_name, group=_group, sort_key=_place)
+_NAMES = {name for names in _COMMANDS.values() for name in names}
+for _group, _names in _COMMANDS.items():
+    for _place, (_name, _module) in enumerate(_names.items()):
+        _function = f"softreach.cli.{_module}:{_FUNCTIONS.get(_name, _name)}"
+        app.command(_function, name=_name, group=_group, sort_key=_place)
 for _flag in ("--help", "--version"):
     app[_flag].group = _MORE
 app.meta.suppress_keyboard_interrupt = False

@@ -10,7 +10,6 @@ from cyclopts import App, Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.lengths import Rows
 from softreach.cli.options import (
     OUT,
     SAMPLING,
@@ -21,8 +20,8 @@ from softreach.cli.options import (
     check_picture,
     refuse,
 )
-from softreach.cli.values import Whole, as_read, pairs_in
-from softreach.support.errors import InvalidInput, MissingExtra, NotPossible
+from softreach.cli.values import Whole, pairs_in, rows_of
+from softreach.support.errors import InvalidInput, NotPossible, counted
 from softreach.support.quantity import numbers_in
 
 if TYPE_CHECKING:
@@ -112,7 +111,14 @@ def status(store: Store, /, *, json: AsJson = False) -> None:
     """
     from softreach.atlas import atlas_status
 
-    _print_status(store, atlas_status(store), json)
+    _print(store, atlas_status(store), json)
+
+
+def _print(store: str, state: AtlasStatus, json: bool) -> None:
+    if json:
+        console.json(asdict(state))
+    else:
+        console.line("\n  ".join([f"atlas {store}", *str(state).splitlines()]))
 
 
 @atlas.command
@@ -125,18 +131,12 @@ def verify(store: Store, /, *, json: AsJson = False) -> None:
     """
     from softreach.atlas import verify_atlas
 
-    state = verify_atlas(store)
-    _print_status(store, state, json)
+    _print(store, state := verify_atlas(store), json)
     if state.damaged:
-        allowed = "0; the command that built the atlas computes them again"
-        raise InvalidInput(f"damaged designs of {store}", state.damaged, allowed)
-
-
-def _print_status(store: str, state: AtlasStatus, json: bool) -> None:
-    if json:
-        console.json(asdict(state))
-    else:
-        console.block(f"atlas {store}", state)
+        raise NotPossible(
+            f"{counted(state.damaged, 'design')} of {store} damaged; the command that built the "
+            "atlas computes them again"
+        )
 
 
 @atlas.command
@@ -163,13 +163,7 @@ def best(
     from softreach.atlas import best_designs, open_atlas
 
     designs = best_designs(open_atlas(store), metric, smallest=smallest, where=where, count=count)
-    columns = {str(name): column for name, column in designs.variables.items()}
-    rows: Rows = {
-        name: as_read(column.values, str(column.attrs.get("units", "1")))
-        for name, column in columns.items()
-        if column.dtype.kind in "fi"
-    }
-    console.rows(f"best {metric} of {store}", rows, json)
+    console.rows(f"best {metric} of {store}", rows_of(designs), json)
 
 
 @atlas.command
@@ -206,9 +200,6 @@ def figures(
         pyplot().close(figure.get_figure(root=True))
 
 
-_NAMED_IN_FILE = "with --space, whose file names the design"
-
-
 def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
 ) -> DesignSpace:
@@ -219,7 +210,7 @@ def _space_of(
     if (path is None) == (vary is None):
         raise NotPossible("give either --vary or --space")
     if path is not None:
-        refuse(_NAMED_IN_FILE, design=design, **changes.given)
+        refuse("with --space, whose file names the design", design=design, **changes.given)
         return parse_space(read_text("space", path, LONGEST), design_from)
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
@@ -229,19 +220,20 @@ def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter
 
-    pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8") or {}
+    pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8")
     return DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))
 
 
 def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:
+    from softreach.support.files.formats import check_installed
+
     if scheduler is not None:
         refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:
         return None
-    try:
-        from distributed import Client
-    except ModuleNotFoundError as error:
-        raise MissingExtra(("distributed", "cluster")) from error
+    check_installed(("distributed", "cluster"))
+    from distributed import Client
+
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
 
 

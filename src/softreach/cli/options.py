@@ -10,20 +10,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.changes import Changes, design_from, say_limits
+from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
-from softreach.cli.lengths import Lengths, check_unit
 from softreach.cli.values import Whole
 from softreach.support.errors import InvalidInput, NotPossible
+from softreach.support.files.formats import (
+    PAGES,
+    PICTURES,
+    FileFormat,
+    Formats,
+    check_installed,
+    format_of,
+)
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in
-from softreach.support.units import TYPED, read_length
+from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.arm.manipulator import Manipulator
-    from softreach.support.files.formats import Formats
 
 
 OUTPUT = Group("Output options", sort_key=3)
@@ -122,21 +128,26 @@ def cloud_of(
     changes: Changes,
     unit: str | None,
     check: Callable[[int], None] | None = None,
-) -> tuple[xr.Dataset, Lengths]:
-    """The stored cloud, or one of the design once its number of samples is checked; its lengths."""
+) -> tuple[xr.Dataset, Manipulator]:
+    """The stored cloud, or one of the design once its number of samples is checked; its design."""
     from softreach.cloud.clouds import compute_cloud, design_of, open_cloud
 
-    check_unit(unit)
+    if unit is not None:
+        as_unit(unit, 1.0)  # before anything is computed
     if is_stored(source):
-        refuse(_STORED, **changes.given)
-        refuse(_STORED, **vars(sampling))
+        refuse(_STORED, **changes.given, **vars(sampling))
         cloud = open_cloud(source)
-        say_limits(arm := design_of(cloud))
-        return cloud, Lengths.of(arm, unit)
+        say_limits(arm := shown_in(unit, design_of(cloud)))
+        return cloud, arm
     if check is not None:
         check(sampling.count)
-    arm = design_from(source, changes)
-    return compute_cloud(arm, **sampling.arguments), Lengths.of(arm, unit)
+    arm = design_from(source, changes, unit)
+    return compute_cloud(arm, **sampling.arguments), arm
+
+
+def written_unit(arm: Manipulator) -> LengthUnit:
+    """Unit of tables and meshes, which other programs take to be in m unless one was chosen."""
+    return METER if arm.display_unit is None else arm.length_unit
 
 
 def activation_of(text: str | None, arm: Manipulator) -> list[float]:
@@ -198,12 +209,20 @@ def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
         MissingExtra: A library that writes it is not installed.
         NotWritten: Nothing can be written there.
     """
-    from softreach.support.files.atomic import check_place
-    from softreach.support.files.formats import format_of
+    check_outputs([] if path is None else [path], formats, overwrite)
 
-    if path is None:
+
+def check_outputs(
+    paths: list[Path], formats: Formats, overwrite: bool, *libraries: tuple[str, str]
+) -> None:
+    """As `check_output`, of several files; all libraries that are missing are named at once."""
+    from softreach.support.files.atomic import check_place
+
+    if not paths:
         refuse("without --out", overwrite=overwrite)
-    else:
+    known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
+    check_installed(*libraries, *((name, each.extra) for each in known for name in each.libraries))
+    for path in paths:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")
 
@@ -213,7 +232,6 @@ def check_picture(
 ) -> None:
     """Refuse a view, and a place for a picture or for a page that turns, as `check_output`."""
     from softreach.picture.projection import view_angles
-    from softreach.support.files.formats import PAGES, PICTURES
 
     if path is None:
         refuse("without --out", view=view)
@@ -224,25 +242,16 @@ def check_picture(
 
 def is_page(path: Path) -> bool:
     """True if a figure is asked for that turns in a browser."""
-    from softreach.support.files.formats import PAGES
-
     return path.suffix.lower() in PAGES
 
 
-def write_page(
-    data: list[Any], path: Path, lengths: Lengths, *, overwrite: bool, **look: Any
+def save_picture(
+    path: Path, draw: Callable[[], Any], page: list[Any], overwrite: bool, **look: Any
 ) -> None:
-    """Write what is given as a figure that turns in a browser, and say what part it shows."""
+    """Draw, or write what is given as a page that turns, if a page is asked for."""
     from softreach.plot import plot_3d, save_figure
 
-    figure = plot_3d(data, unit=lengths.unit, **look)
+    figure = plot_3d(page, **look) if is_page(path) else draw()
     save_figure(figure, path, overwrite=overwrite)
-    if figure.note:
+    if is_page(path) and figure.note:
         console.note(f"{path}: {figure.note}")
-
-
-def check_surface(path: Path | None, overwrite: bool) -> None:
-    """Refuse a place for a surface, as `check_output`."""
-    from softreach.export.surfaces import SURFACE_FILES
-
-    check_output(path, SURFACE_FILES, overwrite)

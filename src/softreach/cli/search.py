@@ -1,4 +1,4 @@
-"""`softreach search`: the designs that meet requirements and are best."""
+"""`softreach check` and `search`: a design against what it is for, and designs that meet it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,91 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.changes import Changes, design_from
-from softreach.cli.check import EXIT, finding_record
+from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
 from softreach.cli.console import console
-from softreach.cli.lengths import Lengths
-from softreach.cli.options import OUT, AsJson, Overwrite, Unit
-from softreach.cli.values import Number, Whole, as_read, pairs_in
+from softreach.cli.options import (
+    OUT,
+    AsJson,
+    Design,
+    Out,
+    Overwrite,
+    Unit,
+    View,
+    check_picture,
+)
+from softreach.cli.values import Number, Whole, as_read, pairs_in, record
 
 if TYPE_CHECKING:
     from softreach.optimization import Candidate, Search
+    from softreach.requirements import Check, Finding
 
 _ASKED = Group("Override the file", sort_key=1)
+_EXIT = {"met": 0, "missed": 1, "undecided": 3}
+"""Verdict -> exit code; 2 is that of wrong input."""
+
+
+def check(
+    design: Design,
+    needs: Path,
+    /,
+    *,
+    accuracy: Number = 1e-2,
+    changes: Changes = UNCHANGED,
+    out: Out = None,
+    view: View = None,
+    overwrite: Overwrite = False,
+    unit: Unit = None,
+    json: AsJson = False,
+) -> int:
+    """Check a design against requirements: met or missed, and by how much.
+
+    Places to reach, regions to stay in or to avoid, payloads, limits, measures;
+    for what is missed, how far, which bounds hold the arm back, and what it would
+    take. A margin that is smaller than its own error is undecided. The exit code
+    is 0 if all is met, 1 if something is missed, and 3 if something is undecided.
+
+    Example: softreach check arm.toml needs.toml --out check.png
+
+    Args:
+        needs: Requirements (.toml).
+        accuracy: Accuracy of coverages and volumes.
+        out: Draw the arm at the places (.png .pdf .svg).
+    """
+    from softreach.requirements import Requirements
+    from softreach.requirements import check as checked
+    from softreach.support import progress
+
+    arm = design_from(design, changes, unit)
+    check_picture(out, overwrite, view=view)
+    requirements = Requirements.load(needs, length=arm.length)
+    with progress.bar("checking", None) as step:
+        result = checked(arm, requirements, accuracy=accuracy, progress=step)
+    if json:
+        console.json(_checked(result))
+    else:
+        console.line(result)
+    if out is not None:
+        from softreach.plot import plot_check, save_figure
+
+        axes: Any = plot_check(result, view=view or "oblique", unit=arm.length_unit)
+        save_figure(axes.figure, out, overwrite=overwrite)
+    return _EXIT[result.verdict]
+
+
+def _checked(result: Check) -> dict[str, Any]:
+    names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
+    return {
+        **record(
+            {name: getattr(result, name) for name in names}, result.arm.length, "places", "gaps"
+        ),
+        "findings": [_finding(finding) for finding in result.findings],
+        "payloads_kg": result.payloads,
+        "coverages": [coverage._asdict() for coverage in result.coverages],
+    }
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {**vars(finding), "met": finding.met}
 
 
 def search(
@@ -75,34 +149,35 @@ def search(
     from softreach.requirements.requirements import LONGEST
     from softreach.support.files.text import read_text
 
-    options = {"designs": designs, "seed": seed, "accuracy": accuracy, "sampler": sampler}
-    given = {
+    options = {
         "design": design,
         "maximize": None if maximize is None else maximize.split(","),
         "minimize": None if minimize is None else minimize.split(","),
-        "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2"),
-        "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4"),
+        "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2") or None,
+        "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4") or None,
         "polish": polish,
-        **options,
+        "designs": designs,
+        "seed": seed,
+        "accuracy": accuracy,
+        "sampler": sampler,
     }
-    given = {name: value for name, value in given.items() if value is not None}
+    given = {name: value for name, value in options.items() if value is not None}
     text = read_text("requirements", needs, LONGEST)
     designs_from = partial(design_from, changes=Changes(point=point))
     asked = read_search(text, needs.parent, designs_from, source=str(needs), given=given)
     base = asked.base
-    first = next(iter(base.values())) if isinstance(base, Mapping) else base
-    lengths = Lengths.of(first, unit)
+    arm = shown_in(unit, next(iter(base.values())) if isinstance(base, Mapping) else base)
     check_folder(out, overwrite=overwrite)
     if storage is None:
         out.mkdir(parents=True, exist_ok=True)
         storage = out / "search.journal"
     result = _searched(asked, storage)
     if json:
-        console.json(_record(result, out))
+        console.json(_found(result, out))
     else:
-        console.line(result.report(lengths.unit.name))
-    result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
-    return EXIT[result.verdict]
+        console.line(result.report(arm.length_unit.name))
+    result.save(out, unit=arm.display_unit, overwrite=overwrite)
+    return _EXIT[result.verdict]
 
 
 def _searched(asked: Any, storage: Path) -> Search:
@@ -154,7 +229,7 @@ class _Watch:
         return f"searching, best {names[0]} {best.objectives[0].value:.5g}"
 
 
-def _record(result: Search, out: Path) -> dict[str, Any]:
+def _found(result: Search, out: Path) -> dict[str, Any]:
     """The result for machines: SI units, angles in degrees."""
     return {
         "met": result.met,
@@ -165,7 +240,7 @@ def _record(result: Search, out: Path) -> dict[str, Any]:
         "seconds": result.seconds,
         "front": [_design(result, each) for each in result.front],
         "at_ends": result.at_ends,
-        "findings": [finding_record(finding) for finding in result.findings],
+        "findings": [_finding(finding) for finding in result.findings],
         "folder": str(out),
     }
 
