@@ -221,7 +221,8 @@ def check_outputs(
     if not paths:
         refuse("without --out", overwrite=overwrite)
     known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
-    check_installed(*libraries, *((name, each.extra) for each in known for name in each.libraries))
+    needed = [(name, each.extra) for each in known for name in each.libraries]
+    check_installed(*needed, *libraries)
     for path in paths:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")
