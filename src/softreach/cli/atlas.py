@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.options import (
-    OUT,
-    SAMPLING,
-    AsJson,
-    Durable,
-    Overwrite,
-    Sampling,
-    check_picture,
-    refuse,
-)
 from softreach.cli.values import Whole, pairs_in, rows_of
 from softreach.support.errors import InvalidInput, NotPossible, counted
 from softreach.support.quantity import numbers_in
@@ -53,7 +44,7 @@ def build(
     vary: list[str] | None = None,
     design: str | None = None,
     space: Path | None = None,
-    sampling: Sampling = SAMPLING,
+    sampling: options.Sampling = options.SAMPLING,
     alpha: str | None = None,
     metrics: str | None = None,
     keep_clouds: Annotated[bool, Parameter(negative="--no-keep-clouds")] = True,
@@ -61,8 +52,8 @@ def build(
     scheduler_file: Path | None = None,
     shard: Shard = "0/1",
     changes: Changes = UNCHANGED,
-    durable: Durable = False,
-    json: AsJson = False,
+    durable: options.Durable = False,
+    json: options.AsJson = False,
 ) -> None:
     """Compute the clouds and the metrics of all designs.
 
@@ -88,7 +79,7 @@ def build(
 
     groups = tuple(METRIC_GROUPS) if metrics is None else tuple(metrics.split(","))
     if "concave" not in groups:
-        refuse("without the metrics concave", alpha=alpha)
+        options.refuse("without the metrics concave", alpha=alpha)
     build_atlas(
         _space_of(space, design, vary, changes),
         store,
@@ -104,7 +95,7 @@ def build(
 
 
 @atlas.command
-def status(store: Store, /, *, json: AsJson = False) -> None:
+def status(store: Store, /, *, json: options.AsJson = False) -> None:
     """Count the designs that are done, and explain the others.
 
     Example: softreach atlas status atlas.zarr
@@ -122,7 +113,7 @@ def _print(store: str, state: AtlasStatus, json: bool) -> None:
 
 
 @atlas.command
-def verify(store: Store, /, *, json: AsJson = False) -> None:
+def verify(store: Store, /, *, json: options.AsJson = False) -> None:
     """Read all of an atlas and check it.
 
     The command that built it computes again what is damaged.
@@ -148,7 +139,7 @@ def best(
     smallest: bool = False,
     where: list[str] | None = None,
     count: Whole = 1,
-    json: AsJson = False,
+    json: options.AsJson = False,
 ) -> None:
     """Find the designs with the largest metric, under constraints.
 
@@ -172,8 +163,8 @@ def figures(
     /,
     *,
     panels: Whole = 7,
-    out: Annotated[Path, OUT] = Path("figures"),
-    overwrite: Overwrite = False,
+    out: Annotated[Path, options.OUT] = Path("figures"),
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Draw the atlas: sheets, corners, maps, curvature.
 
@@ -192,7 +183,7 @@ def figures(
 
     as_integer("panels", panels, 1)
     for suffix in ("png", "pdf"):  # tried by a name that any of them may have
-        check_picture(out / f"clouds.{suffix}", overwrite)
+        options.check_picture(out / f"clouds.{suffix}", overwrite)
     for name, figure in atlas_figures(open_atlas(store), panels):
         for suffix in ("png", "pdf"):
             save_figure(figure, out / f"{name}.{suffix}", overwrite=overwrite)
@@ -210,7 +201,7 @@ def _space_of(
     if (path is None) == (vary is None):
         raise NotPossible("give either --vary or --space")
     if path is not None:
-        refuse("with --space, whose file names the design", design=design, **changes.given)
+        options.refuse("with --space, whose file names the design", design=design, **changes.given)
         return parse_space(read_text("space", path, LONGEST), design_from)
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
@@ -228,7 +219,7 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLik
     from softreach.support.files.formats import check_installed
 
     if scheduler is not None:
-        refuse("with --scheduler", scheduler_file=scheduler_file)
+        options.refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:
         return None
     check_installed(("distributed", "cluster"))

@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.options import (
-    OUTPUT,
-    AsJson,
-    Design,
-    Out,
-    Overwrite,
-    Unit,
-    check_output,
-    written_unit,
-)
 from softreach.cli.values import Number, Whole, as_read, pairs_in
 from softreach.support.errors import InvalidInput
 
@@ -43,7 +34,7 @@ _POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 
 
 def calibrate(
-    design: Design,
+    design: options.Design,
     data: Path,
     /,
     *,
@@ -59,12 +50,12 @@ def calibrate(
     run: Annotated[str | None, Parameter(group=_COLUMNS)] = None,
     order: Annotated[str | None, Parameter(group=_COLUMNS)] = None,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    report: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
-    table: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: options.Out = None,
+    report: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
+    table: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Fit numbers of a design to measured poses, with honest errors.
 
@@ -102,7 +93,7 @@ def calibrate(
     arm = design_from(design, changes, unit)
     outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
     for path, formats in outputs or [(None, {})]:
-        check_output(path, formats, overwrite)
+        options.check_output(path, formats, overwrite)
     with progress.bar("fitting", None) as step:
         result = calibration.calibrate(
             arm,
@@ -127,8 +118,8 @@ def calibrate(
     if out is not None:
         result.save(out, overwrite=overwrite)
     if table is not None:
-        write_table(table, result.table(written_unit(arm).name), overwrite=overwrite)
-        console.written(table, written_unit(arm))
+        write_table(table, result.table(options.written_unit(arm).name), overwrite=overwrite)
+        console.written(table, options.written_unit(arm))
     if report is not None:
         result.report(arm.length_unit.name).save(report, overwrite=overwrite)
 
@@ -186,7 +177,7 @@ def _errors(errors: PlacementErrors) -> dict[str, float]:
 
 
 def plan_poses(
-    design: Design,
+    design: options.Design,
     /,
     *,
     free: Free,
@@ -196,10 +187,10 @@ def plan_poses(
     candidates: Whole = 2000,
     seed: Whole = 0,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Choose the poses to measure for a calibration.
 
@@ -223,7 +214,7 @@ def plan_poses(
 
     arm = design_from(design, changes, unit)
     width = read_noise(noise)
-    check_output(out, TABLES, overwrite)
+    options.check_output(out, TABLES, overwrite)
     plan = calibration.plan_poses(
         arm,
         free_names(arm, free),

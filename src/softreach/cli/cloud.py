@@ -5,28 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
-from softreach.cli.options import (
-    OUT,
-    SAMPLING,
-    Activation,
-    AsJson,
-    Design,
-    Out,
-    Overwrite,
-    Sampling,
-    Source,
-    Unit,
-    check_output,
-    check_picture,
-    cloud_of,
-    radius_of,
-    save_picture,
-    shape_of,
-    written_unit,
-)
 from softreach.cli.values import Number, Rows
 
 if TYPE_CHECKING:
@@ -36,16 +18,16 @@ if TYPE_CHECKING:
 
 
 def cloud(
-    design: Design,
+    design: options.Design,
     /,
     *,
-    sampling: Sampling = SAMPLING,
+    sampling: options.Sampling = options.SAMPLING,
     tol: Number = 1e-6,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Sample the reachability cloud of a design and store it as Zarr.
 
@@ -62,7 +44,7 @@ def cloud(
 
     arm = design_from(design, changes, unit)
     out = out or Path(f"{Path(design).stem}.zarr")
-    check_output(out, CLOUD_STORE, overwrite)
+    options.check_output(out, CLOUD_STORE, overwrite)
     arguments = sampling.arguments
     start = perf_counter()
     dataset = compute_cloud(arm, **arguments, tol=tol)
@@ -93,16 +75,16 @@ def _status_rows(cloud: xr.Dataset) -> Rows:
 
 
 def volume(
-    source: Source,
+    source: options.Source,
     /,
     *,
     alpha: str = "0.05L",
-    sampling: Sampling = SAMPLING,
+    sampling: options.Sampling = options.SAMPLING,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Estimate volumes and unreachability from a cloud.
 
@@ -120,11 +102,11 @@ def volume(
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.schema import is_stable
 
-    check_output(out, SURFACE_FILES, overwrite)
-    radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
-    cloud, arm = cloud_of(source, sampling, changes, unit, check_hull_memory)
+    options.check_output(out, SURFACE_FILES, overwrite)
+    options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
+    cloud, arm = options.cloud_of(source, sampling, changes, unit, check_hull_memory)
     bias = cloud.attrs["sampler"] == "uniform"
-    concave = concave_hull(cloud.tip, radius_of(alpha, arm.length), bias=bias)
+    concave = concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
     rows = volume_rows(concave, convex_hull(cloud.tip))
     areas = flat_areas(cloud.tip.values[is_stable(cloud.tip)], concave.alpha)
     if areas is not None:
@@ -134,8 +116,8 @@ def volume(
         rows["unreachability"] = (share, "")
     console.rows(f"volume of {source}", rows, json, arm)
     if out is not None:
-        export_mesh(concave, out, unit=written_unit(arm), overwrite=overwrite)
-        console.written(out, written_unit(arm))
+        export_mesh(concave, out, unit=options.written_unit(arm), overwrite=overwrite)
+        console.written(out, options.written_unit(arm))
 
 
 _BYTES = 700  # of memory that a sample and its share of the triangulation take at most
@@ -164,16 +146,16 @@ def volume_rows(concave: Hull, convex: Hull) -> Rows:
 
 
 def show(
-    source: Source,
+    source: options.Source,
     /,
     *,
     color: str | None = None,
-    activation: Activation = None,
-    sampling: Sampling = SAMPLING,
+    activation: options.Activation = None,
+    sampling: options.Sampling = options.SAMPLING,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, OUT] = Path("cloud.png"),
-    overwrite: Overwrite = False,
-    unit: Unit = None,
+    out: Annotated[Path, options.OUT] = Path("cloud.png"),
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
 ) -> None:
     """Draw a cloud and its arm from four sides, or as a web page that turns.
 
@@ -187,14 +169,17 @@ def show(
             out, of more), effort, the name of a bundle, or compliance: how far the tip yields.
         out: Picture file: .png .pdf .svg, or .html to turn
     """
-    from softreach.plot import plot_views
+    from softreach.plot import plot_3d, plot_views
 
-    check_picture(out, overwrite, page=True)
-    cloud, arm = cloud_of(source, sampling, changes, unit)
-    shape = None if activation is None else shape_of(activation, arm)
+    options.check_picture(out, overwrite, page=True)
+    cloud, arm = options.cloud_of(source, sampling, changes, unit)
+    shape = None if activation is None else options.shape_of(activation, arm)
     look = {"color": _colors(cloud, color), "unit": arm.length_unit}
-    seen = [cloud, arm if shape is None else shape]
-    save_picture(out, lambda: plot_views(cloud, arm, shape, **look), seen, overwrite, **look)
+    if options.is_page(out):
+        figure = plot_3d([cloud, arm if shape is None else shape], **look)
+    else:
+        figure = plot_views(cloud, arm, shape, **look)
+    options.save_picture(figure, out, overwrite)
     console.line(out)
 
 

@@ -7,20 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
 from softreach.cli.console import console
-from softreach.cli.options import (
-    Activation,
-    AsJson,
-    Overwrite,
-    Source,
-    Unit,
-    check_output,
-    is_stored,
-    refuse,
-    shape_of,
-    written_unit,
-)
 from softreach.cli.values import Number, Rows
 from softreach.support.errors import InvalidInput, NotPossible
 
@@ -35,15 +24,15 @@ _OTHER = "for ActiveFilaments.jl, whose lengths are in m"
 
 
 def export(
-    source: Source,
+    source: options.Source,
     out: Path,
     /,
     *,
-    activation: Activation = None,
+    activation: options.Activation = None,
     format: Format = None,
     changes: Changes = UNCHANGED,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
 ) -> None:
     """Convert a cloud or an arm for other programs.
 
@@ -58,15 +47,15 @@ def export(
     """
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
-    if is_stored(source):
-        refuse("on a cloud, which has many", activation=activation)
-        refuse("on a stored cloud: give the design instead", **changes.given)
+    if options.is_stored(source):
+        options.refuse("on a cloud, which has many", activation=activation)
+        options.refuse("on a stored cloud: give the design instead", **changes.given)
         write = _export_pair if format else _export_cloud
         write(source, out, overwrite, unit)
     elif format is not None and out.suffix != ".jl":
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
     elif out.suffix == ".jl":
-        refuse("on a filament's definition, which has none", activation=activation)
+        options.refuse("on a filament's definition, which has none", activation=activation)
         _export_filament(design_from(source, changes), out, overwrite, unit)
     else:
         _export_arm(design_from(source, changes, unit), out, activation, overwrite)
@@ -77,9 +66,9 @@ def _export_cloud(source: str, out: Path, overwrite: bool, unit: str | None) -> 
     from softreach.cloud.clouds import design_of, open_cloud
     from softreach.export.clouds import CLOUD_FILES, export_cloud
 
-    check_output(out, CLOUD_FILES, overwrite)
+    options.check_output(out, CLOUD_FILES, overwrite)
     cloud = open_cloud(source)
-    written = written_unit(shown_in(unit, design_of(cloud)))
+    written = options.written_unit(shown_in(unit, design_of(cloud)))
     export_cloud(cloud, out, unit=written, overwrite=overwrite)
     console.written(out, written)
 
@@ -88,9 +77,9 @@ def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> N
     from softreach.cloud.clouds import open_cloud
     from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
 
-    refuse(_OTHER, unit=unit)
+    options.refuse(_OTHER, unit=unit)
     for path in (out, gamma_path(out)):
-        check_output(path, CLOUD_PAIR, overwrite)
+        options.check_output(path, CLOUD_PAIR, overwrite)
     write_cloud(open_cloud(source), out, overwrite=overwrite)
     console.line(gamma_path(out))
 
@@ -98,8 +87,8 @@ def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> N
 def _export_filament(arm: Manipulator, out: Path, overwrite: bool, unit: str | None) -> None:
     from softreach.exchange.activefilaments.definition import FILAMENT_SCRIPT, write_design
 
-    refuse(_OTHER, unit=unit)
-    check_output(out, FILAMENT_SCRIPT, overwrite)
+    options.refuse(_OTHER, unit=unit)
+    options.check_output(out, FILAMENT_SCRIPT, overwrite)
     write_design(arm, out, overwrite=overwrite)
 
 
@@ -107,8 +96,8 @@ def _export_arm(arm: Manipulator, out: Path, activation: str | None, overwrite: 
     from softreach.export import export_arm
     from softreach.export.surfaces import SURFACE_FILES
 
-    check_output(out, SURFACE_FILES, overwrite)
-    shape, written = shape_of(activation, arm), written_unit(arm)
+    options.check_output(out, SURFACE_FILES, overwrite)
+    shape, written = options.shape_of(activation, arm), options.written_unit(arm)
     export_arm(arm, shape, out, unit=written, overwrite=overwrite)
     console.written(out, written)
 
@@ -120,9 +109,9 @@ def import_file(
     *,
     design: str | None = None,
     tol: Number | None = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Convert a filament or a cloud of ActiveFilaments.jl.
 
@@ -143,8 +132,8 @@ def import_file(
 
     rows: Rows
     if source.suffix == ".json":
-        refuse("on a filament, only on a cloud", design=design, tol=tol)
-        check_output(out, DESIGN_FILE, overwrite)
+        options.refuse("on a filament, only on a cloud", design=design, tol=tol)
+        options.check_output(out, DESIGN_FILE, overwrite)
         arm = shown_in(unit, read_design(source))
         arm.save(out, overwrite=overwrite)
         rows = {
@@ -160,7 +149,7 @@ def import_file(
     else:
         given = read_design(design) if design.endswith(".json") else design_from(design)
         arm = shown_in(unit, given)
-        check_output(out, CLOUD_STORE, overwrite)
+        options.check_output(out, CLOUD_STORE, overwrite)
         cloud = read_cloud(arm, source, tol=1e-6 if tol is None else tol)
         save_cloud(cloud, out, overwrite=overwrite)
         rows = {

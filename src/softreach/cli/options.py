@@ -246,13 +246,10 @@ def is_page(path: Path) -> bool:
     return path.suffix.lower() in PAGES
 
 
-def save_picture(
-    path: Path, draw: Callable[[], Any], page: list[Any], overwrite: bool, **look: Any
-) -> None:
-    """Draw, or write what is given as a page that turns, if a page is asked for."""
-    from softreach.plot import plot_3d, save_figure
+def save_picture(figure: Any, path: Path, overwrite: bool) -> None:
+    """Write a figure, and say what part of the data a page that turns shows."""
+    from softreach.plot import save_figure
 
-    figure = plot_3d(page, **look) if is_page(path) else draw()
     save_figure(figure, path, overwrite=overwrite)
-    if is_page(path) and figure.note:
-        console.note(f"{path}: {figure.note}")
+    if note := getattr(figure, "note", ""):
+        console.note(f"{path}: {note}")

@@ -5,24 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
 from softreach.cli.console import console
-from softreach.cli.options import (
-    OUT,
-    Activation,
-    AsJson,
-    Design,
-    Out,
-    Overwrite,
-    Unit,
-    View,
-    activation_of,
-    check_output,
-    check_picture,
-    points_in,
-    refuse,
-    save_picture,
-)
 from softreach.cli.values import Whole, activation_text, record
 from softreach.support.errors import NotPossible, counted
 from softreach.support.units import LengthUnit
@@ -38,7 +23,7 @@ _EXACT = 1e-6  # of L, the error of tips
 
 
 def solve(
-    design: Design,
+    design: options.Design,
     /,
     *,
     target: Signed = None,
@@ -46,8 +31,8 @@ def solve(
     within: str | None = None,
     family: Whole | None = None,
     changes: Changes = UNCHANGED,
-    unit: Unit = None,
-    json: AsJson = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Find every activation that puts the tip at a target.
 
@@ -69,11 +54,11 @@ def solve(
         raise NotPossible("give either --target or --targets")
     arm = design_from(design, changes, unit)
     if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
-        refuse("on up to three free bundles, where all solutions are found", family=family)
+        options.refuse("on up to three free bundles, where all solutions are found", family=family)
     if targets is None:
         points = [position_in("target", target or "", arm.length)]
     else:
-        points = points_in("targets", targets, arm)
+        points = options.points_in("targets", targets, arm)
     reach = 0.0 if within is None else length_in("within", within, arm.length)
     count = 1 if family is None else family
     solutions = solve_inverse(arm, points, within=reach, family=count)
@@ -110,15 +95,15 @@ def _print(solution: Solution, arm: Manipulator, family: int) -> None:
 
 
 def track(
-    design: Design,
+    design: options.Design,
     path: Path,
     /,
     *,
     start: Signed = None,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, OUT] = Path("activations.csv"),
-    overwrite: Overwrite = False,
-    unit: Unit = None,
+    out: Annotated[Path, options.OUT] = Path("activations.csv"),
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
 ) -> None:
     """Follow a path of tip positions, and say where it ends.
 
@@ -137,9 +122,9 @@ def track(
     from softreach.support.files.text import write_text
 
     arm = design_from(design, changes, unit)
-    check_output(out, TABLES, overwrite)
-    first = None if start is None else activation_of(start, arm)
-    tracked = track_path(arm, points_in("path", path, arm), first)
+    options.check_output(out, TABLES, overwrite)
+    first = None if start is None else options.activation_of(start, arm)
+    tracked = track_path(arm, options.points_in("path", path, arm), first)
     write_text(out, path_csv(tracked), overwrite=overwrite)
     followed = int((tracked.status == 0).sum())
     share = f"{followed} of {tracked.sizes['point']} points followed"
@@ -161,16 +146,16 @@ def _end(tracked: xr.Dataset, unit: LengthUnit) -> str:
 
 
 def equilibria(
-    design: Design,
+    design: options.Design,
     /,
     *,
-    activation: Activation = None,
-    view: View = None,
+    activation: options.Activation = None,
+    view: options.View = None,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Find every equilibrium of a loaded arm at given activations.
 
@@ -181,12 +166,12 @@ def equilibria(
     Args:
         out: Draw them: .png .pdf .svg, or .html to turn
     """
-    from softreach.plot import plot_equilibria
+    from softreach.plot import plot_3d, plot_equilibria
     from softreach.rod import equilibria as all_of
 
-    check_picture(out, overwrite, view=view, page=True)
+    options.check_picture(out, overwrite, view=view, page=True)
     arm = design_from(design, changes, unit)
-    result = all_of(arm, activation_of(activation, arm))
+    result = all_of(arm, options.activation_of(activation, arm))
     if json:
         fields = vars(result) | {"status": _statuses(result), "degree": result.degree}
         del fields["rod"], fields["solver"]
@@ -195,7 +180,9 @@ def equilibria(
         _print_all(result, arm)
     if out is not None:
         look = {"view": view or "oblique", "unit": arm.length_unit}
-        save_picture(out, lambda: plot_equilibria(result, **look), [result], overwrite, **look)
+        page = options.is_page(out)
+        figure = plot_3d([result], **look) if page else plot_equilibria(result, **look)
+        options.save_picture(figure, out, overwrite)
 
 
 def _statuses(result: AllEquilibria) -> list[str]:

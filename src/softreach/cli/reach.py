@@ -7,24 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
-from softreach.cli.options import (
-    OUT,
-    OUTPUT,
-    AsJson,
-    Design,
-    Out,
-    Overwrite,
-    Unit,
-    check_outputs,
-    check_picture,
-    is_page,
-    refuse,
-    save_picture,
-    written_unit,
-)
 from softreach.cli.values import ERROR, Number, Rows, rows_of
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import PAGES, PICTURES
@@ -35,16 +21,16 @@ if TYPE_CHECKING:
 
 
 def reach(
-    design: Design,
+    design: options.Design,
     /,
     *,
     accuracy: Number = 3e-3,
     changes: Changes = UNCHANGED,
-    out: Annotated[list[Path] | None, OUT] = None,
-    at: Annotated[str | None, Parameter(group=OUTPUT, allow_leading_hyphen=True)] = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: Annotated[list[Path] | None, options.OUT] = None,
+    at: Annotated[str | None, Parameter(group=options.OUTPUT, allow_leading_hyphen=True)] = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Compute the exact reachable set: volume, multiplicity, folds.
 
@@ -67,9 +53,9 @@ def reach(
     arm = design_from(design, changes, unit)
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
     meshed = [("skimage", "surface")] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
-    check_outputs(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite, *meshed)
+    options.check_outputs(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite, *meshed)
     if not any(map(_is_drawn, outs)):
-        refuse("without a picture: add --out slices.png", at=at)
+        options.refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
@@ -87,34 +73,33 @@ def _write(
     reached: ReachableSet, arm: Manipulator, path: Path, at: list[float] | None, overwrite: bool
 ) -> None:
     from softreach.export import export_mesh
-    from softreach.plot import plot_slices
+    from softreach.plot import plot_3d, plot_slices
     from softreach.workspace import ReachableSolid, ReachableSurface
 
     unit = arm.length_unit
-    if is_page(path):
-        save_picture(path, tuple, [reached, arm], overwrite, unit=unit)
+    if options.is_page(path):
+        options.save_picture(plot_3d([reached, arm], unit=unit), path, overwrite)
     elif _is_drawn(path) and isinstance(reached, ReachableSolid):
-        figure = plot_slices(reached.grid, at=at, unit=unit)
-        save_picture(path, lambda: figure, [], overwrite)
+        options.save_picture(plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
     elif not _is_drawn(path) and isinstance(reached, ReachableSolid | ReachableSurface):
-        export_mesh(reached.surface(), path, unit=written_unit(arm), overwrite=overwrite)
-        console.written(path, written_unit(arm))
+        export_mesh(reached.surface(), path, unit=options.written_unit(arm), overwrite=overwrite)
+        console.written(path, options.written_unit(arm))
     else:
         raise NotPossible(f"{path} cannot be written for a design with so few free bundles")
 
 
 def payload(
-    design: Design,
+    design: options.Design,
     /,
     *,
     share: Number = 0.8,
     payloads: str | None = None,
     accuracy: Number = 0.01,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Compute how much of its reach a payload costs an arm.
 
@@ -133,7 +118,7 @@ def payload(
     from softreach.workspace.payload import payload_curve
 
     arm = design_from(design, changes, unit)
-    check_picture(out, overwrite)
+    options.check_picture(out, overwrite)
     if arm.loads is None:
         raise NotPossible("this design has no loads; add --gravity down")
     masses = None if payloads is None else [read_mass("payloads", m) for m in payloads.split(",")]
@@ -150,19 +135,19 @@ def payload(
     if arm.loads.payload and not json:
         console.line(f"  they take the place of the design's own payload, {arm.loads.payload:g} kg")
     if out is not None:
-        from softreach.plot import plot_payload_curve, save_figure
+        from softreach.plot import plot_payload_curve
 
-        save_figure(plot_payload_curve(curve, largest=[largest]), out, overwrite=overwrite)
+        options.save_picture(plot_payload_curve(curve, largest=[largest]), out, overwrite)
 
 
 def gradient(
-    design: Design,
+    design: options.Design,
     parameters: list[str],
     /,
     *,
     accuracy: Number = 3e-3,
     changes: Changes = UNCHANGED,
-    json: AsJson = False,
+    json: options.AsJson = False,
 ) -> None:
     """Differentiate the reachable volume by design parameters.
 
