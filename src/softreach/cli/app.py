@@ -14,7 +14,7 @@ from typing import Annotated, Any, cast
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from softreach.cli.console import HelpConsole, console
-from softreach.support.errors import NotPossible, NotWritten, SoftreachError, check_date
+from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
@@ -140,7 +140,6 @@ def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
     with console.listening():
         try:
-            check_date()
             if not _NAMES & {*arguments}:
                 _ = [app[name] for name in _NAMES]  # imports them: help lists their docstrings
             code = app.meta(arguments, result_action="return_value")

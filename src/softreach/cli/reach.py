@@ -11,7 +11,7 @@ from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
-from softreach.cli.values import ERROR, Number, Rows, rows_of
+from softreach.cli.values import ERROR, Number, Rows, as_read, rows_of
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import PAGES, PICTURES
 
@@ -165,11 +165,14 @@ def gradient(
     arm = design_from(design, changes)
     with progress.bar("differentiating the volume", len(parameters)) as step:
         derivatives = volume_gradient(arm, parameters, accuracy=accuracy, progress=step)
-    rows: Rows = {}
-    for k, unit in enumerate(derivatives.units):
-        per = "" if unit == "1" else f"/{unit}"
-        for name, (values, symbol) in rows_of(derivatives.to_dataset()).items():
-            label = f"{name.removesuffix(ERROR)} by {derivatives.parameters[k]}"
-            ending = ERROR * name.endswith(ERROR)
-            rows[f"{label}{ending}"] = (values[k], f"{symbol or '1' * bool(per)}{per}")
+    numbers = rows_of(derivatives.to_dataset())
+    rows: Rows = {"route": numbers.pop("route")}
+    for k, (parameter, unit) in enumerate(
+        zip(derivatives.parameters, derivatives.units, strict=True)
+    ):
+        for name, (values, symbol) in numbers.items():
+            label = f"{name.removesuffix(ERROR)} by {parameter}{ERROR * name.endswith(ERROR)}"
+            kind = as_read((), symbol.removesuffix(" per unit"))[1]
+            per = kind if unit == "1" else f"{kind or '1'}/{unit}"
+            rows[label] = (values[k], per)
     console.rows(f"derivatives of what {design} reaches", rows, json)

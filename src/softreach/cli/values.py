@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import Enum
+from itertools import repeat
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
@@ -78,29 +79,41 @@ def as_read(values: Any, unit: str) -> tuple[Any, str]:
 
 def rows_of(dataset: xr.Dataset) -> Rows:
     """The numbers of a result, by the names and units that its dataset has."""
-    rows: Rows = {"route": (dataset.attrs["route"], "")} if "route" in dataset.attrs else {}
+    rows: Rows = {}
     for name, column in dataset.variables.items():
         if column.dtype.kind in "fi":
             unit = str(column.attrs.get("units", "1"))
             rows[str(name).replace("_", " ")] = as_read(column.values, unit)
-    return rows
+    return rows | ({"route": (dataset.attrs["route"], "")} if "route" in dataset.attrs else {})
 
 
 def rows_for_people(rows: Rows, unit: LengthUnit) -> dict[str, str]:
     """The rows as text: lengths, areas and volumes in the unit, and errors beside their values."""
     texts: dict[str, str] = {}
-    errors = {f"{name}{ERROR}" for name, (value, _) in rows.items() if not isinstance(value, list)}
     for name, (value, symbol) in rows.items():
+        if name.endswith(ERROR) and _are_alike(value, rows.get(name.removesuffix(ERROR))):
+            continue  # it stands beside the value
         size, power = 1.0, _POWERS.get(symbol)
         if power is not None:
             size, symbol = unit.scale(power), unit.symbol(power)
-        error = rows.get(f"{name}{ERROR}", (None, ""))[0]
-        text = shown(value if size == 1.0 else _over(value, size))
-        if error is not None and isinstance(value, float):
-            texts[name] = quantity(value / size, symbol, error / size)
-        elif name not in errors:
-            texts[name] = f"{text} {'' if text == '-' else symbol}".rstrip()
+        error = rows.get(f"{name}{ERROR}")
+        if error is not None and _are_alike(value, error):
+            text = _with_errors(value, error[0], size)
+        else:
+            text = shown(value if size == 1.0 else _over(value, size))
+        texts[name] = f"{text} {'' if text == '-' else symbol}".rstrip()
     return texts
+
+
+def _are_alike(value: Any, row: tuple[Any, str] | None) -> bool:
+    """True if a row has one number for each of a value, such as an error."""
+    return row is not None and isinstance(value, list) == isinstance(row[0], list)
+
+
+def _with_errors(value: Any, error: Any, size: float) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(_with_errors, value, error, repeat(size)))
+    return shown(None) if value is None else quantity(value / size, "", error / size)
 
 
 def rows_for_machines(rows: Rows, length: float | None) -> Iterator[tuple[str, Any, str]]:
