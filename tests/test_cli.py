@@ -14,7 +14,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed
-from softreach.cli.app import _COMMANDS, app, run
+from softreach.cli.app import MODULES, app, run
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.rod.summary import describe
@@ -23,7 +23,6 @@ from softreach.rod.summary import describe
 pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 
 COMMANDS = [name for name in app if not name.startswith("-")]
-MODULES = {name: module for names in _COMMANDS.values() for name, module in names.items()}
 HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}
 
 

@@ -11,9 +11,9 @@ from cyclopts import App, Parameter
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Whole, pairs_in, rows_of
+from softreach.cli.values import Whole, pairs_in, read_positive, rows_of
 from softreach.support.errors import InvalidInput, NotPossible, counted
-from softreach.support.quantity import numbers_in
+from softreach.support.quantity import read_number
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -230,11 +230,9 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLik
 
 def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
-    values = numbers_in(text.removesuffix("L"), 1) if text.endswith("L") else None
-    if not values or values[0] <= 0:
-        allowed = "a radius > 0 over the length of each design, like 0.05L"
-        raise InvalidInput("alpha", text or "''", allowed)
-    return values[0]
+    allowed = "a radius > 0 over the length of each design, like 0.05L"
+    bare = text.removesuffix("L") if text.endswith("L") else ""
+    return read_positive("alpha", text, lambda _: read_number(bare), allowed)
 
 
 def _shard(text: str) -> tuple[int, int]:

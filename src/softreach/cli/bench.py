@@ -11,8 +11,9 @@ from cyclopts import Group, Parameter
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, pairs_in
+from softreach.cli.values import Number, Whole, as_read, pairs_in, read_positive
 from softreach.support.errors import InvalidInput
+from softreach.support.units import TYPED, read_length
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -101,7 +102,7 @@ def calibrate(
             free=free_names(arm, free),
             prior=priors(arm, prior or ()),
             hold_out=hold_out,
-            noise=None if noise is None else read_noise(noise),
+            noise=None if noise is None else _noise(noise),
             robust=robust,
             rivals=rivals,
             inputs=pairs_in("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"') or None,
@@ -124,17 +125,8 @@ def calibrate(
         result.report(arm.length_unit.name).save(report, overwrite=overwrite)
 
 
-def read_noise(text: str) -> float:
-    """A standard deviation [m] with its unit, or in m."""
-    from softreach.support.units import TYPED, read_length
-
-    try:
-        noise = read_length(text)
-    except ValueError:
-        noise = 0.0
-    if not noise > 0:
-        raise InvalidInput("noise", text, f"a length > 0 such as 0.2mm ({TYPED})")
-    return noise
+def _noise(text: str) -> float:
+    return read_positive("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})")
 
 
 def _record(result: Calibration) -> dict[str, Any]:
@@ -213,7 +205,7 @@ def plan_poses(
     from softreach.support.quantity import columns
 
     arm = design_from(design, changes, unit)
-    width = read_noise(noise)
+    width = _noise(noise)
     options.check_output(out, TABLES, overwrite)
     plan = calibration.plan_poses(
         arm,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.values import Number, pairs_in
+from softreach.cli.values import Number, pairs_in, read_as
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, did_you_mean, warn
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import as_unit
@@ -34,17 +35,14 @@ class Changes:
     """Changes that a command makes to the design that it takes.
 
     Attributes:
-        base: The way the arm points from its base in the world: up (upright), down (hanging), x,
-            -x, y or -y.
-        revolution_deg: Revolution of every helical fiber [deg]; each keeps its handedness.
-        taper_deg: Taper angle [deg].
+        base: The way the arm points: up (upright), down (hanging), x, -x, y or -y.
+        revolution_deg: Revolution of every helical fiber; each keeps its handedness.
+        taper_deg: Taper angle.
         payload: Mass at the tip with its unit: 200g.
-        gravity: down, up, sideways (along +x), none, or x,y,z [m/s²] in the world, whose +z points
-            up; down if left out and there are loads.
-        tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5 or 0,0,-500mN.
+        gravity: down, up, sideways, none, or x,y,z [m/s²]; default down if there are loads.
+        tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5
         point: Marker that counts as the tip, such as that of a tool.
-        settings: PATH=VALUE of any parameter, as softreach list parameters DESIGN names them:
-            left.offset_deg=30, or with the unit in the value, left.offset=30deg. May be repeated.
+        settings: PATH=VALUE of a parameter: taper=2deg. May be repeated.
     """
 
     base: Signed = None
@@ -64,16 +62,7 @@ class Changes:
         return {name: value for name, value in options.items() if value is not None}
 
     def applied_to(self, arm: Manipulator) -> Manipulator:
-        """The changed design.
-
-        Parameters of the body and of actuators come first, then loads, for which these may have
-        given moduli and densities.
-
-        Raises:
-            InvalidInput: An option that cannot be read, or an unknown parameter.
-            NotPossible: Loads on an arm without moduli or densities.
-            InvalidDesign: No such arm can exist.
-        """
+        """The changed design: parameters first, which may give what loads need to know."""
         from softreach.arm.base import POINTS
         from softreach.arm.parameters import changed
 
@@ -126,12 +115,7 @@ UNCHANGED = Changes()
 
 
 def design_from(text: str, changes: Changes = UNCHANGED, unit: str | None = None) -> Manipulator:
-    """The design of that name or file, changed as asked, to be shown in a unit.
-
-    Raises:
-        InvalidInput: There is no such design, or no such unit.
-        InvalidDesign: No such arm can exist; in the terms of files.
-    """
+    """The design of that name or file, changed as asked, to be shown in a unit."""
     from softreach.arm import design_file
     from softreach.arm.tables import check_extension
 
@@ -187,18 +171,12 @@ def _unchanged(text: str) -> Manipulator:
 
 
 def read_mass(name: str, text: str) -> float:
-    """A mass [kg] that was written with its unit.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    try:
-        if (mass := read_quantity(text, "kg")) >= 0:
-            return mass
-    except ValueError:
-        pass
-    units = ", ".join(unit_names("kg"))
-    raise InvalidInput(name, text, f"a mass >= 0 with its unit ({units}), such as 200g")
+    """A mass [kg] that was written with its unit."""
+    allowed = f"a mass >= 0 with its unit ({', '.join(unit_names('kg'))}), such as 200g"
+    mass = read_as(name, text, lambda text: read_quantity(text, "kg"), allowed)
+    if mass < 0:
+        raise InvalidInput(name, text, allowed)
+    return mass
 
 
 def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:
@@ -230,8 +208,7 @@ def _values(arm: Manipulator, written: Sequence[tuple[str, object]]) -> dict[str
         parameter = names.by_key[name]
         if parameter.name in values:
             raise InvalidInput("set", key, "given once, under one of its names")
-        try:
-            values[parameter.name] = names.number(name, value)
-        except ValueError:
-            raise InvalidInput(key, value, names.allowed(name)) from None
+        values[parameter.name] = read_as(
+            key, value, partial(names.number, name), names.allowed(name)
+        )
     return values

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from cyclopts import Group, Parameter
 
 from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
-from softreach.cli.values import Whole
+from softreach.cli.values import Whole, read_positive
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.files.formats import (
     PAGES,
@@ -33,46 +32,33 @@ if TYPE_CHECKING:
 
 
 OUTPUT = Group("Output options", sort_key=3)
-
 OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
 """The one name of the file or folder that a command writes."""
 
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
 _STORED = "on a stored cloud: give the design instead"
 
+
+def _output(help: str, name: str | None = None) -> Parameter:
+    return Parameter(name=name, group=OUTPUT, help=help)
+
+
 Design = Annotated[
     str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
 ]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
-Activation = Annotated[
-    str | None,
-    Parameter(
-        help="Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5",
-        allow_leading_hyphen=True,
-    ),
-]
-AsJson = Annotated[
-    bool, Parameter(name="--json", group=OUTPUT, help="Print JSON; null where there is no number.")
-]
-Unit = Annotated[
-    str | None,
-    Parameter(
-        name="--unit",
-        group=OUTPUT,
-        help="Unit of lengths: m, cm, mm, or L, the arm's length. If left out, that of the design "
-        "file; else mm for arms below 1 m, m for others, and m for meshes and tables.",
-    ),
-]
-Durable = Annotated[
-    bool,
-    Parameter(group=OUTPUT, help="Flush to disk before exiting."),
-]
-Overwrite = Annotated[bool, Parameter(group=OUTPUT, help="Overwrite existing output.")]
+_ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
+Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]
+AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "--json")]
+_UNIT = (
+    "Unit of lengths: m, cm, mm, or L, the arm's length. If left out, that of the design file; "
+    "else mm for arms below 1 m, m for others, and m for meshes and tables."
+)
+Unit = Annotated[str | None, _output(_UNIT)]
+Durable = Annotated[bool, _output("Flush to disk before exiting.")]
+Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
-View = Annotated[
-    str | None,
-    Parameter(group=OUTPUT, help="View of the picture: oblique (if left out), front, side, top."),
-]
+View = Annotated[str | None, _output("View: oblique (if left out), front, side, top.")]
 
 
 @Parameter(name="*")
@@ -97,11 +83,7 @@ class Sampling:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Arguments of `compute_cloud` and `build_atlas`.
-
-        Raises:
-            InvalidInput: A seed for a sampler without chance.
-        """
+        """Arguments of `compute_cloud` and `build_atlas`."""
         if self.sampler == "grid":
             refuse("on the sampler grid, which is not random", seed=self.seed)
         return {"n": self.count, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
@@ -186,29 +168,12 @@ def radius_of(text: str, length: float) -> float | str:
     """An alpha radius in m from `0.05L`, `5cm`, `0.05` (m) or `critical`."""
     if text == "critical":
         return text
-    try:
-        radius = read_length(text, length)
-    except ValueError:
-        radius = 0.0
-    if not 0.0 < radius < math.inf:
-        allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
-        raise InvalidInput("alpha", text or "''", allowed)
-    return radius
+    allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
+    return read_positive("alpha", text, lambda text: read_length(text, length), allowed)
 
 
 def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
-    """Refuse a file that could not be written in the end, before anything is computed.
-
-    Args:
-        path: Where it goes, if it is asked for.
-        formats: What can be written there, by suffix.
-        overwrite: Whether it may replace what is there.
-
-    Raises:
-        InvalidInput: Another suffix, something is there, or there is nothing to overwrite.
-        MissingExtra: A library that writes it is not installed.
-        NotWritten: Nothing can be written there.
-    """
+    """Refuse a file that could not be written in the end, before anything is computed."""
     check_outputs([] if path is None else [path], formats, overwrite)
 
 

@@ -28,16 +28,28 @@ _POWERS = {"m": 1, "m²": 2, "m³": 3}
 _READ_AS = {"m2": "m²", "m3": "m³", "1": ""}
 
 
+def read_as(name: str, text: Any, read: Callable[[Any], Any], allowed: str) -> Any:
+    """What a reader makes of a text; where it raises ValueError, the option is refused."""
+    try:
+        return read(text)
+    except ValueError:
+        raise InvalidInput(name, text or "''", allowed) from None
+
+
+def read_positive(name: str, text: str, read: Callable[[str], float], allowed: str) -> float:
+    """As `read_as`, of numbers above 0."""
+    if (value := read_as(name, text, read, allowed)) > 0:
+        return value
+    raise InvalidInput(name, text, allowed)
+
+
 def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
-    """Options that are read by a function from text, which raises ValueError of other text."""
+    """Options that are read by a function from text."""
 
     def convert(kind: Any, tokens: Sequence[Token]) -> float:
         del kind
-        try:
-            return read(tokens[0].value)
-        except ValueError:
-            name = (tokens[0].keyword or "number").lstrip("-").replace("-", "_")
-            raise InvalidInput(name, tokens[0].value or "''", allowed) from None
+        name = (tokens[0].keyword or "number").lstrip("-").replace("-", "_")
+        return read_as(name, tokens[0].value, read, allowed)
 
     return Parameter(converter=convert)
 
@@ -47,11 +59,7 @@ Number = Annotated[float, _read_by(read_number, "a finite number such as 0.5 or 
 
 
 def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, str]:
-    """Names and values of NAME=VALUE; a name may hold another =.
-
-    Raises:
-        InvalidInput: Text of another form, or a name that is given twice.
-    """
+    """Names and values of NAME=VALUE, each name once; a name may hold another =."""
     pairs: dict[str, str] = {}
     for text in texts or ():
         key, sign, value = (part.strip() for part in text.rpartition("="))
