@@ -41,11 +41,6 @@ def stored(tmp_path_factory):
     return str(path)
 
 
-def printed_json(capsys, *arguments):
-    assert run([*arguments, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_of_every_command_teaches_with_an_example_that_parses(command, capsys):
     assert run([command, "--help"]) == 0
@@ -100,8 +95,8 @@ def test_importing_and_helping_load_no_heavy_library(code):
 
 
 class TestDesign:
-    def test_what_is_printed_follows_from_the_design(self, capsys):
-        facts = printed_json(capsys, "design", "minimal_trunk", "--taper-deg", "3")
+    def test_what_is_printed_follows_from_the_design(self, printed):
+        facts = printed("design", "minimal_trunk", "--taper-deg", "3")
         arm = sr.designs.minimal_trunk(taper=np.radians(3))
         known = describe(arm)
         assert facts["bundles"] == 3
@@ -117,13 +112,13 @@ class TestDesign:
         assert "-108, 108, 0 deg" in streams.out
         assert streams.err.startswith("warning: activations reach |γ| = 1.67")
 
-    def test_stiffness_weight_and_ranges_are_those_of_the_library(self, folder, capsys):
+    def test_stiffness_weight_and_ranges_are_those_of_the_library(self, folder, printed):
         rubber = sr.Material(young_modulus=1e5, density=1000.0)
         trunk = sr.designs.minimal_trunk()
         ring = trunk.section.rings[0].replace(material=rubber)
         arm = trunk.replace(section=trunk.section.replace(rings=(ring,)))
         arm.save("rubber.toml")
-        facts, known = printed_json(capsys, "design", "rubber.toml"), describe(arm)
+        facts, known = printed("design", "rubber.toml"), describe(arm)
         assert facts["K1_at_base_and_tip_n_m2"] == known.stiffness.bending.tolist()
         assert facts["mass_kg"] == known.mass
         assert facts["load_number"] == known.load_number
@@ -163,35 +158,35 @@ class TestDesign:
         assert err.count("tips are off by up to about") == said
         assert ("L) within the bounds" in err) == said
 
-    def test_the_schema_is_printed_for_editors(self, capsys):
+    def test_the_schema_is_printed_for_editors(self, printed):
         from softreach.arm.design_file.schema import json_schema
 
-        assert printed_json(capsys, "design", "--schema") == json_schema()
+        assert printed("design", "--schema") == json_schema()
 
-    def test_a_saved_design_is_the_varied_one(self, folder, capsys):
+    def test_a_saved_design_is_the_varied_one(self, folder, capsys, printed):
         assert run(["design", "redundant_trunk", "--revolution-deg", "60", "--out", "a.toml"]) == 0
         assert sr.Manipulator.load("a.toml") == changed(
             sr.designs.redundant_trunk(), {"revolution": np.radians(60)}
         )
         capsys.readouterr()
-        facts = printed_json(capsys, "design", "a.toml")
+        facts = printed("design", "a.toml")
         np.testing.assert_allclose(facts["revolution_deg"], [-60, 60, 0, 0])
 
 
 class TestCloud:
-    def test_the_cloud_on_disk_is_that_of_the_library(self, folder, capsys):
+    def test_the_cloud_on_disk_is_that_of_the_library(self, folder, printed):
         options = ["--n", "512", "--seed", "3", "--sampler", "sobol", "--out", "a.zarr"]
-        facts = printed_json(capsys, "cloud", "minimal_trunk", *options, "--taper-deg", "1")
+        facts = printed("cloud", "minimal_trunk", *options, "--taper-deg", "1")
         arm = changed(sr.designs.minimal_trunk(), {"taper": np.radians(1)})
         cloud = sr.open_cloud("a.zarr")
         assert cloud.identical(sr.compute_cloud(arm, 512, seed=3, sampler="sobol"))
         assert facts["samples"] == 512
         assert facts["highest_tip_L"] == pytest.approx(float(cloud.tip[:, 2].max()))
 
-    def test_lengths_are_counted_in_l_whatever_the_length(self, folder, capsys):
+    def test_lengths_are_counted_in_l_whatever_the_length(self, folder, printed):
         sr.designs.minimal_trunk(length=0.3).save("short.toml")
-        short = printed_json(capsys, "cloud", "short.toml", "--n", "500")
-        long = printed_json(capsys, "cloud", "minimal_trunk", "--n", "500")
+        short = printed("cloud", "short.toml", "--n", "500")
+        long = printed("cloud", "minimal_trunk", "--n", "500")
         for name in ("highest_tip_L", "lowest_tip_L"):
             assert short[name] == pytest.approx(long[name], rel=1e-6)
 
@@ -207,8 +202,8 @@ class TestCloud:
 
 
 class TestVolume:
-    def test_volumes_are_those_of_the_library(self, stored, capsys):
-        facts = printed_json(capsys, "volume", stored, "--alpha", "0.4L")
+    def test_volumes_are_those_of_the_library(self, stored, printed):
+        facts = printed("volume", stored, "--alpha", "0.4L")
         tip = sr.open_cloud(stored).tip
         hull, convex = sr.concave_hull(tip, 0.4, bias=True), sr.convex_hull(tip)
         assert facts["points"] == 3_000
@@ -222,13 +217,13 @@ class TestVolume:
     @pytest.mark.parametrize(
         ("alpha", "length", "radius"), [("0.3L", 2.0, 0.3), ("0.3", 2.0, 0.15)]
     )
-    def test_a_radius_is_in_meters_or_in_l(self, alpha, length, radius, folder, capsys):
+    def test_a_radius_is_in_meters_or_in_l(self, alpha, length, radius, folder, printed):
         sr.designs.minimal_trunk(length=length).save("long.toml")
         options = ("--alpha", alpha, "--n", "1000")
-        assert printed_json(capsys, "volume", "long.toml", *options)["alpha_L"] == radius
+        assert printed("volume", "long.toml", *options)["alpha_L"] == radius
 
-    def test_the_critical_radius_leaves_one_region(self, stored, capsys):
-        assert printed_json(capsys, "volume", stored, "--alpha", "critical")["regions"] == 1
+    def test_the_critical_radius_leaves_one_region(self, stored, printed):
+        assert printed("volume", stored, "--alpha", "critical")["regions"] == 1
 
     def test_too_fine_a_radius_is_warned_of_and_the_estimate_withheld(self, stored, capsys):
         assert run(["volume", stored, "--alpha", "0.08L"]) == 0
@@ -238,9 +233,9 @@ class TestVolume:
         assert "Traceback" not in streams.err
         assert streams.out.splitlines()[6].endswith("(estimate)  -")
 
-    def test_the_hull_is_written(self, stored, folder, capsys):
+    def test_the_hull_is_written(self, stored, folder, printed):
         trimesh = pytest.importorskip("trimesh")
-        facts = printed_json(capsys, "volume", stored, "--alpha", "0.4L", "--out", "hull.ply")
+        facts = printed("volume", stored, "--alpha", "0.4L", "--out", "hull.ply")
         assert trimesh.load("hull.ply").volume == pytest.approx(facts["volume_L3"], rel=1e-6)
 
 
@@ -337,7 +332,7 @@ def test_json_has_null_where_there_is_no_number(capsys):
 
 class TestList:
     @pytest.mark.parametrize("kind", ["designs", "materials", "metrics"])
-    def test_the_names_are_those_of_the_library(self, kind, capsys):
+    def test_the_names_are_those_of_the_library(self, kind, capsys, printed):
         from softreach.arm.material import material_names
         from softreach.atlas.metrics import METRIC_GROUPS
 
@@ -346,14 +341,14 @@ class TestList:
             "materials": list(material_names()),
             "metrics": [metric.name for group in METRIC_GROUPS.values() for metric in group],
         }[kind]
-        records = printed_json(capsys, "list", kind)
+        records = printed("list", kind)
         assert [next(iter(record.values())) for record in records] == names
         assert run(["list", kind]) == 0
         lines = capsys.readouterr().out.splitlines()
         assert [line.split()[0] for line in lines[1:]] == names
 
-    def test_every_listed_parameter_can_be_set_to_its_value(self, capsys):
-        records = printed_json(capsys, "list", "parameters", "lce_arm", "--payload", "2g")
+    def test_every_listed_parameter_can_be_set_to_its_value(self, capsys, printed):
+        records = printed("list", "parameters", "lce_arm", "--payload", "2g")
         words = [
             word
             for one in records

@@ -59,7 +59,6 @@ def export(
         _export_filament(design_from(source, changes), out, overwrite, unit)
     else:
         _export_arm(design_from(source, changes, unit), out, activation, overwrite)
-    console.line(out)
 
 
 def _export_cloud(source: str, out: Path, overwrite: bool, unit: str | None) -> None:
@@ -71,6 +70,7 @@ def _export_cloud(source: str, out: Path, overwrite: bool, unit: str | None) -> 
     written = options.written_unit(shown_in(unit, design_of(cloud)))
     export_cloud(cloud, out, unit=written, overwrite=overwrite)
     console.written(out, written)
+    console.line(out)
 
 
 def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> None:
@@ -78,10 +78,12 @@ def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> N
     from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
 
     options.refuse(_OTHER, unit=unit)
-    for path in (out, gamma_path(out)):
+    written = out, gamma_path(out)
+    for path in written:
         options.check_output(path, CLOUD_PAIR, overwrite)
     write_cloud(open_cloud(source), out, overwrite=overwrite)
-    console.line(gamma_path(out))
+    for path in written:
+        console.line(path)
 
 
 def _export_filament(arm: Manipulator, out: Path, overwrite: bool, unit: str | None) -> None:
@@ -90,6 +92,7 @@ def _export_filament(arm: Manipulator, out: Path, overwrite: bool, unit: str | N
     options.refuse(_OTHER, unit=unit)
     options.check_output(out, FILAMENT_SCRIPT, overwrite)
     write_design(arm, out, overwrite=overwrite)
+    console.line(out)
 
 
 def _export_arm(arm: Manipulator, out: Path, activation: str | None, overwrite: bool) -> None:
@@ -100,6 +103,7 @@ def _export_arm(arm: Manipulator, out: Path, activation: str | None, overwrite: 
     shape, written = options.shape_of(activation, arm), options.written_unit(arm)
     export_arm(arm, shape, out, unit=written, overwrite=overwrite)
     console.written(out, written)
+    console.line(out)
 
 
 def import_file(
