@@ -173,15 +173,6 @@ def _posture(loads: Loads) -> str:
     return names.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
 
 
-_STABILITY = {
-    "STABLE": "stable",
-    "UNSTABLE": "not stable",
-    "NO_EQUILIBRIUM": "the loads shorten the arm to nothing",
-    "UNDECIDED": "undecided: the search for an equilibrium gave up",
-    "SNAPS": "the arm snaps before",
-}
-
-
 def _rest_rows(arm: Manipulator) -> Rows:
     """Sag and stability of the arm without activation.
 
@@ -204,7 +195,9 @@ def _rest_rows(arm: Manipulator) -> Rows:
     return {
         f"sag at rest{how[0]}": (None if held is None else held.sag, "m"),
         f"at rest{how[1]}": (
-            "unknown: the loads are too large" if stood is None else _STABILITY[stood.status.name],
+            "unknown: the loads are too large"
+            if stood is None
+            else stood.status.name.lower().replace("_", " "),
             "",
         ),
     }
