@@ -16,7 +16,7 @@ from softreach.studio.found import Found
 from softreach.studio.job import Job, Learned, what_follows
 from softreach.studio.reach import Reach
 from softreach.studio.session import Session
-from softreach.studio.settings import PlotSettings
+from softreach.studio.state import PlotSettings
 from softreach.studio.state import Camera, Slice, StudioState
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import InvalidInput

@@ -13,7 +13,7 @@ from softreach.arm.parameters import changed
 from softreach.studio.plots.chart import Chart, Curve
 from softreach.studio.plots.sweep import sweep
 from softreach.studio.reach import Quality
-from softreach.studio.settings import MOST_POINTS, PlotSettings, TipPath
+from softreach.studio.state import MOST_POINTS, PlotSettings, TipPath
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput

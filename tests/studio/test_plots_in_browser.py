@@ -7,7 +7,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed, find_parameter
-from softreach.studio.settings import PlotSettings
+from softreach.studio.state import PlotSettings
 from softreach.studio.state import Slice
 
 

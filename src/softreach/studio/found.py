@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,8 @@ class Found:
     """Of the design."""
     refusal: str = ""
     """Reason why nothing can be computed of the design."""
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Ends of the sliders of a design, by the names of their parameters."""
     slopes: VolumeSlopes | None = None
     """Change of its volume by each slider."""
     free: Reach | None = None
@@ -71,6 +74,8 @@ class Found:
     """The design against its needs."""
     check_refusal: str = ""
     """Reason why it cannot be judged."""
+    part: int = 0
+    """Number of the part whose numbers are typed, in the list of parts."""
     section: Picture | None = None
     """Of the reachable set by the plane of the slice."""
     sweep: Sweep | None = None

@@ -1,11 +1,11 @@
-"""State of a tab of the studio as a value, its tip map, and the history of states."""
+"""State of a tab of the studio as a value, what it is made of, and the history of states."""
 
 from __future__ import annotations
 
 import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import lru_cache
 from typing import Any, Self
@@ -14,15 +14,13 @@ import numpy as np
 
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
+from softreach.requirements import Requirements
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.studio.needs import requirements_of
-from softreach.studio.settings import PlotSettings, TipPath
-from softreach.support.errors import InvalidDesign, InvalidInput, Range
-
-# Tip map of a design, as the studio uses it.
-
+from softreach.support.arrays import as_floats
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
+from softreach.support.files.toml import tables_of
 
 TOL = 1e-5
 """Largest tip error, in L: far below a pixel."""
@@ -77,6 +75,60 @@ def _is_solvable(arm: Manipulator) -> bool:
         return False
 
 
+_MOST_PLACES = 300  # to reach, which are judged while a slider moves
+_FILES = "file", "mesh"
+"""Keys under which a table of requirements may name another file."""
+
+
+@lru_cache(maxsize=32)
+def requirements_of(text: str) -> Requirements:
+    """The requirements in the state of a tab; none for an empty text.
+
+    Raises:
+        InvalidDesign: The text is none of requirements, or names other files.
+        InvalidInput: It lists more places than can be shown.
+    """
+    return needs_of_text(text) if text else Requirements()
+
+
+def needs_of_text(text: str, *, length: float | None = None, source: str = "") -> Requirements:
+    """Requirements from the text of a file that comes from a page, as `Requirements.from_toml`.
+
+    Raises:
+        InvalidDesign: The text is none of requirements, or names other files: those that lie beside
+            it are not sent with it, and files of this machine are not for whoever has the page.
+        InvalidInput: It lists more places than can be shown.
+    """
+    if faults := [Fault(path, None, _allowed(path)) for path in _files_in(text)]:
+        raise InvalidDesign(faults, source)
+    needs = Requirements.from_toml(text, length=length, source=source)
+    if (count := len(needs.places)) > _MOST_PLACES:
+        allowed = f"at most {_MOST_PLACES} in the studio"
+        raise InvalidInput("places", f"{count:,}", allowed, "use softreach check")
+    return needs
+
+
+def _allowed(path: str) -> str:
+    instead = "places_m" if path.endswith("file") else "a table of vertices_m and faces"
+    return f"names another file, which is not sent along: write {instead} instead"
+
+
+def _files_in(text: str) -> list[str]:
+    try:
+        document = tables_of(text)
+    except ValueError:
+        return []  # which the reader refuses
+    lists = {key: tables for key, tables in document.items() if isinstance(tables, list)}
+    return [
+        f"{key}[{k}].{name}"
+        for key, tables in lists.items()
+        for k, table in enumerate(tables)
+        if isinstance(table, dict)
+        for name in _FILES
+        if isinstance(table.get(name), str)
+    ]
+
+
 VERSION = 3
 LEVELS = range(12, 22)
 """The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
@@ -89,6 +141,9 @@ MOUSE = {
     "none": "turns the view alone",
 }
 """Uses of the mouse in the scene: name -> what the menu says."""
+
+MOST_POINTS = 2000
+"""Of a path: each is followed, drawn and kept in the state."""
 
 Vector = tuple[float, float, float]
 
@@ -112,6 +167,32 @@ class Slice:
             raise InvalidInput("slice.axis", self.axis, f"one of {', '.join(_AXES)}")
         _check_number("slice.center", self.center, -_FAR, _FAR)
         _check_number("slice.thickness", self.thickness, 0.0, _FAR)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlotSettings:
+    """Plots beside the scene; each is computed only while it is shown."""
+
+    shown: tuple[str, ...] = ()
+    """Names of the plots, each once and in order."""
+    parameter: str = ""
+    """Parameter against which the volume is plotted; "" for the first there is."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.parameter, str):
+            raise InvalidInput("plots.parameter", self.parameter, "a str")
+        if not all(isinstance(name, str) for name in self.shown):
+            raise InvalidInput("plots.shown", self.shown, "names of plots")
+        object.__setattr__(self, "shown", tuple(sorted(set(self.shown))))
+
+    def showing(self, name: str, on: bool = True) -> Self:
+        """A copy with a plot, or without it."""
+        shown = {*self.shown, name} if on else {*self.shown} - {name}
+        return replace(self, shown=tuple(shown))
+
+    def sweeping(self, parameter: str) -> Self:
+        """A copy with another parameter."""
+        return replace(self, parameter=parameter)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,6 +245,45 @@ class Camera:
             _check_number("camera.aspect", self.aspect, 0.0, _FAR)
         for value in (*self.position, *self.look_at):
             _check_number("camera", value, -_FAR, _FAR)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TipPath:
+    """A path of the tip, and how far along it the arm is."""
+
+    points: tuple[Vector, ...]
+    """[m], in order."""
+    start: tuple[float, ...] | None = None
+    """Activation to begin with; None for the best-conditioned solution at the first point."""
+    at: int = 0
+    """The point where the arm is."""
+
+    def __post_init__(self) -> None:
+        if not 2 <= len(self.points) <= MOST_POINTS:
+            raise InvalidInput("path", f"{len(self.points)} points", f"2 to {MOST_POINTS}")
+        if not np.isfinite(self.points).all():
+            raise InvalidInput("path", "not finite", "finite numbers [m]")
+        if not isinstance(self.at, int) or not 0 <= self.at < len(self.points):
+            raise InvalidInput("path.at", self.at, f"0 to {len(self.points) - 1}")
+
+    @classmethod
+    def through(cls, points: Any, start: Sequence[float] | None = None) -> Self:
+        """A path through points [m], shape (k, 3).
+
+        Raises:
+            InvalidInput: Points of another shape, too few or too many, or not finite.
+        """
+        values = as_floats("path", points)
+        if values.ndim != 2 or values.shape[1] != 3:
+            raise InvalidInput("path.shape", values.shape, "of shape (k, 3)")
+        triples = tuple((float(x), float(y), float(z)) for x, y, z in values)
+        return cls(points=triples, start=None if start is None else tuple(map(float, start)))
+
+    @classmethod
+    def from_fields(cls, values: Mapping[str, Any]) -> Self:
+        """A path from what a saved state holds of it."""
+        path = cls.through(values["points"], values["start"])
+        return replace(path, at=values["at"])
 
 
 @dataclass(frozen=True, kw_only=True)

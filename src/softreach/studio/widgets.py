@@ -55,13 +55,6 @@ class Line:
         self._widget.remove()
 
 
-def show_where(wanted: bool, *widgets: Any) -> None:
-    """Show widgets that mean something now, and hide them else."""
-    for widget in widgets:
-        if widget.visible != wanted:
-            widget.visible = wanted
-
-
 class PictureFrame:
     """Place for a picture that changes, empty until there is one."""
 
@@ -192,10 +185,6 @@ class TypedField:
                 self._text.value = text
                 self._message.warn("")
         self._follow()
-
-    def rename(self, label: str, kind: TextKind, value: Any) -> None:
-        """Show another value of another kind."""
-        self._text.label, self._kind, self.value = label, kind, value
 
     def on_update(self, callback: Callable[[Any], object]) -> None:
         """Call back with the event when a person has applied a value."""

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
 from softreach.studio import markup
 from softreach.studio.captions import told_error
-from softreach.studio.fields import Fields
+from softreach.studio.fields import GRAY, Fields
+from softreach.studio.found import Found
 from softreach.studio.reach import Reach
 from softreach.studio.shown_parameters import ShownParameter, named_parameters, slider_parameters
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import Line, show_where
 from softreach.support.errors import SoftreachError
-
-if TYPE_CHECKING:
-    from viser import GuiApi
-
-    from softreach.studio.session import Session
 
 _HINT = "Keep this design to see what a change of it costs and gains."
 _EQUAL = 1e-9  # relative difference that is rounding
@@ -31,38 +26,24 @@ _MOST = 24
 Value = float | None
 
 
-class ComparePanel:
+def compare(panel: Fields) -> None:
     """Keeps a design, and compares the design with it."""
+    known = "design", "reference", "found.reach", "found.reference"
+    panel.html(*known, content=_compared_html)
+    panel.change("Keep this design", kept, "Draws its boundary in gray from now on")
+    with panel.folder("kept design", lambda state, _: state.reference is not None):
+        panel.change("Swap", swapped, "Makes the kept design the design, and back")
+        forget = "Compares no more, and takes the gray boundary away"
+        panel.change("Forget", lambda state: state.replace(reference=None), forget, **GRAY)
 
-    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._fields = Fields(session, dragged=False)
-        self._known: object = None
-        with tab:
-            self._table = Line(gui, _HINT)
-            self._fields.button("Keep this design", kept, "Draws its boundary in gray from now on")
-            self._others = gui.add_folder("kept design", visible=False)
-            with self._others:
-                self._fields.button("Swap", swapped, "Makes the kept design the design, and back")
-                forget = "Compares no more, and takes the gray boundary away"
-                self._fields.button(
-                    "Forget", lambda state: state.replace(reference=None), forget, color="gray"
-                )
 
-    def show(self, session: Session) -> None:
-        """Bring the table in line with both designs and what is known of them."""
-        self._fields.show(session)
-        design, reference = session.state.design, session.state.reference
-        show_where(reference is not None, self._others)
-        known = (design, reference, session.found.reach, session.found.reference)
-        if known == self._known:
-            return
-        self._known = known
-        if reference is None:
-            self._table.say(_HINT)
-        else:
-            before = _known_reach(session.found.reference, reference)
-            now = _known_reach(session.found.reach, design)
-            self._table.show(comparison_html(compared((reference, before), (design, now))))
+def _compared_html(state: StudioState, found: Found) -> str:
+    design, reference, before = state.design, state.reference, found.reference
+    if reference is None:
+        return markup.paragraph(_HINT)
+    is_known = before is not None and before.fine and before.arm == reference
+    now = design, found.complete_reach(design)
+    return comparison_html(compared((reference, before if is_known else None), now))
 
 
 def kept(state: StudioState) -> StudioState:
@@ -73,10 +54,6 @@ def kept(state: StudioState) -> StudioState:
 def swapped(state: StudioState) -> StudioState:
     """The state with both designs exchanged."""
     return state.replace(design=state.reference or state.design, reference=state.design)
-
-
-def _known_reach(reach: Reach | None, design: Manipulator) -> Reach | None:
-    return reach if reach is not None and reach.fine and reach.arm == design else None
 
 
 class Row(NamedTuple):
