@@ -13,9 +13,8 @@ from softreach.arm.parameters import changed
 from softreach.studio.plots.chart import Chart, Curve
 from softreach.studio.plots.sweep import sweep
 from softreach.studio.reach import Quality
-from softreach.studio.state import MOST_POINTS, PlotSettings, TipPath
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import StudioState
+from softreach.studio.state import MOST_POINTS, PlotSettings, StudioState, TipPath
 from softreach.support.errors import InvalidInput
 
 STATE = StudioState(design=designs.minimal_trunk())

@@ -7,8 +7,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed, find_parameter
-from softreach.studio.state import PlotSettings
-from softreach.studio.state import Slice
+from softreach.studio.state import PlotSettings, Slice
 
 
 @pytest.fixture(autouse=True)

@@ -10,8 +10,7 @@ from softreach.geometry.surface import plane_cut
 from softreach.inverse import solve_inverse
 from softreach.studio.plots.section import enclosed_area, plane_counts, section_curves, within
 from softreach.studio.reach import stages
-from softreach.studio.state import PlotSettings
-from softreach.studio.state import Slice
+from softreach.studio.state import PlotSettings, Slice
 from tests.studio.conftest import SMALL
 
 

@@ -20,6 +20,7 @@ from softreach.studio.scene.clouds import key_html, sample_colors, sample_values
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, work_on
 from softreach.studio.state import StudioState
+from softreach.studio.tabs import click
 from softreach.studio.work import Dropped
 from tests.studio.sockets import page
 
@@ -32,9 +33,8 @@ def session(studio) -> Iterator[Session]:
 
 def clicked_path(session: Session, origin, direction) -> np.ndarray | None:
     """The path [L] after a click that may lead it on."""
-    (panel,) = (one for one in session.panels if type(one).__name__ == "PathPanel")
     session.update(lambda state: state.showing(mouse="path"))
-    panel.click(origin, direction)
+    click(session, origin, direction)
     assert session.settle()
     path, length = session.state.path, session.state.design.length
     return None if path is None else np.array(path.points) / length

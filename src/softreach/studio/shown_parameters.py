@@ -264,11 +264,11 @@ def _last(start: float, limit: float, near: float, exists: Callable[[float], boo
     if exists(limit):
         return limit
     inside, outside = start, limit
-    bracket = near - (limit - start) / 100, near + (limit - start) / 100
-    for tried in bracket if near != limit else ():
-        if min(inside, outside) < tried < max(inside, outside):
+    digits = max(0, 2 - math.floor(math.log10(abs(near)))) if near else 0
+    for tried in (near, near + math.copysign(10.0**-digits, limit - start)):
+        if near != limit and min(inside, outside) < tried < max(inside, outside):
             inside, outside = (tried, outside) if exists(tried) else (inside, tried)
-    while abs(outside - inside) > abs(limit - start) / 2**_HALVINGS:
+    for _ in range(0 if inside == near else _HALVINGS):
         middle = (inside + outside) / 2
         inside, outside = (middle, outside) if exists(middle) else (inside, middle)
     digits = max(0, 2 - math.floor(math.log10(abs(inside)))) if inside else 0
