@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from softreach.inverse.drag import Drag, Dragged
     from softreach.plot.coloring import BundleKey, ScalarKey
     from softreach.requirements import Check
-    from softreach.studio.plots.section import Picture
-    from softreach.studio.plots.sweep import Sweep
+    from softreach.studio.figures import Picture
     from softreach.studio.reach import Reach
     from softreach.studio.slopes import VolumeSlopes
 
@@ -73,7 +72,7 @@ class Found:
     """Reason why it cannot be judged."""
     section: Picture | None = None
     """Of the reachable set by the plane of the slice."""
-    sweep: Sweep | None = None
+    sweep: Picture | None = None
     """Volumes of designs that differ in one parameter."""
     track: xr.Dataset | None = None
     """Result of `track_path` for the path."""

@@ -71,7 +71,7 @@ class PictureFrame:
         self._shown: NDArray[np.uint8] | None = None
 
     def show(self, image: NDArray[np.uint8]) -> None:
-        """Show a picture, RGB from 0 to 255, shape (rows, columns, 3)."""
+        """Show a picture, RGBA from 0 to 255, shape (rows, columns, 4)."""
         if image is self._shown:
             return
         self._shown = image

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
+from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
 from softreach.studio.found import Found
 from softreach.studio.job import Job, Learned, Results, Tools
-from softreach.studio.plots.section import section_picture
-from softreach.studio.plots.sweep import sweep, swept_parameter
 from softreach.studio.state import StudioState
 
 
 def _cut(state: StudioState, found: Found, tools: Tools) -> Results:
-    reach, look = found.complete_reach(state.design), state.appearance
+    reach = found.complete_reach(state.design)
     if reach is not None:
         tools.report("cutting the reachable set")
-        picture = section_picture(reach, look.slice, tools.check, dark=look.dark)
-        yield Learned({"section": picture})
+        yield Learned({"section": section_picture(reach, state.appearance.slice)})
 
 
 DRAW_SECTION = Job(
     "section",
-    ("found.reach", "appearance.slice.axis", "appearance.slice.center", "appearance.dark"),
+    ("found.reach", "appearance.slice.axis", "appearance.slice.center"),
     _cut,
     wanted=lambda state: "section" in state.appearance.plots.shown,
     makes=("section",),
@@ -28,13 +26,10 @@ DRAW_SECTION = Job(
 
 
 def _sweep(state: StudioState, found: Found, tools: Tools) -> Results:
-    latest, parameter = found.sweep, swept_parameter(state)
-    if parameter is None:
-        return
-    subject = state.design, parameter
-    if latest is None or not latest.complete or (latest.arm, latest.parameter) != subject:
-        for known in sweep(state.design, parameter, tools.quality, tools.check, latest):
-            yield Learned({"sweep": known})
+    parameter = swept_parameter(state)
+    if parameter is not None:
+        for picture in sweep_pictures(state.design, parameter, tools.quality):
+            yield Learned({"sweep": picture})
 
 
 SWEEP_VOLUME = Job(

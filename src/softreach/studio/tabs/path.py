@@ -11,15 +11,14 @@ from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
 from softreach.studio.fields import attempt, bind_button
+from softreach.studio.figures import track_picture
 from softreach.studio.files import LARGEST
 from softreach.studio.jobs.path import at_point
-from softreach.studio.plots.chart import Chart, Curve
 from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.state import StudioState, solvable_rod
-from softreach.studio.widgets import Line, show_where
+from softreach.studio.widgets import Line, PictureFrame, show_where
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import text_of
-from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from softreach.studio.session import Session
 
 _HINT = "The tip follows a path as far as its branch of solutions goes: load one, or click it."
-_MOST_CURVES = 8  # in the timeline: more are not told apart
 _POINTS = 24  # of the straight line to each place that is clicked
 
 
@@ -69,7 +67,7 @@ class PathPanel:
         )
         self._at = gui.add_slider("point", 0, 1, 1, 0, hint="point of the path where the arm is")
         graph = gui.add_folder("activations along the path")
-        self._timeline = Chart(gui, graph, "activation")
+        self._timeline = PictureFrame(gui, graph)
         self._save = gui.add_button("Save the path (CSV)", hint="with its activations")
 
     def show(self, session: Session) -> None:
@@ -104,13 +102,8 @@ class PathPanel:
         if count == 0:
             return
         self._at.max = max(count - 1, 1)
-        steps = np.linalg.norm(np.diff(track.position.values[:count], axis=0), axis=1)
-        way = np.concatenate([[0.0], np.cumsum(steps)]) / arm.length
-        names = [str(name) for name in track["bundle"].values][:_MOST_CURVES]
-        curves = [Curve(name, _css(bundle_color(k))) for k, name in enumerate(names)]
-        values = [track.activation.values[:count, k] for k in range(len(names))]
         if count > 1:
-            self._timeline.show("way / L", way, curves, values)
+            self._timeline.show(track_picture(track, arm).image)
 
     def _take(self, path: TipPath | None) -> None:
         self._session.update(lambda state: state.replace(path=path))
@@ -182,7 +175,3 @@ def _tip(state: StudioState) -> np.ndarray:
     if not np.isfinite(tip).all():
         raise InvalidInput("activation", state.activation, "one with an equilibrium")
     return tip
-
-
-def _css(color: tuple[float, float, float]) -> str:
-    return "rgb({},{},{})".format(*(round(255 * part) for part in color))

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio.fields import Attribute, Fields
-from softreach.studio.plots.chart import Chart, Curve
-from softreach.studio.plots.sweep import Sweep, swept_parameter
+from softreach.studio.figures import swept_parameter
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
 from softreach.studio.widgets import Line, PictureFrame, show_where
@@ -28,7 +27,6 @@ _ABOUT = {
 }
 _WIDTH = 380  # pixels
 _COMPUTING = "computing ..."
-_VOLUME = Curve("V", "#2f6db5", points=True)
 
 
 class PlotsPanel:
@@ -46,9 +44,7 @@ class PlotsPanel:
         with self._window.add_tab("Figures"):
             self._folders = {name: gui.add_folder(text) for name, text in _LABELS.items()}
             self._texts = {name: self._text(gui, folder) for name, folder in self._folders.items()}
-        self._frame = PictureFrame(gui, self._folders["section"])
-        self._chart = Chart(gui, self._folders["sweep"])
-        self._drawn: Sweep | None = None
+        self._frames = {name: PictureFrame(gui, place) for name, place in self._folders.items()}
 
     def _text(self, gui: GuiApi, folder: Any) -> Line:
         with folder:
@@ -65,24 +61,12 @@ class PlotsPanel:
         self._window.visible = bool(shown)
         for name, folder in self._folders.items():
             show_where(name in shown, folder)
-        if "section" in shown and found.section is not None:
-            self._frame.show(found.section.image)
-            self._say("section", found.section.text, found.section.arm, session)
-        if "sweep" in shown and found.sweep is not None:
-            self._draw_sweep(found.sweep)
-            self._say("sweep", _sweep_text(found.sweep), found.sweep.arm, session)
-
-    def _say(self, name: str, text: str, arm: object, session: Session) -> None:
-        old = arm != session.state.design
-        self._texts[name].say(text, " · of the design before, computing ..." if old else "")
-
-    def _draw_sweep(self, known: Sweep) -> None:
-        if known is self._drawn or len(known.value) < 2:
-            return
-        self._drawn, unit = known, known.arm.length_unit
-        label, here = known.parameter.label, known.parameter.shown
-        volumes = unit.of(known.volume, 3)
-        self._chart.show(label, known.value, (_VOLUME,), (volumes,), here, y=unit.label("V", 3))
+            picture = getattr(found, name)
+            if name in shown and picture is not None:
+                self._frames[name].show(picture.image)
+                old = picture.arm != session.state.design
+                more = " · of the design before, computing ..." if old else ""
+                self._texts[name].say(picture.text, more)
 
 
 def _switch(name: str) -> Attribute:
@@ -103,12 +87,3 @@ def _swept(state: StudioState) -> str:
 
 def _sweeping(state: StudioState, name: str) -> StudioState:
     return state.showing(plots=state.appearance.plots.showing("sweep").sweeping(name))
-
-
-def _sweep_text(known: Sweep) -> str:
-    unit, parameter = known.arm.length_unit, known.parameter
-    volumes = known.volume[known.value == parameter.shown]
-    parts = [f"here V = {unit.rounded(v, 3)} at {parameter.shown:g}" for v in volumes]
-    if known.refused:
-        parts.append(f"{len(known.refused)} values make no design or take too long")
-    return " · ".join([*parts, *([] if known.complete else [_COMPUTING])])
