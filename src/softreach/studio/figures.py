@@ -19,7 +19,7 @@ from softreach.plot.sets import plot_slice
 from softreach.studio.reach import Quality, Reach, exact_set
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
 from softreach.studio.state import Slice, StudioState, solvable_rod
-from softreach.studio.work import OverBudget, all_cores, check_wanted
+from softreach.studio.work import Budget, OverBudget, all_cores, check_wanted
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.palette import bundle_color
 from softreach.workspace import ReachableSolid
@@ -204,7 +204,7 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float | None:
     try:
         with all_cores:
             solvable_rod(design)
-            return exact_set(design, accuracy, tol, check_wanted, _SECONDS).volume
+            return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
     except (SoftreachError, OverBudget, MemoryError):
         return None
 

@@ -17,7 +17,8 @@ from softreach.rod.kinematics import configuration
 from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
-from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.scene.colors import sample_values
+from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import Appearance, StudioState, design_of_text
 from softreach.support.errors import InvalidInput

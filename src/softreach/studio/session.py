@@ -17,8 +17,8 @@ from softreach.studio.found import Found, Pull
 from softreach.studio.job import Job, Learned, Page, Tools, forgotten, what_follows
 from softreach.studio.reach import cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
-from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene, shows_cloud
+from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import Dropped, Latest, StaleCheck, return_memory_soon
@@ -150,7 +150,7 @@ class Session:
         if reach is None or not shown or reach.arm != self.state.design:
             return None
         points = cloud_points(reach, look.level)
-        hidden = self.scene.clouds.hidden(points) & shows_cloud(reach, look)
+        hidden = self.scene.hidden(points) & shows_cloud(reach, look)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
         hit = picked_point(points[seen], origin, direction, _CLICK)
         if hit is None:

@@ -67,7 +67,7 @@ def _look(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
     ahead = (camera.look_at - position) * (1.0, 1.0, 0.0)
     base = np.array(state.design.base.position) / state.design.length
     most = _DRAGGED if found.is_dragged else None
-    page.scene.clouds.look(ahead if look.half else None, base, most)
+    page.scene.look(ahead if look.half else None, base, most)
     page.scene.axes.turn(position, page.camera.focal)
     tip = found.tip if look.handle and look.arm else None
     hides = tip is not None and is_behind(tip, position, *page.scene.spine)

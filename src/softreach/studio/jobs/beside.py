@@ -24,7 +24,7 @@ def _compute_free(state: StudioState, found: Found, tools: Tools) -> Results:
 
 
 def _draw_free(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
-    page.scene.draw_free(found.free, state.appearance.slice)
+    page.scene.draw_beside("/free", found.free, state.appearance.slice)
     draw_axes(page, state, found)
     return {}
 
@@ -47,7 +47,7 @@ def _compute_reference(state: StudioState, found: Found, tools: Tools) -> Result
 
 
 def _draw_reference(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
-    page.scene.draw_reference(found.reference, state.appearance.slice)
+    page.scene.draw_beside("/reference", found.reference, state.appearance.slice)
     return {}
 
 

@@ -6,8 +6,6 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from softreach.requirements import check
 from softreach.requirements.checks import quick_check
 from softreach.studio.found import Found
@@ -52,7 +50,7 @@ def _check(state: StudioState, found: Found, tools: Tools) -> Results:
 
 def _draw(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
     del state
-    draw_needs(page.client.scene, found.check, np.array(page.scene.axes.corners))
+    draw_needs(page.scene, found.check)
     return {}
 
 

@@ -7,9 +7,8 @@ from typing import Any
 
 from softreach.studio.found import Found
 from softreach.studio.job import Job, Learned, Page, Results, Tools
-from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.reach import Reach, shown_rows, stages
-from softreach.studio.scene.clouds import shown_color
+from softreach.studio.reach import Reach, count_activations, shown_rows, stages, uncounted
+from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.slopes import volume_slopes
 from softreach.studio.state import Appearance, StudioState

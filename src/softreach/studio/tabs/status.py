@@ -10,7 +10,7 @@ from softreach.studio.captions import legend_text, loaded_share, reach_text
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.markup import Part, Strong, fields_style
 from softreach.studio.needs import verdict_text
-from softreach.studio.scene.clouds import key_html
+from softreach.studio.scene.colors import key_html
 from softreach.studio.widgets import Line, show_where
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.studio.fields import Attribute, Fields, attribute, bind_button
 from softreach.studio.scene.camera import VIEWS
-from softreach.studio.scene.clouds import color_names
+from softreach.studio.scene.colors import color_names
 from softreach.studio.state import StudioState
 from softreach.studio.widgets import show_where
 
