@@ -186,13 +186,14 @@ def test_a_surface_is_read_back_from_its_file():
 
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])
     skin = Skin(vertices, np.array([[0, 1, 2]]), np.full((3, 3), 255.0))
-    data = glb(skin, 0.5, both_sides=False)
+    data = glb(skin, 0.5, vertices[[[0, 1]]], (0, 0, 0), both_sides=False)
     scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
-    (surface,) = scene.geometry.values()
+    surface, lines = scene.geometry.values()
     np.testing.assert_allclose(surface.vertices, vertices)
     np.testing.assert_array_equal(
         surface.visual.vertex_attributes["color"][0], (255, 255, 255, 128)
     )
+    np.testing.assert_allclose(lines.vertices, vertices[:2])
 
 
 def test_a_ball_hides_what_is_behind_it_and_nothing_that_it_touches():

@@ -223,14 +223,14 @@ class Scene:
         vertices = sheets.vertices / reach.arm.length
         colors = shaded(coloring.rgb, vertex_normals(vertices, sheets.faces)).astype(float)
         skin = sliced(Skin(vertices, sheets.faces, colors), look.slice)
+        lines = vertices[sheets.lines]
+        inner = in_slice(lines.reshape(-1, 3), look.slice).reshape(-1, 2).all(axis=1)
         self.remove("/surface")
         if len(skin.faces):
             opened = look.slice.axis != "none" or not isinstance(reach.exact, ReachableSolid)
-            data = glb(skin, _CLEAR_SURFACE, both_sides=opened)
+            ink = _INK[look.dark]
+            data = glb(skin, _CLEAR_SURFACE, lines[inner], ink, both_sides=opened)
             self.api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
-        lines = vertices[sheets.lines]
-        inner = in_slice(lines.reshape(-1, 3), look.slice).reshape(-1, 2).all(axis=1)
-        self.lines("/surface/lines", lines[inner], _INK[look.dark], 0.002)
         return coloring.key
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:

@@ -56,31 +56,45 @@ def _half(skin: Skin, depth: Array) -> Skin:
 
 
 _UNLIT = "KHR_materials_unlit"
+_LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
 
 
-def glb(skin: Skin, opacity: float, *, both_sides: bool) -> bytes:
-    """A surface as binary glTF, in its colors as they are.
+def glb(
+    skin: Skin, opacity: float, lines: Array, ink: tuple[int, int, int], *, both_sides: bool
+) -> bytes:
+    """A surface and lines on it as binary glTF, in their colors as they are.
 
-    viser's own meshes have one color each, and a page without a graphics card is slow with light.
+    viser's own meshes have one color each, its lines are slow, and so is light without a graphics
+    card.
 
     Args:
         skin: The surface.
         opacity: Of it.
+        lines: Their ends [L], shape (n, 2, 3).
+        ink: Color of the lines, RGB from 0 to 255.
         both_sides: Whether it is seen from inside too, which takes a page twice as long.
     """
-    from trimesh import Trimesh
+    from trimesh import Scene, Trimesh
     from trimesh.exchange.gltf import export_glb
 
-    colors = np.column_stack(
-        [255 * (skin.colors / 255) ** 2.2, np.full(len(skin.colors), 255 * opacity)]
-    )
-    mesh = Trimesh(
-        skin.vertices, skin.faces, vertex_colors=np.rint(colors).astype(np.uint8), process=False
-    )
+    colors = _linear(np.column_stack([skin.colors, np.full(len(skin.colors), 255.0 * opacity)]))
+    parts = [Trimesh(skin.vertices, skin.faces, vertex_colors=colors, process=False)]
+    if count := len(lines):  # pairs of corners, which trimesh takes for triples
+        pairs = np.resize(np.arange(2 * count), (2 * -(-count // 3), 3))
+        colors = _linear(np.tile([*ink, 255.0], (2 * count, 1)))
+        parts.append(Trimesh(lines.reshape(-1, 3), pairs, vertex_colors=colors, process=False))
 
     def unlit(tree: dict[str, Any]) -> None:
         look = {"alphaMode": "BLEND", "doubleSided": both_sides, "extensions": {_UNLIT: {}}}
         tree |= {"extensionsUsed": [_UNLIT], "materials": [look]}
-        tree["meshes"][0]["primitives"][0]["material"] = 0
+        for mesh, mode in zip(tree["meshes"], (_TRIANGLES, _LINES), strict=False):
+            mesh["primitives"][0] |= {"material": 0, "mode": mode}
 
-    return export_glb(mesh, include_normals=False, tree_postprocessor=unlit)
+    return export_glb(Scene(parts), include_normals=False, tree_postprocessor=unlit)
+
+
+def _linear(colors: Array) -> NDArray[np.uint8]:
+    """Colors as glTF has them, shape (n, 4), from 0 to 255."""
+    colors = (colors / 255).clip(0, 1)
+    colors[:, :3] **= 2.2
+    return np.rint(255 * colors).astype(np.uint8)
