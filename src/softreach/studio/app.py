@@ -25,9 +25,9 @@ from softreach.studio.jobs.reach import (
     DRAW_CLOUD,
     DRAW_SURFACE,
 )
-from softreach.studio.serve.guard import close_sockets
-from softreach.studio.serve.server import (
+from softreach.studio.serve import (
     LOOPBACK,
+    close_sockets,
     page_address,
     page_url,
     reachable_hosts,

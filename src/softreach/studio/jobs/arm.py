@@ -12,7 +12,7 @@ from softreach.rod.tip_map import TipStatus
 from softreach.studio.found import Found
 from softreach.studio.job import Job, Learned, Page, Results, Tools
 from softreach.studio.scene.camera import is_behind
-from softreach.studio.serve.server import theme
+from softreach.studio.serve import theme
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.support.errors import InvalidInput
 
