@@ -105,7 +105,7 @@ def test_a_job_that_fails_forgets_what_it_knew_and_takes_away_what_it_drew(studi
             raise InvalidInput("target", "wrong", "right")
 
     def draw(given):
-        given.scene.draw_dots("/mark", np.zeros((1, 3)), (0, 0, 0))
+        given.scene.dots("/mark", np.zeros((1, 3)), (0, 0, 0), 0.01)
 
     mark = Job("mark", ("target",), compute, draw, makes=("check_refusal",), draws=("/mark",))
     with page(studio) as tab:

@@ -30,14 +30,14 @@ from softreach.studio.reach import (
     unstable_samples,
 )
 from softreach.studio.scene.camera import is_behind, picked_point
-from softreach.studio.scene.clouds import (
+from softreach.studio.scene.colors import (
     color_names,
-    in_slice,
     key_html,
     sample_colors,
     sample_values,
+    surface_colors,
 )
-from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
+from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.tabs.design import base_field, gravity_name, load_field, other_loads
 from softreach.studio.work import Dropped, affordable_level

@@ -15,7 +15,7 @@ from softreach.arm.parameters import changed
 from softreach.rod import tip_map
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.reach import Size, stages
-from softreach.studio.scene.axes import NumberedBox
+from softreach.studio.scene.camera import NumberedBox
 from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import Appearance, Slice, StudioState
@@ -47,7 +47,9 @@ class Meshes:
         self.added[path] = SimpleNamespace(data=data, **style)
 
     def remove_by_name(self, path):
-        del self.added[path]
+        below = [each for each in self.added if each.startswith(f"{path}/")]
+        for each in (path, *below):
+            del self.added[each]
 
     def get_handle_by_name(self, path):
         return self.added.get(path)
@@ -141,17 +143,17 @@ def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or
     assert drawn(reach, replace(look, surface=False))[1] == set()
 
 
-def test_the_reach_without_loads_is_a_faint_surface_and_points_only_where_it_has_none(trunk):
+def test_a_reach_beside_is_a_faint_surface_and_points_only_where_it_has_none(trunk):
     *_, reach = stages(trunk, 12, SMALL, lambda: None)
     meshes = Meshes()
     scene = Scene(meshes)
-    scene.draw_free(reach, Slice())
+    scene.draw_beside("/free", reach, Slice())
     free = meshes.added["/free"]
     np.testing.assert_allclose(free.vertices, reach.sheets.vertices / trunk.length, atol=1e-6)
     assert free.opacity < 0.3
-    scene.draw_free(replace(reach, exact=None), Slice())
+    scene.draw_beside("/free", replace(reach, exact=None), Slice())
     assert len(meshes.added["/free"].points)
-    scene.draw_free(None, Slice())
+    scene.draw_beside("/free", None, Slice())
     assert not meshes.added
 
 

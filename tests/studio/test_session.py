@@ -14,9 +14,16 @@ from softreach.cli.studio import _start, _work
 from softreach.inverse import solve_inverse
 from softreach.rod.rods import tip_map
 from softreach.studio.files import LARGEST
-from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.reach import Quality, Reach, cloud_points, shown_rows, stages
-from softreach.studio.scene.clouds import key_html, sample_colors, sample_values
+from softreach.studio.reach import (
+    Quality,
+    Reach,
+    cloud_points,
+    count_activations,
+    shown_rows,
+    stages,
+    uncounted,
+)
+from softreach.studio.scene.colors import key_html, sample_colors, sample_values
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, work_on
 from softreach.studio.state import StudioState
@@ -44,12 +51,12 @@ def test_a_click_for_a_path_hits_no_point_that_is_cut_away(session):
     session.update(lambda state: state.showing(cloud=True))
     assert session.settle()
     points = cloud_points(session.found.reach, session.state.appearance.level)
-    hidden = session.scene.clouds.hidden(points)
+    hidden = session.scene.hidden(points)
     eye = np.asarray(session.client.camera.position)
     distance = np.linalg.norm(points - eye, axis=1)
     target = points[np.argmin(np.where(hidden, distance, np.inf))]
     path = clicked_path(session, eye, target - eye)
-    assert path is None or not session.scene.clouds.hidden(path[-1:]).any()
+    assert path is None or not session.scene.hidden(path[-1:]).any()
 
 
 def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_design(session):

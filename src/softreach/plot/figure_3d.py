@@ -152,7 +152,7 @@ class Scene:
         dots = Dots(tips, coloring.rgb[chosen])
         size = point_size(len(tips), np.array([tips.min(axis=0), tips.max(axis=0)]))
         self.parts.append(PagePart(name, dots, size=size))
-        self.keys += _page_keys(coloring.key)
+        self.keys += page_keys(coloring.key)
 
     def add_set(self, reached: Any) -> None:
         """A reachable set: its surface, or the points of a curve."""
@@ -295,7 +295,8 @@ def _length(thing: Any) -> float | None:
     return attrgetter(arms[kind])(thing) if kind in arms else None
 
 
-def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
+def page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
+    """A key as pages have it: colors that stand for something each, and a scale of numbers."""
     if key is None:
         return []
     marks = [(label, css_color(rgb)) for label, rgb in key_entries(key)]

@@ -13,9 +13,9 @@ import numpy as np
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
 from softreach.studio.jobs import JOBS
-from softreach.studio.serve.guard import close_sockets
-from softreach.studio.serve.server import (
+from softreach.studio.serve import (
     LOOPBACK,
+    close_sockets,
     page_address,
     page_url,
     reachable_hosts,

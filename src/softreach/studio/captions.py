@@ -10,7 +10,7 @@ import numpy as np
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.scene.clouds import FAINT
+from softreach.studio.scene.colors import FAINT
 from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:

@@ -115,6 +115,21 @@ class Fields:
         line = self.kept(Line(self.gui))
         self.follow(*paths, show=lambda state, found: line.show(content(state, found)))
 
+    def picture(self, container: Any, *paths: str, image: Shown) -> None:
+        """A picture at the end of a container, once there is one."""
+        widget = None
+
+        def show(state: StudioState, found: Found) -> None:
+            nonlocal widget
+            pixels = image(state, found)
+            if pixels is not None and widget is not None:
+                widget.image = pixels
+            elif pixels is not None:
+                with container:
+                    widget = self.gui.add_image(pixels, format="png")
+
+        self.follow(*paths, show=show)
+
     @contextmanager
     def folder(
         self, label: str, shown: Shown | None = None, *, expanded: bool = True

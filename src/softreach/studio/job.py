@@ -28,10 +28,8 @@ class Given(NamedTuple):
     state: StudioState
     found: Found
     quality: Quality
-    check: StaleCheck
-    """Raises if the work is no longer wanted; called between stages."""
-    report: Callable[[str], None]
-    """Shows the reader what is being done."""
+    check: StaleCheck  # raises if the work is no longer wanted; called between stages
+    report: Callable[[str], None]  # shows the reader what is being done
     client: ClientHandle
     scene: Scene
     camera: TabCamera
@@ -44,8 +42,7 @@ class Learned(NamedTuple):
     """Fields of `Found` and their new values, or the next `Found` from the one before."""
     change: Callable[[StudioState], StudioState] | None = None
     """Change of the state that comes of it, such as that of an arm that follows its tip."""
-    ends_step: bool = False
-    """True if the next change is another step for who undoes it."""
+    ends_step: bool = False  # true if the next change is another step for who undoes it
 
 
 Results = Iterator[Learned]

@@ -13,6 +13,7 @@ from typing import Self
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
 _STATUS = "height:7em;overflow-y:auto"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
+_KEY = "font-size:0.8em;padding:0 0.8em 0.4em"
 _HELP = "cursor:help;text-decoration:underline dotted"
 # A field that is typed into stands where viser has its own beside a slider, which rounds. The
 # button that cancels stands in the corner of the status, so that nothing jumps when it comes.
@@ -70,10 +71,15 @@ class Term(str):
         return term
 
 
-class Swatch(tuple[int, int, int]):
-    """A little square of a color, RGB from 0 to 255."""
+class Swatch(str):
+    """A little square of a color, as CSS has it or RGB from 0 to 255."""
 
     __slots__ = ()
+
+    def __new__(cls, color: str | tuple[int, int, int]) -> Self:
+        """The color, as CSS has it."""
+        text = color if isinstance(color, str) else "rgb({},{},{})".format(*color)
+        return super().__new__(cls, text)
 
 
 Part = str | Strong | Term | Swatch
@@ -124,10 +130,20 @@ def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
     )
 
 
-def spread(*texts: str) -> str:
-    """Texts from left to right over the whole width, as HTML."""
+def scale(colors: Sequence[str], *texts: str) -> str:
+    """A scale of colors, as CSS has them, over texts from its left to its right end, as HTML."""
     cells = "".join(f"<span>{inline(text)}</span>" for text in texts)
-    return f'<div style="display:flex;justify-content:space-between">{cells}</div>'
+    shown = f"background:linear-gradient(90deg,{','.join(colors)});height:0.6em;margin:0.2em 0"
+    below = f'<div style="display:flex;justify-content:space-between">{cells}</div>'
+    return f'<div style="{_KEY}"><div style="{shown}"></div>{below}</div>'
+
+
+def swatches(title: str, entries: Sequence[tuple[str, str]]) -> str:
+    """A title, and labels behind the colors that they explain, as HTML."""
+    parts = [f"{title} \N{EN SPACE} "] if title else []
+    for label, color in entries:
+        parts += [Swatch(color), f" {label} \N{EN SPACE} "]
+    return f'<div style="{_KEY}">{inline(*parts)}</div>'
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Sequence[Part]]]) -> str:
@@ -155,8 +171,7 @@ def _row(cells: Sequence[Sequence[Part]]) -> str:
 
 def _part(part: Part) -> str:
     if isinstance(part, Swatch):
-        red, green, blue = (int(value) for value in part)
-        return f'<span style="color:rgb({red},{green},{blue})">\N{BLACK SQUARE}</span>'
+        return f'<span style="color:{html.escape(part)}">\N{BLACK SQUARE}</span>'
     text = html.escape(part)
     if isinstance(part, Term):
         return f'<b style="{_HELP}" title="{html.escape(part.meaning)}">{text}</b>'

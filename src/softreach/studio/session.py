@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, replace
@@ -17,11 +16,11 @@ from softreach.studio.found import Found, Pull
 from softreach.studio.job import Given, Job, Learned, forgotten, what_follows
 from softreach.studio.reach import cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
-from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene, shows_cloud
+from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import Dropped, Latest, StaleCheck, return_memory_soon
+from softreach.studio.work import Dropped, Latest, StaleCheck, rest, return_memory_soon
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -253,7 +252,7 @@ class Session:
         if reach is None or not shown or reach.arm != self.state.design:
             return None
         points = cloud_points(reach, look.level)
-        hidden = self.scene.clouds.hidden(points) & shows_cloud(reach, look)
+        hidden = self.scene.hidden(points) & shows_cloud(reach, look)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
         hit = picked_point(points[seen], origin, direction, _CLICK)
         if hit is None:
@@ -369,10 +368,7 @@ class Session:
         """Writes the state, once it rests for a moment, to where the next tab finds it."""
 
         def keep(given: Given) -> Iterator[Learned]:
-            for _ in range(10 if self.is_touched else 0):
-                given.check()
-                time.sleep(_REST / 10)
-            given.check()
+            rest(given.check, _REST if self.is_touched else 0.0)
             self.keep()
             yield from ()
 

@@ -22,16 +22,11 @@ Ends = tuple[float, float]
 class ShownParameter(NamedTuple):
     """A parameter of a design in the unit that a person reads."""
 
-    name: str
-    """Of the parameter."""
-    label: str
-    """With the unit."""
-    hint: str
-    """Symbol, unit and meaning."""
-    scale: float
-    """Units of the parameter per shown unit."""
-    shown: float
-    """The value in the shown unit; NaN where the design leaves it out."""
+    name: str  # of the parameter
+    label: str  # with the unit
+    hint: str  # symbol, unit and meaning
+    scale: float  # units of the parameter per shown unit
+    shown: float  # the value in the shown unit; NaN where the design leaves it out
     low: float = math.nan
     """End of a slider in the shown unit, like all that follow; NaN without a slider."""
     high: float = math.nan
@@ -282,18 +277,12 @@ def _last(start: float, limit: float, near: float, exists: Callable[[float], boo
 class Part(NamedTuple):
     """One thing that an arm consists of."""
 
-    label: str
-    """Name in the list of parts."""
-    owners: tuple[str, ...]
-    """Owners of its parameters."""
-    name: str
-    """Its own name, which may be empty."""
-    ring: int | None = None
-    """Index of a ring; None for all else."""
-    actuator: str = ""
-    """Name of an actuator; "" for all else."""
-    home: int | str | None = None
-    """The ring that an actuator is in."""
+    label: str  # name in the list of parts
+    owners: tuple[str, ...]  # owners of its parameters
+    name: str  # its own name, which may be empty
+    ring: int | None = None  # index of a ring; None for all else
+    actuator: str = ""  # name of an actuator; "" for all else
+    home: int | str | None = None  # the ring that an actuator is in
 
 
 _BODY = Part("body", ("", "profile"), "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import lru_cache
 from typing import Any, Self
@@ -76,8 +76,6 @@ def _is_solvable(arm: Manipulator) -> bool:
 
 
 _MOST_PLACES = 300  # to reach, which are judged while a slider moves
-_FILES = "file", "mesh"
-"""Keys under which a table of requirements may name another file."""
 
 
 @lru_cache(maxsize=32)
@@ -114,18 +112,17 @@ def _allowed(path: str) -> str:
 
 
 def _files_in(text: str) -> list[str]:
+    """Where a text of tables names other files."""
     try:
         document = tables_of(text)
     except ValueError:
         return []  # which the reader refuses
-    lists = {key: tables for key, tables in document.items() if isinstance(tables, list)}
     return [
         f"{key}[{k}].{name}"
-        for key, tables in lists.items()
-        for k, table in enumerate(tables)
-        if isinstance(table, dict)
-        for name in _FILES
-        if isinstance(table.get(name), str)
+        for key, tables in document.items()
+        for k, table in enumerate(tables if isinstance(tables, list) else ())
+        for name in ("file", "mesh")
+        if isinstance(table, dict) and isinstance(table.get(name), str)
     ]
 
 
@@ -155,12 +152,9 @@ _FAR = 1e3  # [L], beyond which there is nothing to see
 class Slice:
     """A slab across the cloud; the rest is hidden."""
 
-    axis: str = "none"
-    """"x", "y" or "z" across the slab, or "none"."""
-    center: float = 0.0
-    """[L]."""
-    thickness: float = 0.05
-    """[L]."""
+    axis: str = "none"  # "x", "y" or "z" across the slab, or "none"
+    center: float = 0.0  # [L]
+    thickness: float = 0.05  # [L]
 
     def __post_init__(self) -> None:
         if self.axis not in _AXES:
@@ -173,10 +167,8 @@ class Slice:
 class PlotSettings:
     """Plots beside the scene; each is computed only while it is shown."""
 
-    shown: tuple[str, ...] = ()
-    """Names of the plots, each once and in order."""
-    parameter: str = ""
-    """Parameter against which the volume is plotted; "" for the first there is."""
+    shown: tuple[str, ...] = ()  # names of the plots, each once and in order
+    parameter: str = ""  # parameter against which the volume is plotted; "" for the first there is
 
     def __post_init__(self) -> None:
         if not isinstance(self.parameter, str):
@@ -185,14 +177,10 @@ class PlotSettings:
             raise InvalidInput("plots.shown", self.shown, "names of plots")
         object.__setattr__(self, "shown", tuple(sorted(set(self.shown))))
 
-    def showing(self, name: str, on: bool = True) -> Self:
-        """A copy with a plot, or without it."""
+    def showing(self, name: str, on: bool = True, **changes: Any) -> Self:
+        """A copy with a plot, or without it, and other changes."""
         shown = {*self.shown, name} if on else {*self.shown} - {name}
-        return replace(self, shown=tuple(shown))
-
-    def sweeping(self, parameter: str) -> Self:
-        """A copy with another parameter."""
-        return replace(self, parameter=parameter)
+        return replace(self, shown=tuple(shown), **changes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,19 +188,14 @@ class Appearance:
     """Looks of a tab: what is drawn and how."""
 
     level: int = 17
-    color: str = "effort"
-    """One of `colors.color_names`."""
+    color: str = "effort"  # one of `colors.color_names`
     slice: Slice = field(default_factory=Slice)
-    half: bool = True
-    """The half of the cloud in front of the arm is cut away."""
-    dark: bool = False
-    """The page is dark."""
+    half: bool = True  # the half of the cloud in front of the arm is cut away
+    dark: bool = False  # the page is dark
     cloud: bool = False
     arm: bool = True
-    surface: bool = True
-    """The exact boundary of the reachable set."""
-    mouse: str = "tip"
-    """Use of the mouse in the scene, one of `MOUSE`; it turns the view besides."""
+    surface: bool = True  # the exact boundary of the reachable set
+    mouse: str = "tip"  # use of the mouse in the scene, one of `MOUSE`; it turns the view besides
     plots: PlotSettings = field(default_factory=PlotSettings)
 
     @property
@@ -237,8 +220,7 @@ class Camera:
 
     position: Vector
     look_at: Vector
-    aspect: float | None = None
-    """Width of its picture over the height; None if unknown."""
+    aspect: float | None = None  # width of its picture over the height; None if unknown
 
     def __post_init__(self) -> None:
         if self.aspect is not None:
@@ -251,12 +233,10 @@ class Camera:
 class TipPath:
     """A path of the tip, and how far along it the arm is."""
 
-    points: tuple[Vector, ...]
-    """[m], in order."""
+    points: tuple[Vector, ...]  # [m], in order
     start: tuple[float, ...] | None = None
     """Activation to begin with; None for the best-conditioned solution at the first point."""
-    at: int = 0
-    """The point where the arm is."""
+    at: int = 0  # the point where the arm is
 
     def __post_init__(self) -> None:
         if not 2 <= len(self.points) <= MOST_POINTS:
@@ -267,7 +247,7 @@ class TipPath:
             raise InvalidInput("path.at", self.at, f"0 to {len(self.points) - 1}")
 
     @classmethod
-    def through(cls, points: Any, start: Sequence[float] | None = None) -> Self:
+    def through(cls, points: Any, start: Sequence[float] | None = None, at: int = 0) -> Self:
         """A path through points [m], shape (k, 3).
 
         Raises:
@@ -276,14 +256,8 @@ class TipPath:
         values = as_floats("path", points)
         if values.ndim != 2 or values.shape[1] != 3:
             raise InvalidInput("path.shape", values.shape, "of shape (k, 3)")
-        triples = tuple((float(x), float(y), float(z)) for x, y, z in values)
-        return cls(points=triples, start=None if start is None else tuple(map(float, start)))
-
-    @classmethod
-    def from_fields(cls, values: Mapping[str, Any]) -> Self:
-        """A path from what a saved state holds of it."""
-        path = cls.through(values["points"], values["start"])
-        return replace(path, at=values["at"])
+        start = None if start is None else tuple(map(float, start))
+        return cls(points=tuple(map(vector, values)), start=start, at=at)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -331,12 +305,11 @@ class StudioState:
 
     def to_json(self) -> str:
         """The state as text, from which `from_json` makes an equal one."""
-        values = {name: getattr(self, name) for name in _PLAIN}
-        values["appearance"] = asdict(self.appearance)
-        values["camera"] = self.camera and asdict(self.camera)
-        values["path"] = self.path and asdict(self.path)
-        values["design"] = self.design.file_text
-        values["reference"] = self.reference and self.reference.file_text
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        for name in ("appearance", "camera", "path"):
+            values[name] = values[name] and asdict(values[name])
+        for name in ("design", "reference"):
+            values[name] = values[name] and values[name].file_text
         return json.dumps({"softreach_studio": VERSION, **values}, indent=1, ensure_ascii=False)
 
     @classmethod
@@ -347,49 +320,46 @@ class StudioState:
             InvalidInput: The text is no such state.
             InvalidDesign: A design in it cannot exist.
         """
-        values = _parsed(text)
+        allowed = f"a state that the studio saved, version {VERSION}"
         try:
-            return cls(**_fields(values))
+            values = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise InvalidInput("state file", str(error), allowed) from None
+        version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
+        if version != VERSION:
+            raise InvalidInput("state file", f"version {version}", allowed)
+        try:
+            return cls(**_fields(**values))
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if type(error).__module__.startswith("softreach"):
                 raise
-            raise InvalidInput("state file", str(error), "one that the studio saved") from None
+            raise InvalidInput("state file", str(error), allowed) from None
 
 
-_PLAIN = ("activation", "target", "needs")
-
-
-def _parsed(text: str | bytes) -> dict[str, Any]:
-    allowed = f"a state that the studio saved, version {VERSION}"
-    try:
-        values = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput("state file", str(error), allowed) from None
-    version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
-    if version != VERSION:
-        raise InvalidInput("state file", f"version {version}", allowed)
-    return values
-
-
-def _fields(values: dict[str, Any]) -> dict[str, Any]:
-    look = dict(values["appearance"])
-    look["slice"] = Slice(**look["slice"])
-    look["plots"] = PlotSettings(**look["plots"])
-    camera, reference, path = values["camera"], values["reference"], values["path"]
+def _fields(
+    *,
+    design: str,
+    activation: Any,
+    appearance: dict[str, Any],
+    target: Any,
+    reference: str | None,
+    camera: dict[str, Any] | None,
+    path: dict[str, Any] | None,
+    needs: Any,
+) -> dict[str, Any]:
+    plots, cut = PlotSettings(**appearance["plots"]), Slice(**appearance["slice"])
+    if camera is not None:
+        camera |= {name: vector(camera[name]) for name in ("position", "look_at")}
     return {
-        "design": design_of_text(values["design"], "state file"),
-        "activation": tuple(map(float, values["activation"])),
-        "appearance": Appearance(**look),
-        "target": values["target"] and vector(values["target"]),
+        "design": design_of_text(design, "state file"),
+        "activation": tuple(map(float, activation)),
+        "appearance": Appearance(**appearance | {"slice": cut, "plots": plots}),
+        "target": target and vector(target),
         "reference": reference and design_of_text(reference, "state file"),
-        "camera": camera and _camera(**camera),
-        "path": path and TipPath.from_fields(path),
-        "needs": str(values["needs"]),
+        "camera": camera and Camera(**camera),
+        "path": path and TipPath.through(**path),
+        "needs": str(needs),
     }
-
-
-def _camera(position: Any, look_at: Any, aspect: float | None = None) -> Camera:
-    return Camera(position=vector(position), look_at=vector(look_at), aspect=aspect)
 
 
 def vector(values: Iterable[float]) -> Vector:
@@ -413,10 +383,8 @@ def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...
     return tuple(box.clip(values).tolist())
 
 
-# History: states before and states undone, as values, so that going back is exact.
-#
-# Looks are no part of it: whoever goes back to an earlier design keeps the view.
-
+# History: states before and states undone, as values, so that going back is exact. Looks are no
+# part of it: whoever goes back to an earlier design keeps the view.
 
 _LONGEST = 200  # steps back
 _PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
@@ -428,14 +396,10 @@ _POSE = ("activation", "target")
 class History:
     """States to go back and forth to; a change makes a new history."""
 
-    past: tuple[StudioState, ...] = ()
-    """The latest last."""
-    future: tuple[StudioState, ...] = ()
-    """The next last."""
-    kind: str = ""
-    """Of the latest change; "" after a step back or forth."""
-    at: float = field(default=0.0, compare=False)
-    """Time of that change [s]."""
+    past: tuple[StudioState, ...] = ()  # the latest last
+    future: tuple[StudioState, ...] = ()  # the next last
+    kind: str = ""  # of the latest change; "" after a step back or forth
+    at: float = field(default=0.0, compare=False)  # time of that change [s]
 
     def after(
         self,
@@ -470,17 +434,15 @@ class History:
         """The state before the latest step, seen as now; the present one if there was none."""
         if not self.past:
             return self, present
-        *past, last = self.past
-        future = (*self.future, present)
-        return History(past=tuple(past), future=future), _seen_as(present, last)
+        history = History(past=self.past[:-1], future=(*self.future, present))
+        return history, _seen_as(present, self.past[-1])
 
     def forth(self, present: StudioState) -> tuple[History, StudioState]:
         """The state that was undone last, seen as now; the present one if there is none."""
         if not self.future:
             return self, present
-        *future, following = self.future
-        past = (*self.past, present)
-        return History(past=past, future=tuple(future)), _seen_as(present, following)
+        history = History(past=(*self.past, present), future=self.future[:-1])
+        return history, _seen_as(present, self.future[-1])
 
 
 def _seen_as(view: StudioState, state: StudioState) -> StudioState:
@@ -488,7 +450,6 @@ def _seen_as(view: StudioState, state: StudioState) -> StudioState:
 
 
 def _kind(old: StudioState, new: StudioState) -> str:
-    settings = [name for name in _SETTINGS if getattr(old, name) != getattr(new, name)]
-    if settings:  # activations may have been moved into other bounds
-        return " ".join(settings)
-    return "pose" if any(getattr(old, name) != getattr(new, name) for name in _POSE) else ""
+    differ = [name for name in (*_SETTINGS, *_POSE) if getattr(old, name) != getattr(new, name)]
+    settings = [name for name in differ if name in _SETTINGS]
+    return " ".join(settings) or ("pose" if differ else "")  # bounds may have moved activations

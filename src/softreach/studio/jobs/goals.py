@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from itertools import count
 
@@ -17,6 +16,7 @@ from softreach.studio.found import Sample
 from softreach.studio.job import Given, Job, Learned, Results
 from softreach.studio.scene.needs import draw_needs
 from softreach.studio.state import requirements_of
+from softreach.studio.work import rest
 from softreach.support.errors import SoftreachError, no_warnings
 
 _ACCURACY = 0.03  # of shares that are covered, and of distances between stations
@@ -40,9 +40,7 @@ def _check(given: Given) -> Results:
     yield Learned({"check": quick, "check_refusal": ""})
     if all(finding.met or finding.kind not in _POSES for finding in quick.findings):
         return
-    for _ in range(8):
-        given.check()
-        time.sleep(_PAUSE / 8)
+    rest(given.check, _PAUSE)
     progress = lambda _: given.check()  # noqa: E731
     with no_warnings():
         made = check(quick.arm, quick.requirements, accuracy=_ACCURACY, progress=progress)
@@ -50,7 +48,7 @@ def _check(given: Given) -> Results:
 
 
 def _draw_needs(given: Given) -> None:
-    draw_needs(given.client.scene, given.found.check, np.array(given.scene.axes.corners))
+    draw_needs(given.scene, given.found.check)
 
 
 CHECK_NEEDS = Job(

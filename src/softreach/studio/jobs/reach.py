@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from typing import Any
 
+from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
 from softreach.studio.job import Given, Job, Learned, Results
-from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.plots.section import section_picture
-from softreach.studio.plots.sweep import sweep, swept_parameter
-from softreach.studio.reach import Reach, shown_rows, stages
-from softreach.studio.scene.clouds import shown_color
+from softreach.studio.reach import Reach, count_activations, shown_rows, stages, uncounted
+from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.shown_parameters import slider_ends
 from softreach.studio.slopes import volume_slopes
 from softreach.studio.state import StudioState
-from softreach.studio.work import OverBudget
+from softreach.studio.work import OverBudget, rest
 from softreach.support.errors import InvalidInput
 
 _REST = 0.3  # [s] without another design, before sliders end where that does
@@ -163,9 +160,7 @@ DIFFERENTIATE_VOLUME = Job("slopes", ("design", "found.reach"), _differentiate, 
 
 
 def _end_sliders(given: Given) -> Results:
-    for _ in range(10):
-        time.sleep(_REST / 10)
-        given.check()
+    rest(given.check, _REST)
     ends = slider_ends(given.state.design, given.found.ends, given.check)
     yield Learned({"ends": ends})
 
@@ -175,16 +170,15 @@ END_SLIDERS = Job("ends", ("design",), _end_sliders, makes=("ends",))
 
 
 def _cut(given: Given) -> Results:
-    reach, look = given.found.complete_reach(given.state.design), given.state.appearance
+    reach = given.found.complete_reach(given.state.design)
     if reach is not None:
         given.report("cutting the reachable set")
-        picture = section_picture(reach, look.slice, given.check, dark=look.dark)
-        yield Learned({"section": picture})
+        yield Learned({"section": section_picture(reach, given.state.appearance.slice)})
 
 
 DRAW_SECTION = Job(
     "section",
-    ("found.reach", "appearance.slice.axis", "appearance.slice.center", "appearance.dark"),
+    ("found.reach", "appearance.slice.axis", "appearance.slice.center"),
     _cut,
     wanted=lambda state: "section" in state.appearance.plots.shown,
     makes=("section",),
@@ -193,13 +187,10 @@ DRAW_SECTION = Job(
 
 
 def _sweep(given: Given) -> Results:
-    latest, parameter = given.found.sweep, swept_parameter(given.state)
-    if parameter is None:
-        return
-    subject = given.state.design, parameter
-    if latest is None or not latest.complete or (latest.arm, latest.parameter) != subject:
-        for known in sweep(*subject, given.quality, given.check, latest):
-            yield Learned({"sweep": known})
+    parameter = swept_parameter(given.state)
+    if parameter is not None:
+        for picture in sweep_pictures(given.state.design, parameter, given.quality):
+            yield Learned({"sweep": picture})
 
 
 SWEEP_VOLUME = Job(

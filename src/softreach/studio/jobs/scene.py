@@ -15,7 +15,7 @@ from softreach.studio.job import Given, Job, Learned, Results
 from softreach.studio.jobs.reach import draw_axes
 from softreach.studio.reach import Reach, stages
 from softreach.studio.scene.camera import is_behind
-from softreach.studio.serve.server import theme
+from softreach.studio.serve import theme
 from softreach.studio.state import solvable_rod
 from softreach.support.errors import InvalidInput
 
@@ -69,7 +69,7 @@ def _look(given: Given) -> None:
     position = np.array(camera.position)
     ahead = (camera.look_at - position) * (1.0, 1.0, 0.0)
     base = np.array(state.design.base.position) / state.design.length
-    scene.clouds.look(ahead if look.half else None, base, _DRAGGED if found.is_dragged else None)
+    scene.look(ahead if look.half else None, base, _DRAGGED if found.is_dragged else None)
     scene.axes.turn(position, given.camera.focal)
     tip = found.tip if look.handle and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
@@ -103,7 +103,7 @@ def _compute_free(given: Given) -> Results:
 
 
 def _draw_free(given: Given) -> None:
-    given.scene.draw_free(given.found.free, given.state.appearance.slice)
+    given.scene.draw_beside("/free", given.found.free, given.state.appearance.slice)
     draw_axes(given)
 
 
@@ -128,7 +128,7 @@ DRAW_REFERENCE = Job(
     "reference",
     ("reference", "appearance.slice"),
     _compute_reference,
-    lambda g: g.scene.draw_reference(g.found.reference, g.state.appearance.slice),
+    lambda g: g.scene.draw_beside("/reference", g.found.reference, g.state.appearance.slice),
     wanted=lambda state: state.reference is not None,
     makes=("reference",),
     draws=("/reference",),

@@ -59,8 +59,7 @@ def swapped(state: StudioState) -> StudioState:
 class Row(NamedTuple):
     """A quantity of the kept design and of the present one; None where it is not known."""
 
-    title: str
-    """With its unit."""
+    title: str  # with its unit
     kept: Value
     now: Value
     errors: tuple[Value, Value] = (None, None)
@@ -75,8 +74,7 @@ class Comparison(NamedTuple):
     """What differs between two designs."""
 
     rows: tuple[Row, ...]
-    is_complete: bool
-    """True if the designs differ in these numbers alone."""
+    is_complete: bool  # true if the designs differ in these numbers alone
 
 
 Candidate = tuple[Manipulator, Reach | None]

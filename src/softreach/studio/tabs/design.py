@@ -288,8 +288,7 @@ _SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
 class _Quantity(NamedTuple):
     label: str
     unit: str
-    scale: float
-    """SI units per unit that is typed."""
+    scale: float  # sI units per unit that is typed
     hint: str
 
 

@@ -15,10 +15,10 @@ from softreach.inverse.request import positions_in
 from softreach.schema import activation_symbols
 from softreach.studio.captions import place_text, tip_text
 from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
+from softreach.studio.figures import track_picture
 from softreach.studio.files import LARGEST
 from softreach.studio.found import Found
 from softreach.studio.jobs.move import at_point
-from softreach.studio.plots.chart import Chart, Curve
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.scene.scene import MOST_BUNDLES
 from softreach.studio.session import Session
@@ -26,7 +26,6 @@ from softreach.studio.state import MOST_POINTS, MOUSE, StudioState, TipPath, rod
 from softreach.studio.widgets import TypedField, vector_kind
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import text_of
-from softreach.support.palette import bundle_color
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -225,7 +224,6 @@ def _answer_text(answer: Solution | None, state: StudioState) -> str:
 # A path
 
 _PATH_HINT = "The tip follows a path as far as its branch of solutions goes: load one, or click it."
-_MOST_CURVES = 8  # in the timeline: more are not told apart
 _POINTS = 24  # of the straight line to each place that is clicked
 
 
@@ -256,8 +254,8 @@ def path(panel: Fields) -> None:
                 hint="point of the path where the arm is",
             )
             with panel.folder("activations along the path") as graph:
-                chart = Chart(panel.gui, graph, "activation")
-            panel.follow("found.track", show=lambda s, found: _draw_timeline(chart, s, found))
+                pass
+            panel.picture(graph, "found.track", image=_timeline)
             panel.button("Save the path (CSV)", lambda: _save(session), "with its activations")
 
 
@@ -304,16 +302,9 @@ def end_text(track: xr.Dataset, arm: Manipulator) -> str:
     return f"{count} of {points} points are followed, {way} of path: there {reason}."
 
 
-def _draw_timeline(chart: Chart, state: StudioState, found: Found) -> None:
+def _timeline(state: StudioState, found: Found) -> Any:
     track, count = _track(state, found), _followed(state, found)
-    if track is None or count < 2:
-        return
-    steps = np.linalg.norm(np.diff(track.position.values[:count], axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)]) / state.design.length
-    names = [str(name) for name in track["bundle"].values][:_MOST_CURVES]
-    curves = [Curve(name, _css(bundle_color(k))) for k, name in enumerate(names)]
-    values = [track.activation.values[:count, k] for k in range(len(names))]
-    chart.show("way / L", way, curves, values)
+    return None if track is None or count < 2 else track_picture(track, state.design).image
 
 
 def extend_path(session: Session, point: np.ndarray) -> None:
@@ -354,7 +345,3 @@ def _tip(state: StudioState) -> np.ndarray:
     if not np.isfinite(tip).all():
         raise InvalidInput("activation", state.activation, "one with an equilibrium")
     return tip
-
-
-def _css(color: tuple[float, float, float]) -> str:
-    return "rgb({},{},{})".format(*(round(255 * part) for part in color))

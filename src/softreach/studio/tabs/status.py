@@ -7,7 +7,7 @@ from softreach.studio.captions import legend_text, loaded_share, reach_text
 from softreach.studio.fields import Fields
 from softreach.studio.found import Found
 from softreach.studio.markup import Part, Strong, fields_style
-from softreach.studio.scene.clouds import key_html
+from softreach.studio.scene.colors import key_html
 from softreach.studio.session import Session
 from softreach.studio.state import StudioState
 from softreach.studio.tabs.goals import verdict_text

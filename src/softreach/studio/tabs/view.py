@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from operator import attrgetter
 
 from softreach.studio.fields import Attribute, Fields, attribute
+from softreach.studio.figures import Picture, swept_parameter
 from softreach.studio.found import Found
-from softreach.studio.plots.chart import Chart, Curve
-from softreach.studio.plots.sweep import Sweep, swept_parameter
 from softreach.studio.scene.camera import VIEWS
-from softreach.studio.scene.clouds import color_names
+from softreach.studio.scene.colors import color_names
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import PictureFrame
 from softreach.support.units import LengthUnit
 
 _ACROSS = {axis: axis for axis in ("none", "x", "y", "z")}
@@ -82,7 +81,6 @@ _PLOTS = {
 }
 _WIDTH = 380  # pixels
 _COMPUTING = "computing ..."
-_VOLUME = Curve("V", "#2f6db5", points=True)
 
 
 def plots(panel: Fields) -> None:
@@ -104,40 +102,25 @@ def plots(panel: Fields) -> None:
 
     panel.follow("appearance.plots", show=place)
     with window.add_tab("Figures"):
-        folders = {name: _figure(panel, name) for name in _PLOTS}
-    frame, chart = PictureFrame(panel.gui, folders["section"]), Chart(panel.gui, folders["sweep"])
-
-    def draw(_: StudioState, found: Found) -> None:
-        if found.section is not None:
-            frame.show(found.section.image)
-        if found.sweep is not None and len(found.sweep.value) > 1:
-            _draw_sweep(chart, found.sweep)
-
-    panel.follow("found.section", "found.sweep", show=draw)
+        for name in _PLOTS:
+            _figure(panel, name)
 
 
-def _figure(panel: Fields, name: str) -> Any:
-    """A folder with a line on what is seen in it."""
+def _figure(panel: Fields, name: str) -> None:
+    """A folder with a picture and a line on it."""
+    known: Callable[[Found], Picture | None] = attrgetter(name)
 
     def text(state: StudioState, found: Found) -> tuple[str, ...]:
-        known: Any = getattr(found, name)
-        if known is None:
+        picture = known(found)
+        if picture is None:
             return (_COMPUTING,)
-        about = _sweep_text(known) if isinstance(known, Sweep) else known.text
-        old = known.arm != state.design
-        return (about, " · of the design before, computing ..." if old else "")
+        old = picture.arm != state.design
+        return (picture.text, " · of the design before, computing ..." if old else "")
 
     shown = lambda state, _: name in state.appearance.plots.shown  # noqa: E731
     with panel.folder(_PLOTS[name][0], shown) as folder:
         panel.text("design", f"found.{name}", content=text)
-    return folder
-
-
-def _draw_sweep(chart: Chart, known: Sweep) -> None:
-    unit, parameter = known.arm.length_unit, known.parameter
-    volumes = unit.of(known.volume, 3)
-    here, y = parameter.shown, unit.label("V", 3)
-    chart.show(parameter.label, known.value, (_VOLUME,), (volumes,), here, y=y)
+    panel.picture(folder, f"found.{name}", image=lambda _, f: (p := known(f)) and p.image)
 
 
 def _switch(name: str) -> Attribute:
@@ -157,13 +140,4 @@ def _swept(state: StudioState) -> str:
 
 
 def _sweeping(state: StudioState, name: str) -> StudioState:
-    return state.showing(plots=state.appearance.plots.showing("sweep").sweeping(name))
-
-
-def _sweep_text(known: Sweep) -> str:
-    unit, parameter = known.arm.length_unit, known.parameter
-    volumes = known.volume[known.value == parameter.shown]
-    parts = [f"here V = {unit.rounded(v, 3)} at {parameter.shown:g}" for v in volumes]
-    if known.refused:
-        parts.append(f"{len(known.refused)} values make no design or take too long")
-    return " · ".join([*parts, *([] if known.complete else [_COMPUTING])])
+    return state.showing(plots=state.appearance.plots.showing("sweep", parameter=name))
