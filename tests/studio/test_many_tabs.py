@@ -64,7 +64,7 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
         loaded.set()
 
     monkeypatch.setattr(Session, "_follow_change", follow)
-    monkeypatch.setattr(softreach.studio.app, "_load_libraries", load)
+    monkeypatch.setattr(softreach.studio.app, "load_libraries", load)
     with Studio(studio.start) as other, connected(other):
         until(lambda: seen)
     assert seen[0] == (True, True, True, "computing", True)

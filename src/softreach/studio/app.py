@@ -39,6 +39,7 @@ __all__ = ["Studio"]
 
 _CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
+_PATIENCE = 3.0  # [s] for tabs that are closed
 
 
 class Studio:
@@ -69,9 +70,9 @@ class Studio:
         self.start, self._token, self.work = start, token, work
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
-        self._notice = Latest(_ignored)
+        self._notice = Latest(lambda _: None)  # a tab that hears of it may be gone
         self._compilation = CompilationWatch(self._compiling)
-        self._libraries = threading.Thread(target=_load_libraries, daemon=True)
+        self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
         self.server = start_server(host, port, token)
         camera = start.state.camera or _camera_beside(start.state.design)
@@ -93,19 +94,15 @@ class Studio:
         return [with_token(page_address(name, port), self._token) for name in hosts]
 
     def stop(self) -> None:
-        """Stop serving."""
+        """Stop serving. Tabs go first: viser ends its pool before it reports their closing."""
         self._compilation.close()
         for session in list(self.sessions.values()):
             session.close()
-        self._disconnect_tabs()
-        stop_server(self.server)
-
-    def _disconnect_tabs(self, patience: float = 3.0) -> None:
-        """Close the tabs' connections first: viser ends its pool before it reports the closing."""
         close_sockets(self.server)
-        deadline = time.monotonic() + patience
+        deadline = time.monotonic() + _PATIENCE
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)
+        stop_server(self.server)
 
     def __enter__(self) -> Self:
         return self
@@ -119,13 +116,14 @@ class Studio:
         self.stop()
 
     def _compiling(self, running: bool) -> None:
-        """Tell every tab, on another thread: this one holds the compiler's lock."""
-        self._notice.submit(lambda _: self._tell(running))
+        """Notify every tab, on another thread: this one holds the compiler's lock."""
 
-    def _tell(self, running: bool) -> None:
-        for session in list(self.sessions.values()):
-            session.compiling, session.compiled = running, self._compilation.done
-            session.show()
+        def notify(_: object) -> None:
+            for session in list(self.sessions.values()):
+                session.compiling, session.compiled = running, self._compilation.done
+                session.show()
+
+        self._notice.submit(notify)
 
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start, JOBS, work=self.work)
@@ -161,17 +159,12 @@ class Studio:
             session.keep()
 
 
-def _load_libraries() -> None:
+def load_libraries() -> None:
     """Load what several jobs of a tab use: two threads that import it at once see half of it."""
     import xarray  # noqa: F401
 
     with suppress(SoftreachError):  # whoever draws a figure says so
         pyplot()
-
-
-def _ignored(error: Exception) -> None:
-    """A tab that is told may be gone."""
-    del error
 
 
 def _camera_beside(arm: Manipulator) -> Camera:

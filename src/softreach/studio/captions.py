@@ -45,7 +45,7 @@ def size_text(size: Size, arm: Manipulator) -> str:
     """Size with its error in the unit of the arm, to the first digit of the error."""
     if size.power == 0:
         return size.name
-    unit = _unit_of(size, arm)
+    unit = size_unit(size, arm)
     return f"{size.name} {unit.text(size.value, size.power, told_error(size, arm))}"
 
 
@@ -54,7 +54,7 @@ def told_error(size: Size, arm: Manipulator) -> float:
     return max(size.error, _FINEST * arm.length**size.power)
 
 
-def _unit_of(size: Size, arm: Manipulator) -> LengthUnit:
+def size_unit(size: Size, arm: Manipulator) -> LengthUnit:
     """The unit of the arm; for volumes of a liter and more that of liters in place of mL."""
     unit, liter = arm.length_unit, as_unit("cm")
     large = size.power == 3 and size.value >= liter.scale(3)
@@ -120,7 +120,7 @@ def loaded_share(found: Found, design: Manipulator) -> str:
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = _unit_of(free.size, free.arm).rounded(free.size.value, free.size.power)
+    whole = size_unit(free.size, free.arm).rounded(free.size.value, free.size.power)
     return f" under loads, {share} of {whole} without"
 
 

@@ -31,6 +31,7 @@ class ShownParameter(NamedTuple):
     """End of a slider in the shown unit, like all that follow; NaN without a slider."""
     high: float = math.nan
     step: float = math.nan
+    whole: bool = False  # it counts something
 
     @property
     def limits(self) -> Ends:
@@ -142,9 +143,11 @@ def _on_slider(
     arm: Manipulator, parameter: Parameter, units: _Units, slider: _Slider
 ) -> ShownParameter:
     more = f"{parameter.meaning}{_MORE.get(parameter.field, '')} (parameter {parameter.name})"
-    made = _shown(arm, parameter, units, parameter.symbol, "")
-    label = slider.label.replace("{owner}", parameter.owner)
-    return ShownParameter(made.name, label, f"{made.label}: {more}", *made[3:5], *slider[1:])
+    shown, label = _shown(arm, parameter, units, parameter.symbol, ""), slider.label
+    label, hint = label.replace("{owner}", parameter.owner), f"{shown.label}: {more}"
+    return shown._replace(
+        label=label, hint=hint, low=slider.low, high=slider.high, step=slider.step
+    )
 
 
 def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
@@ -344,8 +347,8 @@ def _shown(
     arm: Manipulator, parameter: Parameter, units: _Units, name: str, hint: str
 ) -> ShownParameter:
     unit, scale = _unit(parameter, units)
-    value = shown_value(parameter, arm, scale)
-    return ShownParameter(parameter.name, _titled(name, unit), hint, scale, value)
+    value, label = shown_value(parameter, arm, scale), _titled(name, unit)
+    return ShownParameter(parameter.name, label, hint, scale, value, whole=parameter.whole)
 
 
 def _unit(parameter: Parameter, units: _Units) -> _Unit:

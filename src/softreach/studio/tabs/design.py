@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from softreach.arm import designs, edits
 from softreach.arm.base import POINTS
@@ -22,7 +20,6 @@ from softreach.studio.shown_parameters import (
     Part,
     ShownParameter,
     body_numbers,
-    known_parameters,
     owner_label,
     part_parameters,
     parts,
@@ -37,54 +34,51 @@ from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Softrea
 # Sliders, numbers that have none, and named designs to start from
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
-_OWN = "this design"
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
-Names = Sequence[tuple[str, str]]
-"""Names and labels of parameters that have fields."""
 
 
 def design(panel: Fields) -> None:
     """Sliders of a design, each with the change of the volume by it."""
-
-    def words(shown: Callable[[Manipulator], Sequence[ShownParameter]]) -> Any:
-        arm = lambda: panel.session.state.design  # noqa: E731
-        return lambda error: refusal(error, shown(arm()), arm())
-
-    def named(shown: Callable[[Manipulator], Sequence[ShownParameter]]) -> Any:
-        return lambda state, _: [(each.name, each.label) for each in shown(state.design)]
-
     with panel.folder("design") as folder:
-        about = lambda state, found: [_ABOUT_BARS] if _has_bars(state, found) else []  # noqa: E731
+        about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)  # noqa: E731
         panel.text("design", "found.slopes", content=about)
-    kind = {"key": named(slider_parameters), "words": words(slider_parameters)}
-    panel.anew(folder, "design", build=_sliders, **kind)
+    _numbers(panel, folder, slider_parameters, _sliders)
     with panel.folder("body") as folder:
         pass
-    kind = {"key": named(body_numbers), "words": words(body_numbers)}
-    panel.anew(folder, "design", build=_body, **kind)
-    names = {"": _OWN} | {name: name for name in designs.__all__}
+    _numbers(panel, folder, body_numbers, _typed)
+    names = {"": "this design"} | {name: name for name in designs.__all__}
     panel.dropdown("start from", names, Attribute(_name, _named), _ABOUT_START)
 
 
-def number_of_design(parameter: ShownParameter) -> Attribute:
-    """A number of the design, as it is shown."""
-    return of_design(parameter.read, parameter.write)
+def _numbers(
+    panel: Fields,
+    folder: Any,
+    shown: Callable[[Manipulator], Sequence[ShownParameter]],
+    build: Callable[[Fields, Sequence[ShownParameter]], object],
+) -> None:
+    """Fields of parameters, made anew for a design that has others."""
+    arm = lambda: panel.session.state.design  # noqa: E731
+    panel.anew(
+        folder,
+        "design",
+        key=lambda state, _: [each[:2] for each in shown(state.design)],
+        build=lambda fields, _: build(fields, shown(arm())),
+        words=lambda error: refusal(error, shown(arm()), arm()),
+    )
 
 
-def _body(panel: Fields, _: Names) -> None:
-    for number in body_numbers(panel.session.state.design):
-        panel.number(number.label, number_of_design(number), number.hint)
+def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
+    for each in numbers:
+        panel.number(each.label, of_design(each.read, each.write), each.hint)
 
 
-def _sliders(panel: Fields, _: Names) -> None:
-    arm, rows = panel.session.state.design, dict[str, SliderField]()
-    bars: dict[str, Line] = {}
-    shown = {each.name: each for each in slider_parameters(arm)}
-    for name, each in shown.items():
-        at = number_of_design(each)
-        rows[name] = panel.slider(each.label, each.limits, each.step, at, each.hint)
-        if not known_parameters(arm)[name].whole:  # what jumps has no slope
-            bars[name] = panel.kept(Line(panel.gui))
+def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
+    rows, bars = dict[str, SliderField](), dict[str, Line]()
+    for each in shown:
+        at = of_design(each.read, each.write)
+        rows[each.name] = panel.slider(each.label, each.limits, each.step, at, each.hint)
+        if not each.whole:  # what jumps has no slope
+            bars[each.name] = panel.kept(Line(panel.gui))
 
     def end(_: StudioState, found: Found) -> None:
         for name, row in rows.items():
@@ -93,13 +87,15 @@ def _sliders(panel: Fields, _: Names) -> None:
                 row.ends = low, high
 
     def draw_bars(state: StudioState, found: Found) -> None:
-        slopes, drawn = found.slopes, dict.fromkeys(bars, NO_BAR)
+        slopes, drawn = found.slopes, dict.fromkeys(bars, NO_BAR * _has_bars(state, found))
         if slopes is not None:
-            ranges = {name: row.ends[1] - row.ends[0] for name, row in rows.items()}
-            sliders = {name: (shown[name], ranges[name]) for name in rows}
-            drawn = slope_bars(slopes, sliders, old=slopes.arm != state.design)
+            sliders = {
+                each.name: (each, rows[each.name].ends[1] - rows[each.name].ends[0])
+                for each in shown
+            }
+            drawn |= slope_bars(slopes, sliders, old=slopes.arm != state.design)
         for name, line in bars.items():
-            line.show(drawn.get(name, "") if _has_bars(state, found) else "")
+            line.show(drawn[name])
 
     panel.follow("found.ends", show=end)
     panel.follow("design", "found.slopes", "found.ends", show=draw_bars)
@@ -223,8 +219,7 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
         hint = "What tables and files call it"
         panel.bind(TypedField(panel.gui, "name", part.name, hint, _NAME), at)
     _add_matter(panel, part)
-    for number in part_parameters(session.state.design, part):
-        panel.number(number.label, number_of_design(number), number.hint)
+    _typed(panel, part_parameters(session.state.design, part))
     if own:
         remove = lambda state: state.replace(design=_without(state.design, part))  # noqa: E731
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
@@ -275,7 +270,7 @@ def _without(arm: Manipulator, part: Part) -> Manipulator:
 
 # Base and loads
 
-_WAYS: Mapping[str, str] = {name: name for name in POINTS} | {
+_WAYS = {name: name for name in POINTS} | {
     "up": "up (upright)",
     "down": "down (hanging)",
     "": "as the file says",
@@ -283,30 +278,18 @@ _WAYS: Mapping[str, str] = {name: name for name in POINTS} | {
 _NONE = Loads(gravity=GRAVITIES["none"])
 _MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
 _SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
-
-
-class _Quantity(NamedTuple):
-    label: str
-    unit: str
-    scale: float  # sI units per unit that is typed
-    hint: str
-
-
-_QUANTITIES = {
-    "gravity": _Quantity(
-        "g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, whose z points up"
-    ),
-    "payload": _Quantity(
-        "payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"
-    ),
-    "payload_arm": _Quantity(
+_LOADS = {
+    "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
+    "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
+    "payload_arm": (
         "lever arm",
         "mm",
         1e-3,
         "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
     ),
-    "tip_force": _Quantity("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
+    "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
 }
+"""Loads that are typed: field -> label, unit, SI units per unit, and meaning."""
 
 
 def loads(panel: Fields) -> None:
@@ -314,19 +297,22 @@ def loads(panel: Fields) -> None:
     loaded = panel.session.state.design.loads is not None
     with panel.folder("base and loads", expanded=loaded):
         way = "Which way the straight arm points from its base, in the world"
-        panel.dropdown("base", _WAYS, of_design(base_name, _based), way)
+        panel.dropdown("base", _WAYS, of_design(_way, _pointing), way)
         where = "r(0): where the arm is clamped, as x, y, z in the world"
         panel.vector("base at [mm]", base_field("position"), where)
         turn = "ψ: turn of the base about the way the arm points"
         panel.number("turn [deg]", base_field("turn"), turn)
         names = {name: name for name in GRAVITIES} | {"": "as typed"}
-        falls = "Which way things fall in the world; the base says how the arm stands in it"
         gravity = load_field("gravity")
-        fall = lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state  # noqa: E731
-        panel.dropdown("gravity", names, Attribute(gravity_name, fall), falls)
-        for name, kind in _QUANTITIES.items():
+        fall = Attribute(
+            gravity_name,
+            lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
+        )
+        falls = "Which way things fall in the world; the base says how the arm stands in it"
+        panel.dropdown("gravity", names, fall, falls)
+        for name, (label, unit, _, hint) in _LOADS.items():
             add = panel.number if name == "payload" else panel.vector
-            add(f"{kind.label} [{kind.unit}]", load_field(name), kind.hint)
+            add(f"{label} [{unit}]", load_field(name), hint)
         panel.message = panel.kept(Line(panel.gui))
         panel.change(
             "Take all loads off",
@@ -336,64 +322,17 @@ def loads(panel: Fields) -> None:
             **GRAY,
         )
         follows = "design", "found.tip", "found.pointing", "found.posture"
-        panel.text(*follows, content=_posture)
+        panel.text(*follows, content=lambda s, found: tip_text(found, s.design) * _is_loaded(s))
         panel.text("design", content=lambda state, _: _others(state.design))
 
 
-def _posture(state: StudioState, found: Found) -> list[Any]:
-    return tip_text(found, state.design) if state.design.loads is not None else []
+def _is_loaded(state: StudioState) -> bool:
+    return state.design.loads is not None
 
 
 def _others(arm: Manipulator) -> list[str]:
     others = ", ".join(other_loads(arm))
     return [f"From the design file act too: {others}."] if others else []
-
-
-def load_field(name: str) -> Attribute:
-    """A load in the unit that is typed; other loads stay, and without any the arm has no loads.
-
-    Writing raises:
-        InvalidInput: A number that no load can have.
-        InvalidDesign: Matter that lacks what loads need, and where to give it.
-    """
-    scale = _QUANTITIES[name].scale
-
-    def read(arm: Manipulator) -> Any:
-        return _in_unit(getattr(arm.loads or _NONE, name), scale)
-
-    def write(arm: Manipulator, value: Any) -> Manipulator:
-        loads = (arm.loads or _NONE).replace(**{name: _in_si(name, value)})
-        try:
-            return arm.replace(loads=None if loads == _NONE else loads)
-        except InvalidDesign as error:
-            raise _in_words(error) from None
-
-    return of_design(read, write)
-
-
-def gravity_name(state: StudioState) -> str:
-    """Name of the gravity in the list of directions; "" for any other."""
-    gravity = (state.design.loads or _NONE).gravity
-    return next((name for name, known in GRAVITIES.items() if known == gravity), "")
-
-
-def base_name(arm: Manipulator) -> str:
-    """Word for the way that an arm points; "" for a rotation."""
-    return arm.base.points if isinstance(arm.base.points, str) else ""
-
-
-def _based(arm: Manipulator, name: str) -> Manipulator:
-    return arm.replace(base=arm.base.replace(points=name)) if name else arm
-
-
-def base_field(name: str) -> Attribute:
-    """Position in mm, or turn in degrees."""
-    scale = math.radians(1.0) if name == "turn" else 1e-3
-
-    def write(arm: Manipulator, value: Any) -> Manipulator:
-        return arm.replace(base=arm.base.replace(**{name: _scaled(value, scale)}))
-
-    return of_design(lambda arm: _in_unit(getattr(arm.base, name), scale), write)
 
 
 def other_loads(arm: Manipulator) -> list[str]:
@@ -405,27 +344,62 @@ def other_loads(arm: Manipulator) -> list[str]:
     return others + ([f"point loads ({count})"] if count else [])
 
 
-def _in_si(name: str, value: Any) -> Any:
-    label, unit, scale, _ = _QUANTITIES[name]
+def gravity_name(state: StudioState) -> str:
+    """Name of the gravity in the list of directions; "" for any other."""
+    gravity = (state.design.loads or _NONE).gravity
+    return next((name for name, known in GRAVITIES.items() if known == gravity), "")
+
+
+def _way(arm: Manipulator) -> str:
+    """Word for the way that an arm points; "" for a rotation."""
+    return arm.base.points if isinstance(arm.base.points, str) else ""
+
+
+def _pointing(arm: Manipulator, name: str) -> Manipulator:
+    return arm.replace(base=arm.base.replace(points=name)) if name else arm
+
+
+def base_field(name: str) -> Attribute:
+    """Position in mm, or turn in degrees."""
+    scale = math.radians(1.0) if name == "turn" else 1e-3
+    return of_design(
+        lambda arm: _over(getattr(arm.base, name), scale),
+        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale)})),
+    )
+
+
+def load_field(name: str) -> Attribute:
+    """A load in the unit that is typed; other loads stay, and without any the arm has no loads.
+
+    Writing raises:
+        InvalidInput: A number that no load can have.
+        InvalidDesign: Matter that lacks what loads need, and where to give it.
+    """
+    label, unit, scale, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
-    numbers = np.atleast_1d(np.asarray(value, float))
-    good = (numbers >= low) & (numbers <= _MOST)
-    if not good.all():
-        wrong = f"{numbers[np.flatnonzero(~good)[0]]:g} {unit}"
-        raise InvalidInput(label, wrong, f"{low:,.0f} to {_MOST:,.0f} {unit}")
-    return _scaled(value, scale)
+
+    def write(arm: Manipulator, value: Any) -> Manipulator:
+        for number in value if isinstance(value, tuple) else (value,):
+            if not low <= number <= _MOST:
+                allowed = f"{low:,.0f} to {_MOST:,.0f} {unit}"
+                raise InvalidInput(label, f"{number:g} {unit}", allowed)
+        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale)})
+        try:
+            return arm.replace(loads=None if loads == _NONE else loads)
+        except InvalidDesign as error:
+            raise _in_words(error) from None
+
+    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale), write)
 
 
-def _scaled(value: Any, scale: float) -> Any:
+def _times(value: Any, scale: float) -> Any:
     return vector(scale * v for v in value) if isinstance(value, tuple) else scale * value
 
 
-def _in_unit(value: Any, scale: float) -> Any:
-    if scale == 1.0:
-        return value
+def _over(value: Any, scale: float) -> Any:
     if isinstance(value, tuple):
-        return vector(_in_unit(each, scale) for each in value)
-    return float(f"{value / scale:.10g}")
+        return vector(_over(each, scale) for each in value)
+    return value if scale == 1.0 else float(f"{value / scale:.10g}")
 
 
 def _in_words(error: InvalidDesign) -> InvalidDesign:
