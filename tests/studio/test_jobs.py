@@ -42,7 +42,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     state = StudioState(design=trunk)
     other = changed(trunk, {"taper": 0.01})
     changes = {
-        state.replace(activation=(-1.0, 0.0, 0.0)): {"arm", "sample"},
+        state.replace(activation=(-1.0, 0.0, 0.0)): {"arm"},
         state.showing(color="multiplicity"): {"cloud", "surface"},
         state.showing(slice=Slice(axis="x")): {"cloud", "surface"},
         state.showing(surface=False): {"cloud", "surface"},
@@ -52,7 +52,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
         state.showing(dark=True): {"theme", "surface"},
         state.replace(needs=NEEDS): {"needs"},
         state.replace(reference=trunk): {"reference"},
-        state.replace(design=other): {"reach", "slopes", "ends", "arm", "sample"},
+        state.replace(design=other): {"reach", "slopes", "arm"},
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
     }
     for new, jobs in changes.items():
@@ -67,7 +67,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
     other = changed(trunk, {"taper": 0.01})
     moves = {
         full.replace(design=other): {
-            "reach", "slopes", "ends", "arm", "sample", "inverse", "needs", "sweep",
+            "reach", "slopes", "arm", "inverse", "needs", "sweep",
         },
         full.showing(slice=Slice(axis="x")): {"cloud", "reference", "surface", "section"},
         full.showing(plots=PlotSettings()): {"sweep", "section"},

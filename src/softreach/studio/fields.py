@@ -39,10 +39,11 @@ GRAY: Any = {"color": "gray"}
 
 
 class Attribute(NamedTuple):
-    """A value of the state that a field shows and changes."""
+    """A value of the state, or of what is found, that a field shows and changes."""
 
-    read: Callable[[StudioState], Any]
-    write: Callable[[StudioState, Any], StudioState]
+    read: Callable[[Any], Any]
+    write: Callable[[Any, Any], Any]
+    of: str = "state"
 
 
 def attribute(path: str) -> Attribute:
@@ -149,14 +150,9 @@ class Fields:
         build: Callable[[Fields, Any], object],
         words: Callable[[SoftreachError], str] = str,
     ) -> None:
-        """Fields at the end of a container that are made anew for each key.
+        """Fields at the end of a folder that are made anew where their key differs.
 
-        Args:
-            container: A folder or tab.
-            paths: What decides the key.
-            key: To be compared; by default another one whenever any of these is another object.
-            build: Declares the fields of a key.
-            words: A refusal in words.
+        By default that is whenever what stands at one of the paths is another object.
         """
         group = _Group(lambda: Fields(self.session, words), container, build)
         self._groups.append(group)
@@ -169,14 +165,7 @@ class Fields:
     def dropdown(
         self, label: str, options: Mapping[Any, str] | Options, at: Attribute, hint: str
     ) -> Any:
-        """Add a menu.
-
-        Args:
-            label: Before the menu.
-            options: What each value is called; in each state, if that depends on the design.
-            at: A value of the state that is among them.
-            hint: What it means.
-        """
+        """Add a menu; options say what each value is called, if need be in each state."""
         offered = options if callable(options) else lambda _: options
         names = offered(self.session.state)
         widget = self.gui.add_dropdown(
@@ -209,15 +198,7 @@ class Fields:
         move: Callable[[int], object],
         hint: str,
     ) -> None:
-        """Add a slider over whole numbers, whose value and last number follow.
-
-        Args:
-            label: Before it.
-            paths: What decides these.
-            at: Value, and last number.
-            move: What a person does by dragging it.
-            hint: What it means.
-        """
+        """Add a slider over whole numbers, whose value and last number follow."""
         slider = self.kept(self.gui.add_slider(label, 0, 1, 1, 0, hint=hint))
 
         def show(state: StudioState, found: Found) -> None:
@@ -269,21 +250,16 @@ class Fields:
         Events run at once and in any order: each reads what the widget holds by then, so that the
         last one has it right. Widgets that we set ourselves also send events, without a client.
         """
-        binding = _Binding(widget, at, options, self._read(at))
-        revision = self.session.revision
-
-        def follow(state: StudioState, _: Found) -> None:
-            nonlocal revision
-            binding.follow(state, anyway=revision != self.session.revision)
-            revision = self.session.revision
+        binding = _Binding(self.session, widget, at, options)
+        act = self.session.learn if at.of == "found" else lambda change: self.apply(change, widget)
 
         def moved(event: Any) -> None:
             if event.client_id is not None:
-                attempt(self.session, lambda: self.apply(binding.write, widget))
+                attempt(self.session, lambda: act(binding.write))
 
         widget.on_update(moved)
         self._bindings.append(binding)
-        self.follow("state", "tab.revision", show=follow)
+        self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
         return self.kept(widget)
 
     def apply(self, change: Change, widget: Any = None) -> None:
@@ -303,10 +279,10 @@ class Fields:
             self._refused = place if refusal else None
             if not refusal and (widget is None or before not in (None, place)):
                 for binding in self._bindings:  # what was refused is given up
-                    binding.follow(session.state, anyway=True)
+                    binding.follow(anyway=True)
 
     def _read(self, at: Attribute) -> Any:
-        return at.read(self.session.state)
+        return at.read(getattr(self.session, at.of))
 
     def _length(self) -> float:
         """L [m], which may be typed as a unit."""
@@ -355,35 +331,38 @@ class _Group:
 
 
 class _Binding:
-    def __init__(self, widget: Any, at: Attribute, options: Options | None, value: Any) -> None:
-        self._widget, self._at, self._options = widget, at, options
-        self._seen = value
-        """Of the state, where widget and state last agreed; the hand may be ahead of both."""
+    def __init__(
+        self, session: Session, widget: Any, at: Attribute, options: Options | None
+    ) -> None:
+        self._session, self._widget, self._at, self._options = session, widget, at, options
+        self._revision = session.revision
+        self._seen = at.read(getattr(session, at.of))
+        """Where widget and state last agreed; the hand may be ahead of both."""
 
-    def write(self, state: StudioState) -> StudioState:
+    def write(self, owner: Any) -> Any:
         """The state with what the widget holds; what it only shows rounded is left as it is."""
-        value = self._widget.value
+        value, known = self._widget.value, self._at.read(owner)
         if self._options is not None:
-            values = {name: value for value, name in self._options(state).items()}
-            value = values.get(value, self._at.read(state))  # it may be of a design before
-        if value == self._at.read(state):
-            return state
-        new = self._at.write(state, value)
+            names = self._options(self._session.state)
+            value = {name: value for value, name in names.items()}.get(value, known)
+        if value == known:  # as of a menu whose option is of a design before
+            return owner
+        new = self._at.write(owner, value)
         self._seen = self._at.read(new)
         return new
 
-    def follow(self, state: StudioState, *, anyway: bool) -> None:
-        value = self._at.read(state)
+    def follow(self, *, anyway: bool = False) -> None:
+        session, widget = self._session, self._widget
+        value = shown = self._at.read(getattr(session, self._at.of))
+        anyway = anyway or value != self._seen or session.revision != self._revision
         if self._options is not None:
-            names = self._options(state)
-            if tuple(self._widget.options) != tuple(names.values()):
-                self._widget.options, anyway = tuple(names.values()), True
-        if not anyway and value == self._seen:
-            return
-        self._seen = value
-        shown = value if self._options is None else self._options(state)[value]
-        if self._widget.value != shown:
-            self._widget.value = shown
+            names = self._options(session.state)
+            shown = names[value]
+            if tuple(widget.options) != tuple(names.values()):
+                widget.options, anyway = tuple(names.values()), True
+        self._seen, self._revision = value, session.revision
+        if anyway and widget.value != shown:
+            widget.value = shown
 
 
 def attempt(session: Session, action: Callable[[], object]) -> None:

@@ -61,8 +61,8 @@ class Job:
     draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
     """Draws what is known after each result, and takes away what is not; returns what follows only
     from drawing, as fields of `Found`."""
-    wanted: Callable[[StudioState], object] = lambda _: True
-    """False for states that have no use of it; it is done once more when that begins."""
+    wanted: Callable[[StudioState, Found], object] = lambda *_: True
+    """False where there is no use of it; it is done once more when that begins."""
     makes: tuple[str, ...] = ()
     """Fields of `Found` that are forgotten where the work fails."""
     draws: tuple[str, ...] = ()
@@ -83,8 +83,9 @@ class Job:
     def is_stale(self, old: tuple[StudioState, Found], new: tuple[StudioState, Found]) -> bool:
         """True if a change decides another result: of what is known, any other object."""
         (before, known), (after, now) = old, new
-        if not (wanted := bool(self.wanted(after))) or not self.wanted(before):
-            return wanted or bool(self.wanted(before))
+        was, wanted = bool(self.wanted(before, known)), bool(self.wanted(after, now))
+        if not (was and wanted):
+            return was != wanted
         of_state, of_found = self._getters
         if not all(map(is_, of_found(known), of_found(now))):
             return True

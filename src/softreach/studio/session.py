@@ -48,14 +48,7 @@ class Session:
         *,
         work: KeptWork | None = None,
     ) -> None:
-        """Begin a session; `panels` are added by the app before the first `update`.
-
-        Args:
-            client: The tab.
-            start: What it begins with.
-            jobs: Work that follows from its state.
-            work: Where its state is kept, if anywhere.
-        """
+        """Begin a session of a tab, whose state is kept in `work`; then it is furnished."""
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
@@ -66,16 +59,13 @@ class Session:
         """True once there is anything to keep."""
         self.state: StudioState = start.state
         self.found = Found(reach=start.reach)
-        """What jobs have found out."""
         self.panels: list[Fields] = []
-        self.note = ""
-        """Text for the reader."""
         self.revision = 0
         """Number of changes that widgets have to follow, whatever they hold."""
+        self.note, self.doing = "", ""
+        """Texts for the reader, the second on the work that is being done."""
         self.canceled = False
         """True if the reader stopped what was being computed of this state."""
-        self.doing = ""
-        """Work that is being done, for the reader."""
         self.compiling, self.compiled = False, 0
         """Whether kernels are being compiled, and how many were since the studio was started."""
         kept = () if work is None else (self._keeping(),)
@@ -173,12 +163,7 @@ class Session:
     def learn(
         self, found: Mapping[str, Any] | Callable[[Found], Found] | None, *, quiet: bool = False
     ) -> None:
-        """Replace what is known, and start what follows from that.
-
-        Args:
-            found: Fields of `Found` and their new values, or the next `Found` from this one.
-            quiet: Whether panels hear of it later.
-        """
+        """Replace some fields of `Found`, or all, and start what follows; panels may hear later."""
         if not found:
             return
         with self.lock:
@@ -236,16 +221,9 @@ class Session:
     # The scene
 
     def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
-        """Place of the tip [m] in the sample under the cursor, of those that can be seen.
+        """Place of the tip [m], shape (3,), in the sample that a ray from the camera [L] meets.
 
-        It is computed anew: a point is rounded, at the rim perhaps to out of reach.
-
-        Args:
-            origin: Of the ray through the pixel: where the camera is [L].
-            direction: Of the ray, any length.
-
-        Returns:
-            Shape (3,); None beside all samples.
+        None beside all. It is computed anew: a point is rounded, at the rim perhaps out of reach.
         """
         reach, look = self.found.reach, self.state.appearance
         shown = look.cloud or look.surface
@@ -282,11 +260,9 @@ class Session:
         self.follow("inverse")  # also where the target is the one before
 
     def drag_to(self, phase: str, wanted: Array) -> None:
-        """Follow a drag of the tip; returns at once. Of its places only the latest is followed.
+        """Follow a drag of the tip to a place [L]; returns at once. Only the latest is followed.
 
-        Args:
-            phase: "start", "update" or "end".
-            wanted: Where the tip should be [L].
+        The phase is "start", "update" or "end".
         """
         self.learn({"pull": Pull(wanted, rests=phase == "end")}, quiet=True)
 

@@ -235,10 +235,7 @@ def slider_ends(
 ) -> dict[str, Ends]:
     """Ends of the sliders of a design: as far as each alone can go, to three digits.
 
-    Args:
-        arm: The design.
-        before: Ends of a design like it, near which they are looked for.
-        check: Called often; raises to stop.
+    They are looked for near those of a design before; the check is called often, and may raise.
     """
     known, before = known_parameters(arm), before or {}
 
@@ -366,13 +363,7 @@ _IN_WORDS = {"R2(L)": "R₂ at the tip", "R2(0)": "R₂ at the base"}
 
 
 def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipulator) -> str:
-    """An error; of faults of a design each number by the label and in the unit of its field.
-
-    Args:
-        error: What is wrong.
-        shown: The parameters that have fields.
-        arm: The design that was to be changed.
-    """
+    """An error; of faults of a design each number by the label and in the unit of its field."""
     if not isinstance(error, InvalidDesign):
         return str(error)
     known = {

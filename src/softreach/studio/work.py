@@ -70,12 +70,7 @@ class Latest:
     def __init__(
         self, failed: Callable[[Exception], None], idle: Callable[[], None] = lambda: None
     ) -> None:
-        """Start with nothing to do.
-
-        Args:
-            failed: Called with an exception other than `Dropped`.
-            idle: Called when there is nothing left to do.
-        """
+        """Start with nothing to do; `failed` gets exceptions, `idle` follows the last work."""
         self._failed, self._idle = failed, idle
         self._waiting: Callable[[StaleCheck], None] | None = None
         self._closed = self._canceled = self.busy = False
@@ -176,12 +171,9 @@ class Budget:
     def __init__(
         self, check: StaleCheck, seconds: float, report: Callable[[int], None] | None = None
     ) -> None:
-        """Begin now.
+        """Begin now; it may take some seconds [s].
 
-        Args:
-            check: Raises when the computation is no longer wanted.
-            seconds: What it may take [s].
-            report: Called with the number of items done in all, at most some times a second.
+        At most some times a second, `report` is called with the number of items done in all.
         """
         self._check, self._report = check, report
         free = free_memory()
@@ -192,10 +184,7 @@ class Budget:
         self._next, self._done = 0.0, 0
 
     def __call__(self, done: int = 0) -> None:
-        """Go on if that is wanted, and there is time and memory.
-
-        Args:
-            done: Items done since the last call.
+        """Go on with so many items done if that is wanted, and there is time and memory.
 
         Raises:
             OverBudget: There is not.
@@ -222,25 +211,16 @@ _COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or wr
 
 
 def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that is computed in time.
+    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
 
-    Args:
-        rod: Of an arm whose samples cost much: loaded, or of many bundles.
-        seconds: What the cloud may take on one core [s].
-        wanted: Level beyond which nobody asks.
+    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
     """
     affordable = math.floor(math.log2(max(seconds, 1e-9) / _seconds_each(rod)))
     return min(wanted, max(_LOWEST, affordable))
 
 
 def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that memory holds.
-
-    Args:
-        bundles: How many activations a sample has.
-        memory: What the cloud and its copies may take [bytes].
-        wanted: Level beyond which nobody asks.
-    """
+    """The level of the largest cloud, at most wanted, that memory [bytes] holds with its copies."""
     each = 8.0 * (bundles + 3) * _COPIES
     return min(wanted, max(_LOWEST, math.floor(math.log2(max(memory, 1.0) / each))))
 

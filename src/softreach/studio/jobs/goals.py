@@ -41,7 +41,7 @@ def _check(given: Given) -> Results:
     if all(finding.met or finding.kind not in _POSES for finding in quick.findings):
         return
     rest(given.check, _PAUSE)
-    progress = lambda _: given.check()  # noqa: E731
+    progress = lambda _: given.check()
     with no_warnings():
         made = check(quick.arm, quick.requirements, accuracy=_ACCURACY, progress=progress)
     yield Learned({"check": made})
@@ -56,7 +56,7 @@ CHECK_NEEDS = Job(
     ("design", "needs"),
     _check,
     _draw_needs,
-    wanted=lambda state: state.needs,
+    wanted=lambda state, _: state.needs,
     makes=("check",),
     draws=("/needs",),
 )
@@ -66,9 +66,8 @@ CHECK_NEEDS = Job(
 def _predict(given: Given) -> Results:
     """Markers of the pose, while the arm has its inputs."""
     bench, design = given.found.bench, given.state.design
-    if bench is None:
-        return
-    if not bench.fits(design) or bench.posed(given.state).activation != given.state.activation:
+    here = bench is not None and bench.posed(given.state).activation == given.state.activation
+    if bench is None or not (here and bench.fits(design)):
         yield Learned({"sample": None})
         return
     arm = bench.fitted(design) or design
@@ -96,6 +95,7 @@ DRAW_SAMPLE = Job(
     ("design", "activation", "found.bench"),
     _predict,
     _draw_sample,
+    wanted=lambda _, found: found.bench is not None,
     makes=("sample",),
     draws=("/sample",),
 )

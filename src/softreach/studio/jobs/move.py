@@ -33,7 +33,7 @@ def _solve(given: Given) -> Results:
     if given.found.takes_nearest and len(answer):
         distance = np.linalg.norm(answer.activations - state.activation, axis=1)
         best = tuple(answer.activations[int(np.argmin(distance))].tolist())
-        change = lambda now: now.replace(activation=best)  # noqa: E731
+        change = lambda now: now.replace(activation=best)
     yield Learned({"answer": answer, "takes_nearest": False}, change)
 
 
@@ -62,7 +62,7 @@ SOLVE_INVERSE = Job(
     ("design", "target"),
     _solve,
     _draw_answer,
-    wanted=lambda state: state.target is not None,
+    wanted=lambda state, _: state.target is not None,
     makes=("answer", "takes_nearest"),
     draws=("/ghosts", "/target", "/gap"),
 )
@@ -87,7 +87,7 @@ def _follow_tip(given: Given) -> Results:
         target = vector(place * state.design.length) if pull.rests else None
         yield Learned(known, lambda now: _moved(now, state, dragged, target))
     if pull.rests:
-        rested = lambda now: now.without(pull)  # noqa: E731
+        rested = lambda now: now.without(pull)
         yield Learned(rested, ends_step=True)
 
 
@@ -132,7 +132,7 @@ FOLLOW_PATH = Job(
     ("design", "path.points", "path.start"),
     _follow,
     _draw_path,
-    wanted=lambda state: state.path is not None,
+    wanted=lambda state, _: state.path is not None,
     makes=("track",),
     draws=("/path",),
     doing="following the path",
@@ -157,12 +157,9 @@ PLAY_PATH = Job("play", (), _play)
 
 
 def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioState:
-    """The arm at a point of its path.
+    """The arm at a point of its path, with one of the activations there, shape (k, bundles).
 
-    Args:
-        state: With a path.
-        activations: At its points, shape (k, bundles).
-        point: Which one; the state stays as it is where it is not followed.
+    The state stays as it is where the path is not followed.
     """
     if state.path is None or point >= len(state.path.points) or point >= len(activations):
         return state

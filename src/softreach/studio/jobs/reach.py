@@ -13,10 +13,8 @@ from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.shown_parameters import slider_ends
 from softreach.studio.slopes import volume_slopes
 from softreach.studio.state import StudioState
-from softreach.studio.work import OverBudget, rest
+from softreach.studio.work import OverBudget
 from softreach.support.errors import InvalidInput
-
-_REST = 0.3  # [s] without another design, before sliders end where that does
 
 
 def _compute_reach(given: Given) -> Results:
@@ -127,7 +125,7 @@ DRAW_SURFACE = Job(
     ),
     _color_surface,
     _draw_surface,
-    wanted=lambda state: state.appearance.surface,
+    wanted=lambda state, _: state.appearance.surface,
     draws=("/surface",),
     at_once=False,
 )  # fmt: skip
@@ -150,23 +148,15 @@ def _count(reach: Reach, given: Given) -> None:
 
 
 def _differentiate(given: Given) -> Results:
-    reach = given.found.complete_reach(given.state.design)
+    design, check = given.state.design, given.check
+    reach = given.found.complete_reach(design)
     if reach is not None:
-        yield Learned({"slopes": volume_slopes(reach, given.quality, given.check)})
+        yield Learned({"ends": slider_ends(design, given.found.ends, check)})
+        yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
 DIFFERENTIATE_VOLUME = Job("slopes", ("design", "found.reach"), _differentiate, makes=("slopes",))
-"""Slopes of the volume by the sliders."""
-
-
-def _end_sliders(given: Given) -> Results:
-    rest(given.check, _REST)
-    ends = slider_ends(given.state.design, given.found.ends, given.check)
-    yield Learned({"ends": ends})
-
-
-END_SLIDERS = Job("ends", ("design",), _end_sliders, makes=("ends",))
-"""How far each slider can go alone, once nobody drags."""
+"""Ends of the sliders, and slopes of the volume by them, once nobody drags."""
 
 
 def _cut(given: Given) -> Results:
@@ -180,7 +170,7 @@ DRAW_SECTION = Job(
     "section",
     ("found.reach", "appearance.slice.axis", "appearance.slice.center"),
     _cut,
-    wanted=lambda state: "section" in state.appearance.plots.shown,
+    wanted=lambda state, _: "section" in state.appearance.plots.shown,
     makes=("section",),
 )
 """Picture of the section by the plane of the slice."""
@@ -197,7 +187,7 @@ SWEEP_VOLUME = Job(
     "sweep",
     ("design", "appearance.plots.parameter"),
     _sweep,
-    wanted=lambda state: "sweep" in state.appearance.plots.shown,
+    wanted=lambda state, _: "sweep" in state.appearance.plots.shown,
     makes=("sweep",),
 )
 """Volumes of designs that differ in one parameter."""

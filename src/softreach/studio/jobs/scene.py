@@ -112,7 +112,7 @@ DRAW_FREE = Job(
     ("unloaded", "appearance.slice"),
     _compute_free,
     _draw_free,
-    wanted=lambda state: state.design.loads is not None,
+    wanted=lambda state, _: state.design.loads is not None,
     makes=("free",),
     draws=("/free",),
 )
@@ -129,7 +129,7 @@ DRAW_REFERENCE = Job(
     ("reference", "appearance.slice"),
     _compute_reference,
     lambda g: g.scene.draw_beside("/reference", g.found.reference, g.state.appearance.slice),
-    wanted=lambda state: state.reference is not None,
+    wanted=lambda state, _: state.reference is not None,
     makes=("reference",),
     draws=("/reference",),
 )

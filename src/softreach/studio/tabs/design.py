@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -40,7 +41,7 @@ _ABOUT_START = "Replaces the whole design by an arm of the literature or an exam
 def design(panel: Fields) -> None:
     """Sliders of a design, each with the change of the volume by it."""
     with panel.folder("design") as folder:
-        about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)  # noqa: E731
+        about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
         panel.text("design", "found.slopes", content=about)
     _numbers(panel, folder, slider_parameters, _sliders)
     with panel.folder("body") as folder:
@@ -57,7 +58,7 @@ def _numbers(
     build: Callable[[Fields, Sequence[ShownParameter]], object],
 ) -> None:
     """Fields of parameters, made anew for a design that has others."""
-    arm = lambda: panel.session.state.design  # noqa: E731
+    arm = lambda: panel.session.state.design
     panel.anew(
         folder,
         "design",
@@ -206,13 +207,13 @@ def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, 
 def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     """The fields of the part that is chosen."""
     session, part, labels = panel.session, known[label], tuple(known)
-    menu = panel.gui.add_dropdown(
-        "edit", labels, initial_value=label, hint="The part whose numbers are below"
+    chosen = Attribute(
+        lambda found: min(found.part, len(labels) - 1),
+        lambda found, number: replace(found, part=number),
+        "found",
     )
-    choose = lambda event: (  # noqa: E731
-        event.client_id is not None and session.learn({"part": labels.index(menu.value)})
-    )
-    panel.kept(menu).on_update(choose)
+    hint = "The part whose numbers are below"
+    panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
     own = part.ring is not None or bool(part.actuator)
     if own:
         at = of_design(lambda _: part.name, lambda arm, name: _renamed(arm, part, name))
@@ -221,7 +222,7 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     _add_matter(panel, part)
     _typed(panel, part_parameters(session.state.design, part))
     if own:
-        remove = lambda state: state.replace(design=_without(state.design, part))  # noqa: E731
+        remove = lambda state: state.replace(design=_without(state.design, part))
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
 
 
@@ -235,7 +236,7 @@ def _add_matter(panel: Fields, part: Part) -> None:
         )
         _material(panel, "material", _AS_TYPED, of_ring)
     if ring == 0:
-        core = lambda arm: arm.section.core.name if arm.section.core else ""  # noqa: E731
+        core = lambda arm: arm.section.core.name if arm.section.core else ""
         _material(panel, "core", _AS_INNERMOST, of_design(core, edits.with_core))
     if part.home is not None and len(arm.section.rings) > 1:
         rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}

@@ -13,7 +13,7 @@ from softreach.calibration import Calibration
 from softreach.calibration.measurements import read_measurements, read_table
 from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target
 from softreach.studio import markup
-from softreach.studio.fields import GRAY, Fields
+from softreach.studio.fields import GRAY, Attribute, Fields
 from softreach.studio.files import LARGEST
 from softreach.studio.found import Bench, Found
 from softreach.studio.markup import Part, Swatch, Term
@@ -51,12 +51,12 @@ _ABOUT = {
 def needs(panel: Fields) -> None:
     """Needs of the design, and what it misses of them."""
     session, gui = panel.session, panel.gui
-    wanted = lambda state, _: state.needs  # noqa: E731
+    wanted = lambda state, _: state.needs
     with panel.folder("requirements"):
         panel.say(_HINT)
         kind = gui.add_dropdown("add", tuple(_EMPTY), hint=_ABOUT["add"])
         field = gui.add_text("numbers", "", hint=_ABOUT["field"])
-        unit = lambda: session.state.design.length_unit.name  # noqa: E731
+        unit = lambda: session.state.design.length_unit.name
         expected = panel.text("design", content=lambda *_: [_EMPTY[kind.value].format(unit=unit())])
         kind.on_update(lambda _: expected.say(_EMPTY[kind.value].format(unit=unit())))
 
@@ -66,7 +66,7 @@ def needs(panel: Fields) -> None:
 
         panel.button("Add to the needs", add, _ABOUT["add"])
         panel.html("design", "found.check", content=lambda state, found: verdict(found, state))
-        refused = lambda _, found: _refusal(found)  # noqa: E731
+        refused = lambda _, found: _refusal(found)
         panel.html("found.check_refusal", content=refused)
         part: Any = gui.add_dropdown("remove", (_ALL,), hint=_ABOUT["remove"], visible=False)
 
@@ -78,11 +78,11 @@ def needs(panel: Fields) -> None:
                 part.value = part.options[0]
 
         panel.follow("design", "needs", show=offer)
-        remove = lambda: _remove_need(session, part.value)  # noqa: E731
+        remove = lambda: _remove_need(session, part.value)
         panel.button("Remove", remove, _ABOUT["remove"], wanted)
-        read = lambda file: read_needs(session, file.name, file.content)  # noqa: E731
+        read = lambda file: read_needs(session, file.name, file.content)
         panel.upload("Load needs (TOML)", read, _ABOUT["load"], **GRAY)
-        save = lambda: session.send("needs.toml", session.state.needs.encode())  # noqa: E731
+        save = lambda: session.send("needs.toml", session.state.needs.encode())
         panel.button("Save needs (TOML)", save, _ABOUT["save"], wanted, **GRAY)
 
 
@@ -287,31 +287,27 @@ def calibrate(panel: Fields) -> None:
             follows = "design", "found.bench", "found.sample"
             panel.text(*follows, content=lambda state, found: [_residuals_text(state, found)])
             for name, label in _FREE.items():
-                _free_box(panel, name, label)
+                panel.checkbox(label, _is_free(name), "Lets the fit change this number")
             panel.button("Fit", lambda: session.follow("fit"), _ABOUT_FIT)
             panel.html("found.bench", content=lambda _, found: _summary(found.bench))
             about = "Makes the calibrated arm the design; can be undone"
-            fitted = lambda state, found: _fitted(found.bench, state) is not None  # noqa: E731
+            fitted = lambda state, found: _fitted(found.bench, state) is not None
             panel.button("Apply", lambda: _apply(session), about, fitted)
 
 
-def _free_box(panel: Fields, name: str, label: str) -> None:
-    session = panel.session
-    box = panel.gui.add_checkbox(label, name == "pose", hint="Lets the fit change this number")
+def _is_free(name: str) -> Attribute:
+    """Whether a fit may change a number; that of the pose before there are data."""
 
-    def free(found: Found) -> Found:
+    def write(found: Found, on: bool) -> Found:
         if found.bench is None:
             return found
-        names = {*found.bench.free, name} if box.value else {*found.bench.free} - {name}
-        ordered = tuple(each for each in _FREE if each in names)
-        return replace(found, bench=replace(found.bench, free=ordered))
+        free = tuple(each for each in _FREE if (on if each == name else each in found.bench.free))
+        return replace(found, bench=replace(found.bench, free=free))
 
-    def show(_: StudioState, found: Found) -> None:
-        if found.bench is not None and box.value != (name in found.bench.free):
-            box.value = not box.value
+    def read(found: Found) -> bool:
+        return name in (found.bench.free if found.bench is not None else ("pose",))
 
-    box.on_update(lambda event: session.learn(free if event.client_id is not None else None))
-    panel.follow("found.bench", show=show)
+    return Attribute(read, write, "found")
 
 
 def _read_poses(session: Session, file: UploadedFile) -> None:

@@ -48,7 +48,7 @@ _ABOUT_MOUSE = (
 def drag(panel: Fields) -> None:
     """Use of the mouse in the scene, and the ball on the tip that it may drag."""
     session = panel.session
-    eye = lambda: np.array(session.camera.actual().position)  # noqa: E731
+    eye = lambda: np.array(session.camera.actual().position)
     ball = DragBall(session.client.scene, session.drag_to, eye)
     panel.dropdown("mouse", MOUSE, attribute("appearance.mouse"), _ABOUT_MOUSE)
 
@@ -94,7 +94,7 @@ def activation(panel: Fields) -> None:
     follows = "design", "found.tip", "found.pointing", "found.posture"
     panel.text(*follows, content=lambda state, found: tip_text(found, state.design))
     with panel.folder("activation") as folder:
-        ends = lambda state, _: _slider_ends(state.design)  # noqa: E731
+        ends = lambda state, _: _slider_ends(state.design)
         panel.anew(folder, "design", key=ends, build=_sliders)
     rest = "Sets every activation to 0, or the nearest to it"
     panel.change("Rest", lambda state: state.replace(activation=()), rest, **GRAY)
@@ -143,7 +143,7 @@ _NEAR = 1e-4
 def target(panel: Fields) -> None:
     """The target, and the activations that reach it, in the unit of the design."""
     with panel.folder("reach a place") as folder:
-        unit = lambda state, _: state.design.length_unit  # noqa: E731
+        unit = lambda state, _: state.design.length_unit
         panel.anew(folder, "design", key=unit, build=_target)
 
 
@@ -153,7 +153,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
     kind = vector_kind(unit.name, lambda: session.state.design.length)
     straight = tuple(unit.of(arm.base.to_world([0.0, 0.0, arm.length])).tolist())
     field = TypedField(panel.gui, unit.label("target"), straight, "Where the tip should go", kind)
-    aim = lambda _: attempt(session, lambda: session.aim(unit.size * np.array(field.value)))  # noqa: E731
+    aim = lambda _: attempt(session, lambda: session.aim(unit.size * np.array(field.value)))
     panel.kept(field).on_update(aim)
 
     def follow(state: StudioState, _: Found) -> None:
@@ -161,7 +161,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
             field.value = tuple(unit.of(np.array(state.target)).tolist())
 
     panel.follow("target", show=follow)
-    some = lambda _, found: found.answer is not None and len(found.answer) > 0  # noqa: E731
+    some = lambda _, found: found.answer is not None and len(found.answer) > 0
     with panel.folder("activations that reach it", some) as solutions:
         panel.anew(solutions, "found.answer", build=_solutions)
     panel.change(
@@ -178,7 +178,7 @@ def _solutions(panel: Fields, _: object) -> None:
     answer = panel.session.found.answer
     for row in answer.activations if answer is not None else ():
         text = ", ".join(f"{value:.4g}" for value in row)
-        act = lambda row=row: take(panel.session, row)  # noqa: E731
+        act = lambda row=row: take(panel.session, row)
         button = panel.button(text, act, "Moves the arm to this solution")
 
         def mark(state: StudioState, _: Found, row: Any = row, button: Any = button) -> None:
@@ -232,7 +232,7 @@ def path(panel: Fields) -> None:
     session = panel.session
     with panel.folder("follow a path"):
         panel.say(_PATH_HINT)
-        read = lambda file: _read_path(session, file)  # noqa: E731
+        read = lambda file: _read_path(session, file)
         panel.upload("Load a path (CSV)", read, "columns x, y, z [m]", mime_type=".csv,text/csv")
         panel.change(
             "Remove the path",
@@ -281,12 +281,7 @@ def _path_text(state: StudioState, found: Found) -> list[str]:
 
 
 def end_text(track: xr.Dataset, arm: Manipulator) -> str:
-    """End of a path that is followed, and the reason for it, in words.
-
-    Args:
-        track: Result of `track_path`.
-        arm: The design.
-    """
+    """End of a path that `track_path` followed, and the reason for it, in words."""
     count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
     end, way = track.attrs["end"], arm.length_unit.rounded(float(track.end_length))
     if end == "no_start":
@@ -295,7 +290,7 @@ def end_text(track: xr.Dataset, arm: Manipulator) -> str:
         return f"All {points} points are followed: {way} of path."
     reasons = {
         "fold": "the branch turns back (a fold)",
-        "unstable": "the arm loses its stability",
+        "snaps": "the arm snaps to another posture",
         "bound": "{end_bundle} is at its {end_bound} bound",
     }
     reason = reasons[end].format(**track.attrs)

@@ -40,7 +40,7 @@ def view(panel: Fields) -> None:
     axis = attribute("appearance.slice.axis")
     panel.dropdown("slice across", _ACROSS, axis, "Hides all but a slab across this axis")
     with panel.folder("slab", lambda state, _: axis.read(state) != "none") as slab:
-        size = lambda state, _: (state.design.length_unit, state.design.length)  # noqa: E731
+        size = lambda state, _: (state.design.length_unit, state.design.length)
         panel.anew(slab, "design", key=size, build=_center)
 
 
@@ -117,7 +117,7 @@ def _figure(panel: Fields, name: str) -> None:
         old = picture.arm != state.design
         return (picture.text, " · of the design before, computing ..." if old else "")
 
-    shown = lambda state, _: name in state.appearance.plots.shown  # noqa: E731
+    shown = lambda state, _: name in state.appearance.plots.shown
     with panel.folder(_PLOTS[name][0], shown) as folder:
         panel.text("design", f"found.{name}", content=text)
     panel.picture(folder, f"found.{name}", image=lambda _, f: (p := known(f)) and p.image)
