@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.rod.rods import tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
 
@@ -49,9 +49,9 @@ def rest(arm: Manipulator) -> Rest:
     held = arm
     if arm.bundles and not arm.drives:
         held = arm.with_bounds(np.stack([activation, activation], axis=1))
-    held_map = with_unstable(tip_map(held, warn=False))
+    held_map = with_unstable(as_tip_map(held, warn=False))
     (tip,), (status,) = held_map.tips_and_status(activation[None])
-    free = tip_map(held.replace(loads=None)).tips(activation[None])[0]
+    free = as_tip_map(held.replace(loads=None)).tips(activation[None])[0]
     sag = float(np.linalg.norm(tip - free))
     return Rest(
         activation=activation,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
     changes = np.abs(shapes - tab.session.state.activation).max(axis=1)
     here, other = changes.argmin(), changes.argmax()
     assert here != other
-    places = tip_map(arm).frames(shapes[[other]], np.linspace(0.3, 0.9, 31)).position[0]
+    places = as_tip_map(arm).frames(shapes[[other]], np.linspace(0.3, 0.9, 31)).position[0]
     place = next(p for p in places if scene.ghost_under(eye, p - eye) == other)
     tab.page.mouse.click(*tab.screen(place))
     there = tuple(shapes[other])

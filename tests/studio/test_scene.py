@@ -12,7 +12,7 @@ import pytest
 import softreach as sr
 from softreach.arm import Marker, designs
 from softreach.arm.parameters import changed
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.reach import Size, stages
 from softreach.studio.scene.camera import NumberedBox
@@ -161,7 +161,7 @@ def test_a_ghost_is_met_by_a_ray_to_it_but_not_behind_the_arm_or_where_all_meet(
     scene, shapes = Scene(Meshes()), np.array([[-1.0, 0.0, -0.4], [0.0, -1.0, -0.4]])
     scene.draw_arm(trunk, [0.0, 0.0, -1.2])
     scene.draw_ghosts(trunk, shapes)
-    middles = tip_map(trunk).frames(shapes, [0.6 * trunk.length]).position[:, 0] / trunk.length
+    middles = as_tip_map(trunk).frames(shapes, [0.6 * trunk.length]).position[:, 0] / trunk.length
     tips = sr.tip_positions(trunk, shapes) / trunk.length
     for k, (middle, tip) in enumerate(zip(middles, tips, strict=True)):
         eye = middle + np.array([0.3, -3.0, 0.1])

@@ -12,7 +12,7 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.cli.studio import _start, _work
 from softreach.inverse import solve_inverse
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.studio.files import LARGEST
 from softreach.studio.reach import (
     Quality,
@@ -104,7 +104,7 @@ def test_places_counted_once_for_every_activation_make_up_the_volume(revolution,
     counts = sample_values(reach, LEVEL, "multiplicity")
     assert counts.min() >= 1
     assert counts.max() >= 2
-    _, slopes = tip_map(reach.arm).tips_and_slopes(reach.cloud.activation.values)
+    _, slopes = as_tip_map(reach.arm).tips_and_slopes(reach.cloud.activation.values)
     stretch = np.abs(np.linalg.det(slopes)) * np.prod(np.ptp(reach.arm.bounds, axis=1))
     volume, error = reach.exact.volume, reach.exact.volume_error
     assert (stretch / counts).mean() == pytest.approx(volume, abs=error + 0.003 * volume)

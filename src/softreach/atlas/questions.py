@@ -15,7 +15,7 @@ from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN
 from softreach.atlas.reading import EXPLAINED, a_store, an_atlas, command_of, contents, opened_atlas
 from softreach.atlas.store import DAMAGED, DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE, AtlasStore
-from softreach.rod.rods import tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
     as_flag,
@@ -148,7 +148,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     if (status := int(row["status"])) not in KNOWN:
         raise InvalidInput("design", at, "done", f"its status is {status}")
     arm = command.design(int(row["number"]))
-    rod = tip_map(arm, command.tol)
+    rod = as_tip_map(arm, command.tol)
     activation = activations_of(rod, opened["unit_activation"].values)
     drawn: Any = {"seed": command.seed, "sampler": command.sampler, "tol": command.tol}
     if rod.supports_unstable:

@@ -14,7 +14,7 @@ from softreach.optimization.free_parameters import Values
 from softreach.optimization.objectives import SETS, DesignCase
 from softreach.optimization.problem import Problem
 from softreach.requirements.regions import Region
-from softreach.rod.rods import effective, in_steps, refined, tip_map
+from softreach.rod.rods import as_tip_map, effective, in_steps, refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
@@ -57,7 +57,7 @@ class DesignPoint:
     def rods(self) -> tuple[TipMap, ...]:
         """Its tip map under each payload."""
         if not self.like:
-            return tuple(refined(tip_map(arm), _TOL) for arm in self.arms)
+            return tuple(refined(as_tip_map(arm), _TOL) for arm in self.arms)
         pairs = zip(self.arms, self.like, strict=True)
         return tuple(in_steps(arm, rod.steps, rod) for arm, rod in pairs)
 

@@ -13,7 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
 from softreach.optimization.deviations import TOL, FirstOrder, region_places
 from softreach.requirements.requirements import Requirements, Target, with_payload
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.sampling import sample_cube
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
@@ -150,7 +150,7 @@ def tried(count: int) -> Index:
 
 def _starts(first: FirstOrder, places: Array) -> list[Array]:
     """Places of the cube to search from: of all solutions of the design, and of a grid."""
-    box, count = tip_map(first.deviations.arm).box, len(places)
+    box, count = as_tip_map(first.deviations.arm).box, len(places)
     solutions = solve_inverse(first.deviations.arm, places)
     rows = [solutions.nearest_activations]
     for number in range(int(solutions.counts.max(initial=0))):
@@ -169,7 +169,7 @@ def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[A
     places = target.places[tried(len(target.places))]
     within, held = max(target.within, TOL * arm.length), np.ones(len(places), bool)
     for payload in first.needs.payloads or (None,):
-        rod, gaps = tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
+        rod, gaps = as_tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
         for start in starts:
             left = np.flatnonzero(gaps > within)
             if len(left):

@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.optimization.deviations import FirstOrder, Spread, deviations_of
 from softreach.optimization.monte_carlo import ArmsMade, arms_made, tried, with_places, with_region
 from softreach.requirements.requirements import Requirements
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.schema import provenance
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array
@@ -96,7 +96,7 @@ def tolerance(
     checked = as_integer("checked", checked, 0, samples)
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     seed, progress = as_integer("seed", seed, 0), as_progress(progress)
-    if (count := tip_map(deviations.arm).box.dimension) < 3:
+    if (count := as_tip_map(deviations.arm).box.dimension) < 3:
         found = counted(count, "free bundle")
         raise NotPossible(f"a tolerance needs three free bundles or more, and this arm has {found}")
     with no_warnings():

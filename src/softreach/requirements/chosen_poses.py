@@ -13,7 +13,7 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.poses import PoseRules
 from softreach.rod.bending import some_corners
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.sampling import sample_cube
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
@@ -75,7 +75,7 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
         return _without_equilibrium(rules, places)
     best = _best(rules, solutions)
     broken = (best.excess.sum(axis=1) > 0.0) & (solutions.statuses == Status.REACHED)
-    if (tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
+    if (as_tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
         rows = np.flatnonzero(broken)
         with no_warnings():
             family = solve_inverse(

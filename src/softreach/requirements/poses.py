@@ -16,7 +16,7 @@ from softreach.requirements.parts import POSE_LIMITS, Keep, Limits
 from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import worst_inputs
 from softreach.rod.kinematics import configuration
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
@@ -84,7 +84,7 @@ class PoseRules:
     @property
     def rod(self) -> TipMap:
         """The tip map of the arm, whose activations are its inputs."""
-        return tip_map(self.arm) if self.known_rod is None else self.known_rod
+        return as_tip_map(self.arm) if self.known_rod is None else self.known_rod
 
     def judged(self, gamma: Array) -> Judged:
         """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""

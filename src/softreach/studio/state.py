@@ -16,7 +16,7 @@ from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.requirements import Requirements
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
@@ -32,7 +32,7 @@ def rod_of(arm: Manipulator) -> TipMap:
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    return tip_map(arm, TOL, warn=False)  # the page says whether samples are stable
+    return as_tip_map(arm, TOL, warn=False)  # the page says whether samples are stable
 
 
 def design_of_text(text: str, source: str) -> Manipulator:

@@ -10,7 +10,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.paper import printed
 from softreach.paper.claims import Finding, Numbers, Verdict, judged
 from softreach.paper.notebook import Notebook, Settings
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.summary import describe
 from softreach.support.errors import InvalidDesign
 from softreach.workspace import reachable_set
@@ -91,7 +91,7 @@ def _rotation(arm: Manipulator, taper: float, angle: float) -> dict[str, float]:
     """Errors of the printed fiber rotation: from the integral, and near φ = 0 from its limit."""
     from scipy.integrate import quad
 
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     z, radius = 0.7 * rod.length, describe(arm).base_radius
     slope = np.tan(angle) * np.hypot(1, np.tan(taper))
     integral = quad(lambda s: slope / float(rod.radius(s)), 0, z)[0]

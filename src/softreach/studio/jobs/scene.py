@@ -35,7 +35,7 @@ def _draw_arm(given: Given) -> Mapping[str, Any]:
         scene.remove("/arm")
         return {"tip": None, "posture": TipStatus.NO_EQUILIBRIUM}
     if held is not None and held[0] == state.design and held[1].activation == state.activation:
-        rod = held[1].rod  # in its posture
+        rod = held[1].tip_map  # in its posture
     tip = scene.draw_arm(state.design, state.activation, rod=rod)
     known = {"tip": tip if np.isfinite(tip).all() else None, "pointing": scene.pointing}
     if not rod.supports_unstable:
