@@ -111,8 +111,15 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
         cells.set_alpha((np.asarray(cells.get_array()) > 0).astype(float))
     names = cast("tuple[str, str]", plane_of(view))
     across, up = map("xyz".index, names)
-    for curve in curves:
-        ax.plot(*unit.of(curve[:, [across, up]] * arm.length).T, color=_LINE, lw=1.4)
+    lines = [unit.of(curve[:, [across, up]] * arm.length) for curve in curves]
+    for line in lines:
+        ax.plot(*line.T, color=_LINE, lw=1.4)
+    if lines:
+        ends = np.array([part(np.concatenate(lines), axis=0) for part in (np.min, np.max)])
+        (left, low), (right, high) = ends + 0.06 * np.ptp(ends, axis=0).max() * np.array(
+            [[-1], [1]]
+        )
+        ax.set(xlim=(left, right), ylim=(low, high))
     where = f"{plane.axis} = {unit.rounded(at, digits='.3g')}"
     ax.set(xlabel=unit.label(names[0]), ylabel=unit.label(names[1]), aspect="equal")
     ax.set_title(f"section {where}")

@@ -15,20 +15,6 @@ _STATUS = "height:7em;overflow-y:auto"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
 _KEY = "font-size:0.8em;padding:0 0.8em 0.4em"
 _HELP = "cursor:help;text-decoration:underline dotted"
-# A field that is typed into stands where viser has its own beside a slider, which rounds. The
-# button that cancels stands in the corner of the status, so that nothing jumps when it comes.
-_FIELDS = """
-div:has(+ form) > * .mantine-Slider-root + .mantine-NumberInput-root,
-div:has(+ form) .mantine-Slider-root + .mantine-NumberInput-root
-  {visibility:hidden;width:4.6rem !important}
-div:has(.mantine-Slider-root) + form
-  {margin:-2.35em 0 0 auto;width:5.8rem;position:relative;z-index:4}
-div:has(.mantine-Slider-root) + form input {padding:0 0.3em;letter-spacing:-0.5px}
-div:has(.mantine-Slider-root) + form div:has(> * > label):not(:has(input)) {display:none}
-div:has(> [data-softreach]) + div:has(> button)
-  {width:max-content;height:0;padding:0 !important;margin:0 0.5em 0 auto !important;
-  position:relative;top:-2.5em;z-index:4}
-"""
 _ALERT = f"color:var(--alert,#c92a2a);{_SMALL};white-space:pre-line"
 
 _BAR = (
@@ -93,11 +79,6 @@ def inline(*parts: Part) -> str:
 def paragraph(*parts: Part) -> str:
     """A line of text as HTML; nothing without text."""
     return f'<div style="{_LINE}">{inline(*parts)}</div>' if parts else ""
-
-
-def fields_style() -> str:
-    """Style by which a slider and the field for the same number share a row, as HTML."""
-    return f"<style>{_FIELDS}</style>"
 
 
 def status(*lines: str) -> str:

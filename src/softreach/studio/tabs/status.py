@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from softreach.studio import markup
 from softreach.studio.captions import legend_text, loaded_share, reach_text
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.markup import Part, Strong, fields_style
+from softreach.studio.markup import Part, Strong
 from softreach.studio.needs import verdict_text
 from softreach.studio.scene.colors import key_html
 from softreach.studio.widgets import Line, show_where
@@ -31,7 +31,6 @@ class StatusPanel:
     """Numbers, key and notes above all tabs."""
 
     def __init__(self, gui: GuiApi, session: Session) -> None:
-        Line(gui).show(fields_style())
         self._known = Line(gui, "computing ...")
         self._note, self._toast = "", None
         self._cancel = gui.add_button(_CANCEL, visible=False, hint=_ABOUT_CANCEL)
