@@ -22,7 +22,7 @@ from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.work import Budget, OverBudget, all_cores, check_wanted
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.palette import bundle_color
-from softreach.workspace import ReachableSolid
+from softreach.workspace import ReachableSolid, ReachableSurface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,7 +81,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
     Raises:
         InvalidInput: There is no exact set with a surface.
     """
-    if reach.exact is None or not reach.has_surface:
+    if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
         raise InvalidInput("section", reach.refusal or "no volume", "a set with a surface to cut")
     plane, length = _plane(cut, reach.arm), reach.arm.length
     surface = reach.exact.surface()
@@ -115,11 +115,10 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
     for line in lines:
         ax.plot(*line.T, color=_LINE, lw=1.4)
     if lines:
-        ends = np.array([part(np.concatenate(lines), axis=0) for part in (np.min, np.max)])
-        (left, low), (right, high) = ends + 0.06 * np.ptp(ends, axis=0).max() * np.array(
-            [[-1], [1]]
-        )
-        ax.set(xlim=(left, right), ylim=(low, high))
+        points = np.concatenate(lines)
+        room = 0.06 * np.ptp(points, axis=0).max()
+        low, high = points.min(axis=0) - room, points.max(axis=0) + room
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     where = f"{plane.axis} = {unit.rounded(at, digits='.3g')}"
     ax.set(xlabel=unit.label(names[0]), ylabel=unit.label(names[1]), aspect="equal")
     ax.set_title(f"section {where}")

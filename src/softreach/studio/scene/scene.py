@@ -120,11 +120,11 @@ class Scene:
 
     def lines(self, path: str, pieces: Array, color: Color, thickness: float) -> None:
         """Pieces of lines between places [L], shape (n, 2, 3); a piece with NaN is left out."""
-        pieces = pieces[np.isfinite(pieces).all(axis=(1, 2))].astype(np.float32)
+        pieces = pieces[np.isfinite(pieces).all(axis=(1, 2))]
         if not len(pieces):
             self._drop(path)
             return
-        self.api.add_line_segments(path, pieces, color, thickness=thickness)
+        self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
 
     def _mesh(
         self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
