@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, cast
@@ -37,7 +36,7 @@ _INK = "#7d848b"  # legible on white and on black
 _WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
 _VALUES = 9  # of the parameter, beside that of the design
 _MOST_CURVES = 8  # of a path: more are not told apart
-_SECONDS, _PAUSE = 10.0, 0.5  # [s] for each volume, and between two pictures
+_SECONDS = 10.0  # [s] for each volume
 
 
 class Picture(NamedTuple):
@@ -175,13 +174,10 @@ def sweep_pictures(
         parameter: What the slider changes.
         quality: How coarse, and how far off the tips may be.
     """
-    shown, known = time.monotonic(), dict[float, float | None]()
+    known = dict[float, float | None]()
     for value, volume in swept_volumes(arm, parameter, quality):
         known[value] = volume
-        if time.monotonic() - shown > _PAUSE:
-            shown = time.monotonic()
-            yield _sweep_picture(arm, parameter, known, " · computing ...")
-    yield _sweep_picture(arm, parameter, known, "")
+        yield _sweep_picture(arm, parameter, known)
 
 
 def swept_volumes(
@@ -219,7 +215,6 @@ def _sweep_picture(
     arm: Manipulator,
     parameter: ShownParameter,
     known: Mapping[float, float | None],
-    more: str,
 ) -> Picture:
     unit, ax = arm.length_unit, _axes(3.0)
     volumes = {value: known[value] for value in sorted(known) if known[value] is not None}
@@ -230,7 +225,7 @@ def _sweep_picture(
     text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
     if missing:
         text += f" · {missing} values make no design or take too long"
-    return Picture(arm, _pixels(ax), text + more)
+    return Picture(arm, _pixels(ax), text)
 
 
 # The activations along a path of the tip.

@@ -54,7 +54,7 @@ def _color_cloud(state: StudioState, found: Found, tools: Tools) -> Results:
 def _draw_cloud(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
     reach, look = found.reach, state.appearance
     if reach is None:
-        page.scene.remove("/cloud", "/unstable", "/slice")
+        page.scene.remove("/cloud", "/unstable")
         return {}
     key = page.scene.draw_cloud(reach, look)
     draw_axes(page, state, found)
@@ -73,7 +73,7 @@ COMPUTE_REACH = Job(
     _compute_reach,
     _draw_cloud,
     makes=("reach", "key", "slopes"),
-    draws=("/cloud", "/unstable", "/slice"),
+    draws=("/cloud", "/unstable"),
     at_once=False,
 )
 """Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next."""
@@ -87,7 +87,7 @@ DRAW_CLOUD = Job(
     _color_cloud,
     _draw_cloud,
     at_once=False,
-    doing="coloring the points", draws=("/cloud", "/unstable", "/slice"))  # fmt: skip
+    doing="coloring the points", draws=("/cloud", "/unstable"))  # fmt: skip
 """Points in their colors, and the axes around them."""
 
 

@@ -45,6 +45,7 @@ _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which th
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
 """Color and opacity of the reach without loads, and of the one of the kept design."""
+_BEHIND = 2e-3  # [L], by which they lie behind the boundary where both coincide
 _MARK: Color = (235, 90, 0)
 _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _DARK: Color = (30, 30, 30)
@@ -180,7 +181,7 @@ class Scene:
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
         if not shows_cloud(reach, look):
-            self.remove("/cloud", "/unstable", "/slice")
+            self.remove("/cloud", "/unstable")
             return None
         points = cloud_points(reach, look.level)
         coloring = sample_colors(reach, look.level, look.color)
@@ -189,21 +190,7 @@ class Scene:
         self._cut_dots("/cloud", points[stable], coloring.rgb[stable], size)
         marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
         self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, shape="diamond")
-        self._slab(look.slice, points)
         return coloring.key
-
-    def _slab(self, cut: Slice, points: Array) -> None:
-        self.remove("/slice")
-        if cut.axis == "none" or not len(points):
-            return
-        axis = "xyz".index(cut.axis)
-        low, high = points.min(axis=0), points.max(axis=0)
-        corners = np.tile(low, (4, 1))
-        corners[:, axis] = cut.center
-        for other, side in zip([k for k in range(3) if k != axis], ((1, 2), (2, 3)), strict=True):
-            corners[list(side), other] = high[other]
-        faces = np.array([[0, 1, 2], [0, 2, 3]])
-        self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
 
     # Surfaces.
 
@@ -252,8 +239,9 @@ class Scene:
     def _plain_surface(
         self, path: str, reach: Reach, cut: Slice, color: Color, opacity: float
     ) -> None:
-        vertices = reach.sheets.vertices / reach.arm.length
-        skin = sliced(Skin(vertices, reach.sheets.faces, np.zeros_like(vertices)), cut)
+        vertices, faces = reach.sheets.vertices / reach.arm.length, reach.sheets.faces
+        vertices = vertices - _BEHIND * vertex_normals(vertices, faces)
+        skin = sliced(Skin(vertices, faces, np.zeros_like(vertices)), cut)
         self.remove(path)
         if len(skin.faces):
             self._mesh(path, skin.vertices, skin.faces, color, opacity)
