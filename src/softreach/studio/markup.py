@@ -77,8 +77,8 @@ def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
     return (
         f'<div role="img" class="sr-bar" title="{meaning}" aria-label="{inline(text)}: {meaning}" '
         f'style="opacity:{0.4 if faded else 1}"><div>{inline(text)}</div><div>'
-        f'<i class="{side}" style="{side}:50%;width:{50 * min(abs(share), 1.0):.2f}%"></i><i class="middle"></i>'
-        "</div></div>"
+        f'<i class="{side}" style="{side}:50%;width:{50 * min(abs(share), 1.0):.2f}%"></i>'
+        '<i class="middle"></i></div></div>'
     )
 
 

@@ -45,7 +45,7 @@ _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which th
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
 """Color and opacity of the reach without loads, and of the one of the kept design."""
-_BEHIND = 2e-3  # [L], by which they lie behind the boundary where both coincide
+_BEHIND = 3e-3  # by so much smaller they lie behind the boundary where both coincide
 _MARK: Color = (235, 90, 0)
 _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _DARK: Color = (30, 30, 30)
@@ -240,7 +240,8 @@ class Scene:
         self, path: str, reach: Reach, cut: Slice, color: Color, opacity: float
     ) -> None:
         vertices, faces = reach.sheets.vertices / reach.arm.length, reach.sheets.faces
-        vertices = vertices - _BEHIND * vertex_normals(vertices, faces)
+        middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        vertices = middle + (1 - _BEHIND) * (vertices - middle)
         skin = sliced(Skin(vertices, faces, np.zeros_like(vertices)), cut)
         self.remove(path)
         if len(skin.faces):
