@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
@@ -45,7 +45,6 @@ _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which th
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
 """Color and opacity of the reach without loads, and of the one of the kept design."""
-_BEHIND = 3e-3  # by so much smaller they lie behind the boundary where both coincide
 _MARK: Color = (235, 90, 0)
 _PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _DARK: Color = (30, 30, 30)
@@ -204,21 +203,34 @@ class Scene:
             self.remove("/surface")
             return None
         if shows_cloud(reach, look):  # whose colors it would hide
-            self._plain_surface("/surface", reach, look.slice, _SURFACE, 0.35)
+            self._draw_boundary("/surface", reach, look.slice, _SURFACE, 0.35)
             return None
-        coloring, sheets = surface_colors(reach, look.color), reach.sheets
-        vertices = sheets.vertices / reach.arm.length
-        colors = shaded(coloring.rgb, vertex_normals(vertices, sheets.faces)).astype(float)
-        skin = sliced(Skin(vertices, sheets.faces, colors), look.slice)
-        lines = vertices[sheets.lines]
-        inner = in_slice(lines.reshape(-1, 3), look.slice).reshape(-1, 2).all(axis=1)
-        self.remove("/surface")
-        if len(skin.faces):
-            opened = look.slice.axis != "none" or not isinstance(reach.exact, ReachableSolid)
-            ink = _INK[look.dark]
-            data = glb(skin, _CLEAR_SURFACE, lines[inner], ink, both_sides=opened)
-            self.api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
+        coloring, ink = surface_colors(reach, look.color), _INK[look.dark]
+        self._draw_boundary("/surface", reach, look.slice, coloring.rgb, _CLEAR_SURFACE, ink)
         return coloring.key
+
+    def _draw_boundary(
+        self,
+        path: str,
+        reach: Reach,
+        cut: Slice,
+        rgb: ArrayLike,
+        opacity: float,
+        ink: Color | None = None,
+    ) -> None:
+        """What a slice shows of a boundary in RGB of shape (v, 3) or (3,); its lines with ink."""
+        faces, vertices = reach.sheets.faces, reach.sheets.vertices / reach.arm.length
+        colors = np.broadcast_to(np.asarray(rgb, float), vertices.shape)
+        colors = shaded(colors, vertex_normals(vertices, faces)).astype(float)
+        skin = sliced(Skin(vertices, faces, colors), cut)
+        self.remove(path)
+        if not len(skin.faces):
+            return
+        lines = vertices[reach.sheets.lines]
+        drawn = in_slice(lines.reshape(-1, 3), cut).reshape(-1, 2).all(axis=1) & (ink is not None)
+        opened = cut.axis != "none" or not isinstance(reach.exact, ReachableSolid)
+        data = glb(skin, opacity, lines[drawn], ink or _DARK, both_sides=opened)
+        self.api.add_glb(path, data, cast_shadow=False, receive_shadow=False)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
         """Another reach, pale: at "/free" that without loads, at "/reference" of the kept design.
@@ -230,22 +242,11 @@ class Scene:
         if reach is None:
             return
         if reach.has_surface:
-            self._plain_surface(path, reach, cut, color, opacity)
+            self._draw_boundary(path, reach, cut, color, opacity)
             return
         points = cloud_points(reach, 15)
         size = 0.4 * _point_size(len(points))
         self._cut_dots(path, points[in_slice(points, cut)], np.array(color, np.uint8), size)
-
-    def _plain_surface(
-        self, path: str, reach: Reach, cut: Slice, color: Color, opacity: float
-    ) -> None:
-        vertices, faces = reach.sheets.vertices / reach.arm.length, reach.sheets.faces
-        middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        vertices = middle + (1 - _BEHIND) * (vertices - middle)
-        skin = sliced(Skin(vertices, faces, np.zeros_like(vertices)), cut)
-        self.remove(path)
-        if len(skin.faces):
-            self._mesh(path, skin.vertices, skin.faces, color, opacity)
 
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
