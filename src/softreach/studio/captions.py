@@ -32,6 +32,12 @@ _SIZES = {
 }
 _FINEST = 1e-6  # [L^power]: the error of a size that is told at least
 _GAP = "\N{EN SPACE} "
+_MARKS = {
+    TipStatus.UNSTABLE: " unstable: {} of the samples",
+    TipStatus.SNAPS: "snaps on the way, not shown: {}",
+    TipStatus.NO_EQUILIBRIUM: "no equilibrium, not shown: {}",
+    TipStatus.UNDECIDED: "undecided, not shown: {}",
+}
 _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
     TipStatus.UNSTABLE: "an unstable equilibrium: a real arm leaves it",
@@ -99,15 +105,11 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     if reach.arm.loads is None:
         return []
     parts: list[Part] = []
-    if unstable := reach.share(TipStatus.UNSTABLE):
-        parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples {_GAP}"]
-    if snaps := reach.share(TipStatus.SNAPS):
-        parts.append(f"snaps on the way, not shown: {_percent(snaps)} {_GAP}")
-    if lost := reach.share(TipStatus.NO_EQUILIBRIUM):
-        parts.append(f"no equilibrium, not shown: {_percent(lost)} {_GAP}")
-    if undecided := reach.share(TipStatus.UNDECIDED):
-        parts.append(f"undecided, not shown: {_percent(undecided)} {_GAP}")
-    if not (unstable or snaps or lost or undecided):
+    for status, words in _MARKS.items():
+        if share := reach.share(status):
+            marked = [Swatch(UNSTABLE)] if status == TipStatus.UNSTABLE else []
+            parts += [*marked, f"{words.format(_percent(share))} {_GAP}"]
+    if not parts:
         parts.append(f"every sample rests in a stable equilibrium {_GAP}")
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, cast
@@ -22,7 +21,7 @@ from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.work import Budget, OverBudget, all_cores, check_wanted
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.palette import bundle_color
-from softreach.workspace import ReachableSolid
+from softreach.workspace import ReachableSolid, ReachableSurface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +36,7 @@ _INK = "#7d848b"  # legible on white and on black
 _WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
 _VALUES = 9  # of the parameter, beside that of the design
 _MOST_CURVES = 8  # of a path: more are not told apart
-_SECONDS, _PAUSE = 10.0, 0.5  # [s] for each volume, and between two pictures
+_SECONDS = 10.0  # [s] for each volume
 
 
 class Picture(NamedTuple):
@@ -81,7 +80,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
     Raises:
         InvalidInput: There is no exact set with a surface.
     """
-    if reach.exact is None or not reach.has_surface:
+    if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
         raise InvalidInput("section", reach.refusal or "no volume", "a set with a surface to cut")
     plane, length = _plane(cut, reach.arm), reach.arm.length
     surface = reach.exact.surface()
@@ -111,8 +110,14 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
         cells.set_alpha((np.asarray(cells.get_array()) > 0).astype(float))
     names = cast("tuple[str, str]", plane_of(view))
     across, up = map("xyz".index, names)
-    for curve in curves:
-        ax.plot(*unit.of(curve[:, [across, up]] * arm.length).T, color=_LINE, lw=1.4)
+    lines = [unit.of(curve[:, [across, up]] * arm.length) for curve in curves]
+    for line in lines:
+        ax.plot(*line.T, color=_LINE, lw=1.4)
+    if lines:
+        points = np.concatenate(lines)
+        room = 0.06 * np.ptp(points, axis=0).max()
+        low, high = points.min(axis=0) - room, points.max(axis=0) + room
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     where = f"{plane.axis} = {unit.rounded(at, digits='.3g')}"
     ax.set(xlabel=unit.label(names[0]), ylabel=unit.label(names[1]), aspect="equal")
     ax.set_title(f"section {where}")
@@ -169,13 +174,10 @@ def sweep_pictures(
         parameter: What the slider changes.
         quality: How coarse, and how far off the tips may be.
     """
-    shown, known = time.monotonic(), dict[float, float | None]()
+    known = dict[float, float | None]()
     for value, volume in swept_volumes(arm, parameter, quality):
         known[value] = volume
-        if time.monotonic() - shown > _PAUSE:
-            shown = time.monotonic()
-            yield _sweep_picture(arm, parameter, known, " · computing ...")
-    yield _sweep_picture(arm, parameter, known, "")
+        yield _sweep_picture(arm, parameter, known)
 
 
 def swept_volumes(
@@ -213,7 +215,6 @@ def _sweep_picture(
     arm: Manipulator,
     parameter: ShownParameter,
     known: Mapping[float, float | None],
-    more: str,
 ) -> Picture:
     unit, ax = arm.length_unit, _axes(3.0)
     volumes = {value: known[value] for value in sorted(known) if known[value] is not None}
@@ -224,7 +225,7 @@ def _sweep_picture(
     text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
     if missing:
         text += f" · {missing} values make no design or take too long"
-    return Picture(arm, _pixels(ax), text + more)
+    return Picture(arm, _pixels(ax), text)
 
 
 # The activations along a path of the tip.

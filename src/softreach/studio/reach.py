@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
-_NEIGHBORS = 8
+_LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
 _BLOCK = 1 << 13  # targets solved at a time: a tenth of a second, after which others have a turn
 
 Rows = slice | NDArray[np.int64]
@@ -169,7 +169,8 @@ class Reach:
         inward = -_INSIDE * self.arm.length * vertex_normals(sheets.vertices, sheets.faces)
         activation = sheets.activation
         if activation is None:
-            activation = given.values[nearest_samples(self, sheets.vertices)].mean(axis=1)
+            shown = given.values[shown_rows(self, _LEVEL)]
+            activation = shown[nearest_samples(self, sheets.vertices)].mean(axis=1)
         cloud = (
             self.cloud[["tip", "activation"]]
             .drop_vars("status", errors="ignore")
@@ -199,14 +200,13 @@ def shown_rows(reach: Reach, level: int) -> NDArray[np.int64]:
     return np.arange(reach.samples)[shown_samples(reach, level)]
 
 
-def nearest_samples(reach: Reach, points: NDArray[np.float64], level: int = 15) -> Rows:
-    """Numbers of the samples nearest to each point [m], of the 2^level first, shape (n, k)."""
+def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Places among `shown_rows(reach, 15)` of the samples nearest to points [m], shape (n, k)."""
     from scipy.spatial import KDTree
 
-    rows = shown_rows(reach, level)
-    count = min(_NEIGHBORS, len(rows))
-    near = KDTree(reach.cloud.tip.values[rows]).query(points, count)[1]
-    return near.reshape(len(points), count)
+    tips = reach.cloud.tip.values[shown_rows(reach, _LEVEL)]
+    count = min(_NEIGHBORS, len(tips))
+    return KDTree(tips).query(points, count)[1].reshape(len(points), count)
 
 
 def unstable_samples(reach: Reach, level: int) -> NDArray[np.bool_]:

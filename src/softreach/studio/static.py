@@ -169,11 +169,11 @@ def _page(
     unit: LengthUnit,
     title: str,
 ) -> str:
-    """The page, with the design in it that is nearest to the base."""
+    """The page, with the design in the middle of those that there are."""
     known = [k for k, entry in enumerate(entries) if "gap" not in entry]
     if not known:
         raise InvalidInput("designs", entries[0]["gap"], "some that can exist and reach something")
-    first = min(known, key=_distances(space).__getitem__)
+    first = known[len(known) // 2]
     boxes = np.array([entries[k]["box"] for k in known])
     box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     content = json.loads(paths[first].read_text("utf-8").partition(", ")[2].removesuffix(");\n"))
@@ -204,17 +204,6 @@ def _page(
         more=more.replace("@SHEET@", script_text(sheet)),
         scripts="'self' file:",
     ).replace('content="softreach figure"', 'content="softreach static page"', 1)
-
-
-def _distances(space: DesignSpace) -> np.ndarray:
-    """Distance of each design to the base, in ranges of the parameters; of unknown ones to half."""
-    axes, varied = [], space.varied()
-    for name, values in space.parameters:
-        low, high = min(values), max(values)
-        own = varied[name].value(space.base)
-        middle = own if np.isfinite(own) else (low + high) / 2
-        axes.append(np.abs(np.array(values) - middle) / (high - low or 1.0))
-    return np.sum(np.meshgrid(*axes, indexing="ij"), axis=0).ravel()
 
 
 def _slider(

@@ -70,7 +70,7 @@ def draw_axes(given: Given) -> None:
         given.scene.draw_axes(found.reach, found.free if loaded else None)
 
 
-_CLOUD = "/cloud", "/unstable", "/slice"
+_CLOUD = "/cloud", "/unstable"
 
 COMPUTE_REACH = Job(
     "reach",

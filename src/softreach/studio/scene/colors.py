@@ -37,7 +37,7 @@ FAINT = (196, 198, 206)
 _MOST_COUNTS = 8  # numbers of activations that the key tells apart
 _PERCENTILES = (1.0, 99.0)  # beyond which values look like the next ones
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
-_LEVEL = 15  # 2^15 samples, of which the nearest tell what is not known of a surface
+_LEVEL = 15  # of the samples whose neighbors color a surface
 
 
 def color_names(arm: Manipulator) -> dict[str, str]:
@@ -108,7 +108,7 @@ def surface_colors(reach: Reach, color: str) -> Coloring:
         return sample_colors(boundary, LEVELS[-1], color, shares=False)
     values = sample_values(reach, _LEVEL, color)
     if not isinstance(values, str | int):
-        near = nearest_samples(reach, boundary.cloud.tip.values, _LEVEL)
+        near = nearest_samples(reach, boundary.cloud.tip.values)
         values = xr.DataArray(values.values[near].mean(axis=1), dims="sample", attrs=values.attrs)
     return color_samples(boundary.cloud, values)
 

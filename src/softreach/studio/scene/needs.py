@@ -61,5 +61,5 @@ def _draw_places(scene: Scene, check: Check) -> None:
     ways = np.stack([places, nearest], axis=1)[missed]
     scene.lines("/needs/gaps", ways, COLORS["missed"], _FINE)
     for k in missed[:_MOST_LABELS]:
-        text = check.arm.length_unit.rounded(gaps[k], digits=".3g")
+        text = check.arm.length_unit.rounded(float(gaps[k]), digits=".3g")
         add_label(scene.api, f"/needs/label {k}", text, places[k] + [0.0, 0.0, 2.0 * _CROSS])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
@@ -120,11 +120,11 @@ class Scene:
 
     def lines(self, path: str, pieces: Array, color: Color, thickness: float) -> None:
         """Pieces of lines between places [L], shape (n, 2, 3); a piece with NaN is left out."""
-        pieces = pieces[np.isfinite(pieces).all(axis=(1, 2))].astype(np.float32)
+        pieces = pieces[np.isfinite(pieces).all(axis=(1, 2))]
         if not len(pieces):
             self._drop(path)
             return
-        self.api.add_line_segments(path, pieces, color, thickness=thickness)
+        self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
 
     def _mesh(
         self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
@@ -180,7 +180,7 @@ class Scene:
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
         if not shows_cloud(reach, look):
-            self.remove("/cloud", "/unstable", "/slice")
+            self.remove("/cloud", "/unstable")
             return None
         points = cloud_points(reach, look.level)
         coloring = sample_colors(reach, look.level, look.color)
@@ -189,21 +189,7 @@ class Scene:
         self._cut_dots("/cloud", points[stable], coloring.rgb[stable], size)
         marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
         self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, shape="diamond")
-        self._slab(look.slice, points)
         return coloring.key
-
-    def _slab(self, cut: Slice, points: Array) -> None:
-        self.remove("/slice")
-        if cut.axis == "none" or not len(points):
-            return
-        axis = "xyz".index(cut.axis)
-        low, high = points.min(axis=0), points.max(axis=0)
-        corners = np.tile(low, (4, 1))
-        corners[:, axis] = cut.center
-        for other, side in zip([k for k in range(3) if k != axis], ((1, 2), (2, 3)), strict=True):
-            corners[list(side), other] = high[other]
-        faces = np.array([[0, 1, 2], [0, 2, 3]])
-        self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
 
     # Surfaces.
 
@@ -217,21 +203,34 @@ class Scene:
             self.remove("/surface")
             return None
         if shows_cloud(reach, look):  # whose colors it would hide
-            self._plain_surface("/surface", reach, look.slice, _SURFACE, 0.35)
+            self._draw_boundary("/surface", reach, look.slice, _SURFACE, 0.35)
             return None
-        coloring, sheets = surface_colors(reach, look.color), reach.sheets
-        vertices = sheets.vertices / reach.arm.length
-        colors = shaded(coloring.rgb, vertex_normals(vertices, sheets.faces)).astype(float)
-        skin = sliced(Skin(vertices, sheets.faces, colors), look.slice)
-        lines = vertices[sheets.lines]
-        inner = in_slice(lines.reshape(-1, 3), look.slice).reshape(-1, 2).all(axis=1)
-        self.remove("/surface")
-        if len(skin.faces):
-            opened = look.slice.axis != "none" or not isinstance(reach.exact, ReachableSolid)
-            ink = _INK[look.dark]
-            data = glb(skin, _CLEAR_SURFACE, lines[inner], ink, both_sides=opened)
-            self.api.add_glb("/surface", data, cast_shadow=False, receive_shadow=False)
+        coloring, ink = surface_colors(reach, look.color), _INK[look.dark]
+        self._draw_boundary("/surface", reach, look.slice, coloring.rgb, _CLEAR_SURFACE, ink)
         return coloring.key
+
+    def _draw_boundary(
+        self,
+        path: str,
+        reach: Reach,
+        cut: Slice,
+        rgb: ArrayLike,
+        opacity: float,
+        ink: Color | None = None,
+    ) -> None:
+        """What a slice shows of a boundary in RGB of shape (v, 3) or (3,); its lines with ink."""
+        faces, vertices = reach.sheets.faces, reach.sheets.vertices / reach.arm.length
+        colors = np.broadcast_to(np.asarray(rgb, float), vertices.shape)
+        colors = shaded(colors, vertex_normals(vertices, faces)).astype(float)
+        skin = sliced(Skin(vertices, faces, colors), cut)
+        self.remove(path)
+        if not len(skin.faces):
+            return
+        lines = vertices[reach.sheets.lines]
+        drawn = in_slice(lines.reshape(-1, 3), cut).reshape(-1, 2).all(axis=1) & (ink is not None)
+        opened = cut.axis != "none" or not isinstance(reach.exact, ReachableSolid)
+        data = glb(skin, opacity, lines[drawn], ink or _DARK, both_sides=opened)
+        self.api.add_glb(path, data, cast_shadow=False, receive_shadow=False)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
         """Another reach, pale: at "/free" that without loads, at "/reference" of the kept design.
@@ -243,20 +242,11 @@ class Scene:
         if reach is None:
             return
         if reach.has_surface:
-            self._plain_surface(path, reach, cut, color, opacity)
+            self._draw_boundary(path, reach, cut, color, opacity)
             return
         points = cloud_points(reach, 15)
         size = 0.4 * _point_size(len(points))
         self._cut_dots(path, points[in_slice(points, cut)], np.array(color, np.uint8), size)
-
-    def _plain_surface(
-        self, path: str, reach: Reach, cut: Slice, color: Color, opacity: float
-    ) -> None:
-        vertices = reach.sheets.vertices / reach.arm.length
-        skin = sliced(Skin(vertices, reach.sheets.faces, np.zeros_like(vertices)), cut)
-        self.remove(path)
-        if len(skin.faces):
-            self._mesh(path, skin.vertices, skin.faces, color, opacity)
 
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""

@@ -6,12 +6,11 @@ from softreach.studio import markup
 from softreach.studio.captions import legend_text, loaded_share, reach_text
 from softreach.studio.fields import Fields
 from softreach.studio.found import Found
-from softreach.studio.markup import Part, Strong, fields_style
+from softreach.studio.markup import Part, Strong
 from softreach.studio.scene.colors import key_html
 from softreach.studio.session import Session
 from softreach.studio.state import StudioState
 from softreach.studio.tabs.goals import verdict_text
-from softreach.studio.widgets import Line
 
 _HISTORY_HINT = (
     "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
@@ -26,7 +25,6 @@ _WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.compiled", "tab.canceled"
 def status(panel: Fields) -> None:
     """Numbers, key and notes above all tabs; keys of the page press undo and redo."""
     session = panel.session
-    Line(panel.gui).show(fields_style())
     known = "found.reach", "found.free", "found.check", "found.key", "found.refusal"
     panel.html("design", *known, *_WORK, content=lambda _, found: _numbers(session, found))
     cancel = panel.button(
