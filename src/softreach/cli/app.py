@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import traceback
 from contextlib import suppress
-from importlib.metadata import version
 from typing import Annotated, Any, cast
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
+import softreach
 from softreach.cli.console import HelpConsole, console
 from softreach.support.errors import NotPossible, NotWritten, SoftreachError, check_date
 from softreach.support.plugins import importing
@@ -25,7 +25,7 @@ _COMMANDS = (
     (Group("Places", sort_key=-4), ("solve", "track", "equilibria")),
     (Group("Output", sort_key=-3), ("show", "export", "import")),
     (Group("Families", sort_key=-2), ("atlas",)),
-    (_MORE, ("demo", "paper", "warmup")),
+    (_MORE, ("demo", "example", "doctor", "paper", "warmup")),
 )
 _OBJECTS = {
     "import": "import_file",
@@ -65,7 +65,7 @@ Start with
 
     softreach demo --out out
 """,
-    version=lambda: version("softreach"),
+    version=lambda: softreach.__version__,
     exit_on_error=False,
     print_error=False,
     suppress_keyboard_interrupt=False,
