@@ -2,10 +2,9 @@
 
 A fence in `README.md` or `docs/` is one of these, or the test fails:
 
-- `python`: executed, in order, in one namespace per page and a folder that is empty but for the
-  files `tentacle.*`, `three_fibers.toml` and `five_places.toml` of `examples/`. One that cannot be
-  says why in its first line: `# not executed: REASON`. One that begins with a name, `# magnets.py`,
-  is written to a file of this name, from which others can import.
+- `python`: executed, in order, in one namespace per page and a folder that is empty at first. One that
+  cannot be says why in its first line: `# not executed: REASON`. One that begins with a name,
+  `# magnets.py`, is written to a file of this name, from which others can import.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
   `# exit code 2` must fail so, one in `# exit code 1` find a requirement missed, and
   `softreach studio` is ended once it serves its page; with `--static` it ends by itself. Other
@@ -27,7 +26,6 @@ import json
 import math
 import re
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -45,11 +43,6 @@ from softreach.cli.app import run
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-EXAMPLES = [
-    path
-    for pattern in ("tentacle.*", "five_places.toml", "three_fibers.toml")
-    for path in sorted((ROOT / "examples").glob(pattern))
-]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
 FEW = 5_000  # samples
@@ -69,8 +62,6 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    for file in EXAMPLES:
-        shutil.copy(file, tmp_path)
     known = {*sys.modules}
     parsers = [
         CodeBlockParser("python", run_python),
