@@ -121,6 +121,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 types: setup
+	$(BIN)/python -m tools.pages
 	$(BIN)/basedpyright
 
 format: setup
@@ -145,4 +146,4 @@ lock:
 	uv export --quiet --all-extras --all-groups --no-emit-project --no-header --format requirements-txt --output-file requirements.lock
 
 clean:
-	rm -rf .venv $(LOWEST) $(NEWEST) out site .cache
+	rm -rf .venv $(LOWEST) $(NEWEST) out site build .cache

@@ -63,7 +63,7 @@ A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a
 built-in design, such as minimal_trunk; softreach list designs has them all.
 Start with
 
-    softreach demo --out out
+    softreach reach minimal_trunk
 """,
     version=lambda: softreach.__version__,
     exit_on_error=False,
