@@ -62,7 +62,7 @@ class Material(Part):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class MaterialRecord:
     """A material of the library and where its numbers come from."""
 
@@ -90,10 +90,9 @@ def material_record(name: str) -> MaterialRecord:
     Raises:
         InvalidInput: No material has this name.
     """
-    library = _library()
-    if name not in library:
-        allowed = "a material of the library"
-        raise InvalidInput("material", name, allowed, _hint(name, tuple(library)))
+    if name not in (library := _library()):
+        hint = _hint(name, tuple(library))
+        raise InvalidInput("material", name, "a material of the library", hint)
     return library[name]
 
 
@@ -140,9 +139,7 @@ def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
         name=name,
     )
     sources = MappingProxyType(row["sources"])
-    return MaterialRecord(
-        material=material, modulus=row["modulus"], sources=sources, note=row["note"]
-    )
+    return MaterialRecord(material, row["modulus"], sources, row["note"])
 
 
 def _hint(name: object, names: tuple[str, ...]) -> str:

@@ -177,11 +177,7 @@ class Section(Part):
         return [] if same else self.modulus_faults("where materials differ")
 
     def ring(self, which: int | str) -> Ring:
-        """A ring by its index or name.
-
-        Raises:
-            InvalidDesign: There is none.
-        """
+        """A ring by its index or name; raises as `ring_index`."""
         return self.rings[self.ring_index(which)]
 
     def ring_index(self, which: int | str) -> int:
@@ -257,8 +253,7 @@ class Section(Part):
             radius: R2 [m].
         """
         outer = np.asarray(radius, float)
-        area = np.pi * self._sum(_modulus, 2)
-        inertia = np.pi / 4 * self._sum(_modulus, 4)
+        area, inertia = np.pi * self._sum(_modulus, 2), np.pi / 4 * self._sum(_modulus, 4)
         shear = self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
         polar = np.pi / 4 * shear
         return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)

@@ -205,7 +205,8 @@ def _rest_rows(arm: Manipulator) -> Rows:
     upright; nothing where moduli or densities are not known.
     """
     from softreach.arm.base import Base
-    from softreach.arm.loads import GRAVITY, Loads, load_number_faults
+    from softreach.arm.body import load_number_faults
+    from softreach.arm.loads import GRAVITY, Loads
 
     if load_number_faults(arm):
         return {}

@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.loads import load_number
+from softreach.arm.body import load_number
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.loaded.phase import LoadPhase
 from softreach.rod.loaded.postures import Postures
