@@ -19,8 +19,6 @@ from softreach.support.arrays import Array
 from softreach.support.errors import Fault
 from softreach.support.lazy import lazy
 
-__all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic", "values_along"]
-
 _INTERPOLATIONS = ("cubic", "linear")
 
 

@@ -16,7 +16,6 @@ from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault
 from softreach.support.lazy import lazy
 
-__all__ = ["POINTS", "UPRIGHT", "Base", "rotation_matrices"]
 Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
 

@@ -29,21 +29,6 @@ from softreach.support.arrays import Array, as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
-__all__ = [
-    "STRAIGHT",
-    "VERIFIED_LOAD_NUMBER",
-    "Body",
-    "RestShape",
-    "RestStrains",
-    "is_overloaded",
-    "kind_faults",
-    "kinds_in_a_sequence",
-    "load_number",
-    "load_number_faults",
-    "mass",
-    "named_actuators",
-]
-
 VERIFIED_LOAD_NUMBER = 12.0
 """Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["BundleNumbers", "Drive", "drive_faults"]
-
 _FINITE = Range(-MOST, MOST)
 
 

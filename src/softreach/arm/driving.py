@@ -21,17 +21,6 @@ from softreach.support.arrays import Array, Mask
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
-__all__ = [
-    "Driving",
-    "Lengths",
-    "body_of",
-    "cube_corners",
-    "extension_range",
-    "inner_arm",
-    "pilot",
-    "without_dead_zones",
-]
-
 _MOST_CORNERS = 1024
 _INSIDE = 256
 _SAFETY = 1.25  # of the largest tensions that samples reach

@@ -36,8 +36,6 @@ from softreach.support.files.text import write_text
 from softreach.support.lazy import lazy
 from softreach.support.units import UNITS, LengthUnit, as_unit, handy_unit
 
-__all__ = ["Manipulator", "a_manipulator", "scale_warnings"]
-
 _NAMES = 6  # of bundles that `repr` lists
 _LONG, _WIDE = 10.0, 1.0  # m, length and outer radius from which mm may be meant
 _SLENDER = 5.0  # least L/R2(0) of a slender arm

@@ -16,17 +16,6 @@ from softreach.arm.part import Part
 from softreach.support.arguments import as_text
 from softreach.support.errors import Fault, InvalidInput
 
-__all__ = [
-    "LIBRARY_HINT",
-    "Material",
-    "MaterialRecord",
-    "as_material",
-    "material_faults",
-    "material_names",
-    "material_record",
-    "named_material",
-]
-
 LIBRARY_HINT = (
     "the page Materials of the guide lists them, and so does arm.material.material_names()"
 )

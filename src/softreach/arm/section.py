@@ -23,8 +23,6 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
 
-__all__ = ["Layer", "Measured", "Ring", "Section", "Stiffness", "name_faults"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Measured(Part):

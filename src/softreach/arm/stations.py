@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["PLACE", "Located", "Marker", "RigidPiece", "Span", "Stations", "placed"]
-
 Triple = tuple[float, float, float]
 
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))

@@ -44,8 +44,6 @@ from softreach.support.files import toml
 from softreach.support.files.text import read_text
 from softreach.support.files.toml import WRONG, FaultReader, key_text, unknown_key
 
-__all__ = ["LONGEST", "document_of", "read", "text_of"]
-
 LONGEST = 250_000
 """Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
 

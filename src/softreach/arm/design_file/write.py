@@ -16,8 +16,6 @@ from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.files.toml import inline_table, key_text, value_text
 
-__all__ = ["display_text", "render"]
-
 _NAMES = {kind: name for kinds in KINDS.values() for name, kind in kinds.items()}
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
