@@ -37,7 +37,6 @@ from sybil.document import Document
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.markdown import CodeBlockParser
 from sybil.region import Lexeme
-
 from tools.address import SPELLED_OUT, address
 
 import softreach as sr
