@@ -2,8 +2,8 @@
 
 A fence in `README.md` or `docs/` is one of these, or the test fails:
 
-- `python`: executed, in order, in one namespace per page and a folder that is empty at first. One that
-  cannot be says why in its first line: `# not executed: REASON`. One that begins with a name,
+- `python`: executed, in order, in one namespace per page and a folder that is empty at first. One
+  that cannot be says why in its first line: `# not executed: REASON`. One that begins with a name,
   `# magnets.py`, is written to a file of this name, from which others can import.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
   `# exit code 2` must fail so, one in `# exit code 1` find a requirement missed, and
