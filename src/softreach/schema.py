@@ -304,6 +304,15 @@ def storable(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign_coords({name: each.astype(texts) for name, each in names.items()})
 
 
+def stored_names(dataset: xr.Dataset) -> xr.Dataset:
+    """The inverse of `storable`: names that xarray can fill, join and pickle."""
+    names = {name: each for name, each in dataset.coords.items() if each.dtype.kind == "T"}
+    texts = {name: np.array(each.values.tolist(), dtype=str) for name, each in names.items()}
+    return dataset.assign_coords(
+        {name: (each.dims, texts[name], each.attrs) for name, each in names.items()}
+    )
+
+
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     """The tips of a cloud sorted into cubes; those that are no stable equilibria in none.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from functools import partial
 from pathlib import Path
 
@@ -50,6 +51,37 @@ def test_stored_clouds_are_those_of_the_cloud_alone_to_half_a_step(paper):
     assert stored.activation.equals(alone.activation)
     assert np.abs(stored.tip.values - alone.tip.values).max() <= 0.5e-5 * (1 + 1e-9)
     assert stored.attrs == alone.attrs
+
+
+EVERYDAY = {
+    "where": lambda data, dim: data.where(data[dim] == data[dim]),
+    "where drop": lambda data, dim: data.where(data[dim] > data[dim][0], drop=True),
+    "reindex": lambda data, dim: data.reindex({dim: [*data[dim].values, 1e3]}),
+    "merge": lambda data, dim: xr.merge([data, data], compat="override", join="outer"),
+    "fillna": lambda data, dim: data.fillna(0.0),
+    "max": lambda data, dim: data.max(),
+    "mean": lambda data, dim: data.mean(dim),
+    "diff": lambda data, dim: data.diff(dim),
+    "sel": lambda data, dim: data.sel({dim: data[dim][-1]}),
+    "sortby": lambda data, dim: data.sortby(dim, ascending=False),
+    "concat": lambda data, dim: xr.concat([data, data], "again"),
+    "to_dataframe": lambda data, dim: data.drop_dims("sample").to_dataframe(),
+    "pickle": lambda data, dim: pickle.loads(pickle.dumps(data.load())),
+}
+
+
+@pytest.mark.parametrize("operation", EVERYDAY.values(), ids=EVERYDAY)
+def test_an_atlas_that_was_read_is_a_dataset_like_any_other(whole, operation):
+    operation(whole, "taper")._repr_html_()
+
+
+@pytest.mark.parametrize("name", ["where", "where drop", "reindex", "max", "diff", "pickle"])
+def test_so_is_a_cloud(tmp_path, trunk, name):
+    sr.save_cloud(sr.compute_cloud(trunk, 50), tmp_path / "cloud.zarr")
+    cloud = sr.open_cloud(tmp_path / "cloud.zarr")
+    numbered = cloud.assign_coords(sample=np.arange(50.0))
+    EVERYDAY[name](numbered, "sample")._repr_html_()
+    assert cloud.reindex(axis=["z", "none"]).tip.isnull().any()
 
 
 def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
