@@ -84,6 +84,16 @@ def test_so_is_a_cloud(tmp_path, trunk, name):
     assert cloud.reindex(axis=["z", "none"]).tip.isnull().any()
 
 
+def test_a_cloud_of_somebodys_own_actuator_opens_without_its_module(tmp_path, trunk):
+    cloud = sr.compute_cloud(trunk, 50)
+    cloud.attrs["design"] = cloud.attrs["design"].replace('kind = "fiber"', 'kind = "Magnets"')
+    sr.save_cloud(cloud, tmp_path / "cloud.zarr")
+    found = sr.open_cloud(tmp_path / "cloud.zarr")
+    assert sr.convex_hull(found.tip).volume == sr.convex_hull(cloud.tip).volume
+    with pytest.raises(sr.InvalidDesign, match="Magnets.*--import"):
+        sr.cloud.design_of(found)
+
+
 def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
     atlas = build_atlas(small_space(), tmp_path / "a.zarr", keep_clouds=False, **SMALL)
     assert "tip" not in atlas
