@@ -295,6 +295,12 @@ def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
     assert run(["atlas", "best", store, "volume", "--where", "taper_deg<=1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["taper_deg"] == [0.0]
+    design = tmp_path / "best.toml"
+    assert run(["atlas", "best", store, "volume", "--out", str(design)]) == 0
+    best = best_designs(open_atlas(store), "volume")
+    taper = float(best.taper[0])
+    assert sr.Manipulator.load(design) == sr.designs.minimal_trunk(taper=taper)
+    assert run(["atlas", "best", store, "volume", "--where", "volume>=9", "--out", "a.toml"]) == 2
 
 
 def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
