@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from importlib.metadata import version
 from typing import Any, Self
 
@@ -99,6 +99,14 @@ class Command:
         values["metrics"] = tuple(_recorded(metric) for metric in values["metrics"])
         values["space"] = DesignSpace.from_dict(values["space"])
         return cls(**values)
+
+    def continuing(self, begun: Command) -> Self:
+        """This command for a store that another version began: without metrics added since."""
+        if begun.softreach_version == self.softreach_version:
+            return self
+        names = {metric.name for metric in begun.metrics}
+        kept = (m for m in self.metrics if m.name in names or not known_metric(m.name))
+        return replace(self, metrics=tuple(kept), softreach_version=begun.softreach_version)
 
     def differences(self, other: Command) -> list[str]:
         """Differences between this command and another, one line each."""
