@@ -12,11 +12,11 @@ from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements
 from softreach.studio.found import Found
-from softreach.studio.job import Job, Learned, what_follows
-from softreach.studio.jobs import JOBS
+from softreach.studio.jobs import Job, Learned, what_follows
 from softreach.studio.reach import Reach
 from softreach.studio.session import Session
 from softreach.studio.state import Camera, PlotSettings, Slice, StudioState
+from softreach.studio.tabs import JOBS
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import InvalidInput
 from tests.studio.sockets import page

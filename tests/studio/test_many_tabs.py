@@ -16,7 +16,7 @@ import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
 from softreach.inverse.prepared import prepared_map
 from softreach.studio import Studio, work
-from softreach.studio.job import Job
+from softreach.studio.jobs import Job
 from softreach.studio.session import Session
 from tests.studio.sockets import PATIENCE, connected, page, until
 

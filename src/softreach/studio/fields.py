@@ -73,7 +73,7 @@ class Fields:
         self.session, self.gui = session, session.client.gui
         self.message: Line | None = None
         """Where refusals of widgets stand that have no line of their own; else above all tabs."""
-        self._words = words
+        self.words = words
         self._followers: list[_Follower] = []
         self._bindings: list[_Binding] = []
         self._groups: list[_Group] = []
@@ -270,7 +270,7 @@ class Fields:
         try:
             session.update(change, by_widget=widget is not None, goes_on=dragged)
         except SoftreachError as error:
-            refusal = self._words(error)
+            refusal = self.words(error)
             if place is None:
                 session.fail(error)
         with session.lock:

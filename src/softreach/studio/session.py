@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Pull
-from softreach.studio.job import Given, Job, Learned, forgotten, what_follows
+from softreach.studio.jobs import Given, Job, Learned, forgotten, what_follows
 from softreach.studio.reach import cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.scene import Scene, shows_cloud

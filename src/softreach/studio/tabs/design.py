@@ -171,6 +171,7 @@ def arm_parts(panel: Fields) -> None:
         arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
         return refusal(error, part_parameters(arm, known[label]), arm)
 
+    panel.message, panel.words = message, words
     panel.anew(folder, "design", "found.part", key=_chosen, build=build, words=words)
 
 
