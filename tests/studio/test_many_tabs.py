@@ -65,7 +65,7 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
         time.sleep(0.05)
         loaded.set()
 
-    monkeypatch.setattr(softreach.studio.app, "JOBS", (Job("first", ("design",), compute),))
+    monkeypatch.setattr(softreach.studio.app, "JOBS", (Job("first", "design", compute),))
     monkeypatch.setattr(softreach.studio.app, "load_libraries", load)
     with Studio(studio.start) as other, connected(other):
         until(lambda: seen)

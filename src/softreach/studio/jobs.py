@@ -65,19 +65,19 @@ class Job:
     """Work that follows from parts of the state and of what is known; it knows no session."""
 
     name: str
-    depends_on: tuple[str, ...] = ()
-    """Attributes that decide the result: "appearance.arm" of the state, "found.reach" of what is
+    depends_on: str = ""
+    """Attributes that decide the result: "design appearance.arm found.reach", the last of what is
     known; without any the work is done when it is asked for."""
     compute: Callable[[Given], Iterable[Learned]] = lambda _: ()
     """Results, each better than the one before."""
     draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
     """Draws what is known after each result, and takes away what is not; returns what follows only
     from drawing, as fields of `Found`."""
-    wanted: Callable[[StudioState, Found], object] = lambda *_: True
-    """False where there is no use of it; it is done once more when that begins."""
-    makes: tuple[str, ...] = ()
+    wanted: str = ""
+    """Attribute that is false where it is of no use; it is done once more when that begins."""
+    makes: str = ""
     """Fields of `Found` that are forgotten where the work fails."""
-    draws: tuple[str, ...] = ()
+    draws: str = ""
     """Nodes of the scene that are taken away then."""
     at_once: bool = True
     """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
@@ -87,15 +87,20 @@ class Job:
 
     @cached_property
     def _getters(self) -> tuple[attrgetter[Any], attrgetter[Any]]:
-        known = [path.removeprefix("found.") for path in self.depends_on if "found." in path]
-        seen = [path for path in self.depends_on if "found." not in path]
+        paths = self.depends_on.split()
+        known = [path.removeprefix("found.") for path in paths if path.startswith("found.")]
+        seen = [path for path in paths if not path.startswith("found.")]
         same = "__class__", "__class__"  # of two attributes and more there is a tuple
         return attrgetter(*same, *seen), attrgetter(*same, *known)
+
+    def _is_wanted(self, state: StudioState, found: Found) -> bool:
+        owner = found if self.wanted.startswith("found.") else state
+        return not self.wanted or bool(attrgetter(self.wanted.removeprefix("found."))(owner))
 
     def is_stale(self, old: tuple[StudioState, Found], new: tuple[StudioState, Found]) -> bool:
         """True if a change decides another result: of what is known, any other object."""
         (before, known), (after, now) = old, new
-        was, wanted = bool(self.wanted(before, known)), bool(self.wanted(after, now))
+        was, wanted = self._is_wanted(*old), self._is_wanted(*new)
         if not (was and wanted):
             return was != wanted
         of_state, of_found = self._getters
@@ -117,7 +122,7 @@ def what_follows(
 def forgotten(job: Job) -> dict[str, Any]:
     """Fields of `Found` after the job has failed."""
     nothing = Found()
-    return {name: getattr(nothing, name) for name in job.makes}
+    return {name: getattr(nothing, name) for name in job.makes.split()}
 
 
 # The reach of the design
@@ -162,7 +167,7 @@ def _color_cloud(given: Given) -> Results:
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
     reach, look = given.found.reach, given.state.appearance
     if reach is None:
-        given.scene.remove(*_CLOUD)
+        given.scene.remove(*_CLOUD.split())
         return None
     key = given.scene.draw_cloud(reach, look)
     draw_axes(given)
@@ -176,14 +181,14 @@ def draw_axes(given: Given) -> None:
         given.scene.draw_axes(found.reach, found.free if loaded else None)
 
 
-_CLOUD = "/cloud", "/unstable"
+_CLOUD = "/cloud /unstable"
 
 COMPUTE_REACH = Job(
     "reach",
-    ("design", "appearance.level"),
+    "design appearance.level",
     _compute_reach,
     _draw_cloud,
-    makes=("reach", "key", "slopes"),
+    makes="reach key slopes",
     draws=_CLOUD,
     at_once=False,
 )
@@ -191,16 +196,13 @@ COMPUTE_REACH = Job(
 
 DRAW_CLOUD = Job(
     "cloud",
-    (
-        "appearance.level", "appearance.color", "appearance.slice",
-        "appearance.cloud", "appearance.surface",
-    ),
+    "appearance.level appearance.color appearance.slice appearance.cloud appearance.surface",
     _color_cloud,
     _draw_cloud,
     draws=_CLOUD,
     at_once=False,
     doing="coloring the points",
-)  # fmt: skip
+)
 """Points in their colors, and the axes around them."""
 
 
@@ -225,16 +227,14 @@ def _draw_surface(given: Given) -> Mapping[str, Any] | None:
 
 DRAW_SURFACE = Job(
     "surface",
-    (
-        "found.reach", "appearance.surface", "appearance.slice",
-        "appearance.cloud", "appearance.color", "appearance.dark",
-    ),
+    "found.reach appearance.surface appearance.slice appearance.cloud "
+    "appearance.color appearance.dark",
     _color_surface,
     _draw_surface,
-    wanted=lambda state, _: state.appearance.surface,
-    draws=("/surface",),
+    wanted="appearance.surface",
+    draws="/surface",
     at_once=False,
-)  # fmt: skip
+)
 """The exact boundary."""
 
 
@@ -261,7 +261,7 @@ def _differentiate(given: Given) -> Results:
         yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
-DIFFERENTIATE_VOLUME = Job("slopes", ("design", "found.reach"), _differentiate, makes=("slopes",))
+DIFFERENTIATE_VOLUME = Job("slopes", "design found.reach", _differentiate, makes="slopes")
 """Ends of the sliders, and slopes of the volume by them, once nobody drags."""
 
 
@@ -274,10 +274,10 @@ def _cut(given: Given) -> Results:
 
 DRAW_SECTION = Job(
     "section",
-    ("found.reach", "appearance.slice.axis", "appearance.slice.center"),
+    "found.reach appearance.slice.axis appearance.slice.center",
     _cut,
-    wanted=lambda state, _: "section" in state.appearance.plots.shown,
-    makes=("section",),
+    wanted="appearance.section",
+    makes="section",
 )
 """Picture of the section by the plane of the slice."""
 
@@ -291,10 +291,10 @@ def _sweep(given: Given) -> Results:
 
 SWEEP_VOLUME = Job(
     "sweep",
-    ("design", "appearance.plots.parameter"),
+    "design appearance.swept",
     _sweep,
-    wanted=lambda state, _: "sweep" in state.appearance.plots.shown,
-    makes=("sweep",),
+    wanted="appearance.sweep",
+    makes="sweep",
 )
 """Volumes of designs that differ in one parameter."""
 
@@ -329,11 +329,7 @@ def _draw_arm(given: Given) -> Mapping[str, Any]:
 
 
 DRAW_ARM = Job(
-    "arm",
-    ("design", "activation", "appearance.arm"),
-    draw=_draw_arm,
-    makes=("tip", "posture"),
-    draws=("/arm",),
+    "arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture", draws="/arm"
 )
 """The arm in its activation."""
 
@@ -361,18 +357,15 @@ def _look(given: Given) -> None:
 
 FOLLOW_CAMERA = Job(
     "camera",
-    (
-        "appearance.half", "appearance.arm", "appearance.handle",
-        "found.tip", "found.sample", "found.is_dragged",
-    ),
+    "appearance.half appearance.arm appearance.handle found.tip found.sample found.is_dragged",
     _wait,
     _look,
-)  # fmt: skip
+)
 """Cuts away the half of a cloud that hides the arm, and turns the axes to the camera."""
 
 SET_THEME = Job(
     "theme",
-    ("appearance.dark",),
+    "appearance.dark",
     draw=lambda given: theme(given.client.gui, dark=given.state.appearance.dark),
 )
 """Turns the light of the page on or off."""
@@ -392,12 +385,12 @@ def _draw_free(given: Given) -> None:
 
 DRAW_FREE = Job(
     "free",
-    ("unloaded", "appearance.slice"),
+    "unloaded appearance.slice",
     _compute_free,
     _draw_free,
-    wanted=lambda state, _: state.design.loads is not None,
-    makes=("free",),
-    draws=("/free",),
+    wanted="design.loads",
+    makes="free",
+    draws="/free",
 )
 """The reach of a loaded arm without its loads, faint behind the loaded one."""
 
@@ -409,12 +402,12 @@ def _compute_reference(given: Given) -> Results:
 
 DRAW_REFERENCE = Job(
     "reference",
-    ("reference", "appearance.slice"),
+    "reference appearance.slice",
     _compute_reference,
     lambda g: g.scene.draw_beside("/reference", g.found.reference, g.state.appearance.slice),
-    wanted=lambda state, _: state.reference is not None,
-    makes=("reference",),
-    draws=("/reference",),
+    wanted="reference",
+    makes="reference",
+    draws="/reference",
 )
 """The boundary of the design that is kept."""
 
@@ -435,7 +428,16 @@ def _reaches(
 
 
 SCENE_JOBS = (
-    COMPUTE_REACH, DIFFERENTIATE_VOLUME, DRAW_CLOUD, DRAW_SURFACE, DRAW_SECTION, SWEEP_VOLUME,
-    DRAW_ARM, FOLLOW_CAMERA, SET_THEME, DRAW_FREE, DRAW_REFERENCE,
-)  # fmt: skip
+    COMPUTE_REACH,
+    DIFFERENTIATE_VOLUME,
+    DRAW_CLOUD,
+    DRAW_SURFACE,
+    DRAW_SECTION,
+    SWEEP_VOLUME,
+    DRAW_ARM,
+    FOLLOW_CAMERA,
+    SET_THEME,
+    DRAW_FREE,
+    DRAW_REFERENCE,
+)
 """What follows in every tab from its design and its looks."""

@@ -315,7 +315,7 @@ class Session:
             raise
         except Exception:
             self.learn(forgotten(job))
-            self.scene.remove(*job.draws)
+            self.scene.remove(*job.draws.split())
             raise
         finally:
             if job.doing:
@@ -347,7 +347,7 @@ class Session:
             self.keep()
             yield from ()
 
-        return Job("keep", tuple(field.name for field in fields(StudioState)), keep)
+        return Job("keep", " ".join(field.name for field in fields(StudioState)), keep)
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that follows from the state is done; return whether it is."""

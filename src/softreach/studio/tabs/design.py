@@ -324,7 +324,7 @@ def loads(panel: Fields) -> None:
             "Take all loads off",
             lambda state: state.replace(design=state.design.replace(loads=None)),
             "Gravity, payload and all forces",
-            lambda state, _: state.design.loads is not None,
+            "design.loads",
             **GRAY,
         )
         follows = "design", "found.tip", "found.pointing", "found.posture"

@@ -50,7 +50,6 @@ _ALL = "everything"
 def needs(panel: Fields) -> None:
     """Needs of the design, and what it misses of them."""
     session, gui = panel.session, panel.gui
-    wanted = lambda state, _: state.needs
     with panel.folder("requirements"):
         panel.say("Say what the arm is for: what it misses is shown while you change it.")
         about = "A place for the tip, a box for the arm at these places, or a limit"
@@ -79,13 +78,13 @@ def needs(panel: Fields) -> None:
                 part.value = part.options[0]
 
         panel.follow("design", "needs", show=offer)
-        panel.button("Remove", lambda: _remove_need(session, part.value), one, wanted)
+        panel.button("Remove", lambda: _remove_need(session, part.value), one, "needs")
         read = lambda file: read_needs(session, file.name, file.content)
         about = "Requirements as softreach check and softreach search read them"
         panel.upload("Load needs (TOML)", read, about, **GRAY)
         save = lambda: session.send("needs.toml", session.state.needs.encode())
         about = "The needs as a file for softreach check and softreach search"
-        panel.button("Save needs (TOML)", save, about, wanted, **GRAY)
+        panel.button("Save needs (TOML)", save, about, "needs", **GRAY)
 
 
 def verdict(found: Found, state: StudioState) -> str:
@@ -274,7 +273,7 @@ def measured(panel: Fields) -> None:
             "Load measured poses (CSV)", lambda file: _read_poses(session, file), _ABOUT_LOAD
         )
         panel.text("found.bench", content=lambda _, found: _bench_text(found.bench))
-        with panel.folder("samples", lambda _, found: found.bench is not None):
+        with panel.folder("samples", "found.bench"):
             panel.steps(
                 "sample",
                 "found.bench",
@@ -412,12 +411,12 @@ def _draw_needs(given: Given) -> None:
 
 CHECK_NEEDS = Job(
     "needs",
-    ("design", "needs"),
+    "design needs",
     _check,
     _draw_needs,
-    wanted=lambda state, _: state.needs,
-    makes=("check",),
-    draws=("/needs",),
+    wanted="needs",
+    makes="check",
+    draws="/needs",
 )
 """The design against its needs."""
 
@@ -451,12 +450,12 @@ def _draw_sample(given: Given) -> None:
 
 DRAW_SAMPLE = Job(
     "sample",
-    ("design", "activation", "found.bench"),
+    "design activation found.bench",
     _predict,
     _draw_sample,
-    wanted=lambda _, found: found.bench is not None,
-    makes=("sample",),
-    draws=("/sample",),
+    wanted="found.bench",
+    makes="sample",
+    draws="/sample",
 )
 """Measured and predicted markers of a pose, while the arm has its inputs."""
 
@@ -476,7 +475,7 @@ def _fit(given: Given) -> Results:
     yield Learned({"bench": replace(bench, result=result)})
 
 
-FIT_ARM = Job("fit", (), _fit, doing="calibrating")
+FIT_ARM = Job("fit", "", _fit, doing="calibrating")
 """Fits free numbers of the design to all poses."""
 
 JOBS = (CHECK_NEEDS, DRAW_SAMPLE, FIT_ARM)

@@ -175,7 +175,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
         "Clear the target",
         lambda state: state.replace(target=None),
         "Takes target and solutions away",
-        lambda state, _: state.target is not None,
+        "target",
         **GRAY,
     )
 
@@ -244,7 +244,7 @@ def path(panel: Fields) -> None:
             "Remove the path",
             lambda state: state.replace(path=None),
             "and what was found along it",
-            lambda state, _: state.path is not None,
+            "path",
             **GRAY,
         )
         panel.text("design", "path", "found.track", content=_path_text)
@@ -388,12 +388,12 @@ def _draw_answer(given: Given) -> None:
 
 SOLVE_INVERSE = Job(
     "inverse",
-    ("design", "target"),
+    "design target",
     _solve,
     _draw_answer,
-    wanted=lambda state, _: state.target is not None,
-    makes=("answer", "takes_nearest"),
-    draws=("/ghosts", "/target", "/gap"),
+    wanted="target",
+    makes="answer takes_nearest",
+    draws="/ghosts /target /gap",
 )
 """The activations that reach the target, and their shapes."""
 
@@ -426,7 +426,7 @@ def _follow_tip(given: Given) -> Results:
         yield Learned(rested, ends_step=True)
 
 
-DRAG_TIP = Job("drag", ("found.pull",), _follow_tip, makes=("pull", "lag"))
+DRAG_TIP = Job("drag", "found.pull", _follow_tip, makes="pull lag")
 """The arm follows its dragged tip on its branch; where that rests, every branch is looked for."""
 
 
@@ -456,12 +456,12 @@ def _draw_path(given: Given) -> None:
 
 FOLLOW_PATH = Job(
     "path",
-    ("design", "path.points", "path.start"),
+    "design path.points path.start",
     _follow,
     _draw_path,
-    wanted=lambda state, _: state.path is not None,
-    makes=("track",),
-    draws=("/path",),
+    wanted="path",
+    makes="track",
+    draws="/path",
     doing="following the path",
 )
 """The activations along the path, and where the branch ends."""
@@ -479,7 +479,7 @@ def _play(given: Given) -> Results:
         time.sleep(_STEP)
 
 
-PLAY_PATH = Job("play", (), _play)
+PLAY_PATH = Job("play", "", _play)
 """Moves the arm along the path."""
 
 

@@ -189,20 +189,20 @@ def plots(panel: Fields) -> None:
     """Check boxes in the tab; a folder for each plot in the window."""
     panel.say(_HINT)
     for name, (label, hint) in _PLOTS.items():
-        panel.checkbox(label, _switch(name), hint)
+        panel.checkbox(label, attribute(f"appearance.{name}"), hint)
     about = "What changes in the plot of V against a parameter"
     panel.dropdown("parameter", _offered, Attribute(_swept, _sweeping), about)
     window = panel.gui.add_panel(visible=False)
 
     def place(state: StudioState, _: Found) -> None:
-        shown = bool(state.appearance.plots.shown)
+        shown = state.appearance.section or state.appearance.sweep
         if shown and not window.visible:
             window.visible = True
             window.dock_left()  # a page forgets where a hidden window was
             window.set_width(_WIDTH)
         window.visible = shown
 
-    panel.follow("appearance.plots", show=place)
+    panel.follow("appearance", show=place)
     with window.add_tab("Figures"):
         for name in _PLOTS:
             _figure(panel, name)
@@ -219,17 +219,9 @@ def _figure(panel: Fields, name: str) -> None:
         old = picture.arm != state.design
         return (picture.text, " · of the design before, computing ..." if old else "")
 
-    shown = lambda state, _: name in state.appearance.plots.shown
-    with panel.folder(_PLOTS[name][0], shown) as folder:
+    with panel.folder(_PLOTS[name][0], f"appearance.{name}") as folder:  # image before its text
+        panel.picture(folder, f"found.{name}", image=lambda _, f: (p := known(f)) and p.image)
         panel.text("design", f"found.{name}", content=text)
-    panel.picture(folder, f"found.{name}", image=lambda _, f: (p := known(f)) and p.image)
-
-
-def _switch(name: str) -> Attribute:
-    return Attribute(
-        lambda state: name in state.appearance.plots.shown,
-        lambda state, on: state.showing(plots=state.appearance.plots.showing(name, on)),
-    )
 
 
 def _offered(state: StudioState) -> dict[str, str]:
@@ -242,4 +234,4 @@ def _swept(state: StudioState) -> str:
 
 
 def _sweeping(state: StudioState, name: str) -> StudioState:
-    return state.showing(plots=state.appearance.plots.showing("sweep", parameter=name))
+    return state.showing(sweep=True, swept=name)
