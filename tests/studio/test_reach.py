@@ -214,9 +214,11 @@ def test_numbers_of_an_edge_keep_their_distance_in_a_small_picture(eye):
 
 @pytest.mark.parametrize("eye", [(2.1, -3.85, 1.45), (-3, 3, 1), (3, 2, -2), (1.5, -5, 0.9)])
 @pytest.mark.parametrize("focal", [420.0, 600.0, 1200.0])
-def test_the_name_of_an_axis_keeps_its_distance_from_the_number_beside_it(eye, focal):
+def test_numbers_stand_outside_and_the_name_of_an_axis_keeps_its_distance_from_them(eye, focal):
     low, high = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
     box = axes_box(low[None], high[None], camera=eye, focal=focal)
+    texts = np.array([at for _, at in box.labels])
+    assert ((texts < low) | (texts > high)).any(axis=1).all()
     forward = (low + high) / 2 - eye
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, (0.0, 0.0, 1.0))

@@ -73,7 +73,7 @@ def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
         gain: float = 4.0
         turns: int = 3
         angle: float = number("α", "rad", "an angle", default=0.0)
-        share: float = number("s", "", "a share", low=0.0, high=1.0, open_low=True, default=0.8)
+        share: float = number("s", "", "a share", above=0.0, high=1.0, default=0.8)
         width: float = number("w", "m", "a width", low=0.0, default=0.02)
         unknown: float = 0.0
 

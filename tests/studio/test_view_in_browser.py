@@ -78,17 +78,6 @@ def along(tab, axis: int) -> float:
 
 
 @pytest.mark.large
-def test_numbers_stand_outside_of_what_they_number_from_every_side(tab):
-    low, high = tab.session.scene.axes.corners
-    middle = (low + high) / 2
-    for toward in ((2, -4, 1.5), (-3, 3, 1), (3, 2, -2), (-4, -1, -2)):
-        tab.session.scene.axes.turn(middle + np.array(toward))
-        labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
-        places = np.array([label.position for label in labels if label is not None])
-        assert ((places < low) | (places > high)).any(axis=1).all()
-
-
-@pytest.mark.large
 def test_a_saved_picture_is_drawn_anew_over_key_numbers_and_design(tab, tmp_path, monkeypatch):
     from matplotlib.image import imread
 

@@ -10,9 +10,9 @@ from cyclopts import Parameter
 from softreach.cli.atlas import grid_of
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
-from softreach.cli.lengths import check_unit
 from softreach.cli.options import OUTPUT, Overwrite, Unit, refuse
 from softreach.cli.values import Whole
+from softreach.support.units import as_unit
 
 if TYPE_CHECKING:
     from softreach.studio import Start
@@ -91,7 +91,7 @@ def _write_static(
     from softreach.support import progress
     from softreach.support.errors import counted
 
-    check_unit(unit)
+    as_unit(unit or "m", 1.0)
     space = grid_of(design_from(source), vary or [])
     with progress.bar("computing designs", space.size) as step:
         title = Path(source).stem
