@@ -14,7 +14,6 @@ from softreach.requirements import check
 from softreach.requirements.checks import quick_check
 from softreach.studio.found import Sample
 from softreach.studio.job import Given, Job, Learned, Results
-from softreach.studio.scene.needs import draw_needs
 from softreach.studio.state import requirements_of
 from softreach.studio.work import rest
 from softreach.support.errors import SoftreachError, no_warnings
@@ -47,15 +46,11 @@ def _check(given: Given) -> Results:
     yield Learned({"check": made})
 
 
-def _draw_needs(given: Given) -> None:
-    draw_needs(given.scene, given.found.check)
-
-
 CHECK_NEEDS = Job(
     "needs",
     ("design", "needs"),
     _check,
-    _draw_needs,
+    lambda given: given.scene.draw_needs(given.found.check),
     wanted=lambda state, _: state.needs,
     makes=("check",),
     draws=("/needs",),

@@ -17,7 +17,7 @@ from softreach.studio.fields import GRAY, Attribute, Fields
 from softreach.studio.files import LARGEST
 from softreach.studio.found import Bench, Found
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.scene.needs import COLORS
+from softreach.studio.scene.scene import VERDICTS
 from softreach.studio.session import Session
 from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import number_of
@@ -94,7 +94,7 @@ _SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided"
 
 
 def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
-    mark, sign = Swatch(COLORS[finding.verdict]), _SIGNS[finding.verdict]
+    mark, sign = Swatch(VERDICTS[finding.verdict]), _SIGNS[finding.verdict]
     text = _reach_text(check, finding) if finding.kind == "reach" else finding.text
     return mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"
 
