@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, cast
 
@@ -174,10 +174,19 @@ def sweep_pictures(
         parameter: What the slider changes.
         quality: How coarse, and how far off the tips may be.
     """
-    known = dict[float, float | None]()
+    unit, known = arm.length_unit, dict[float, float | None]()
     for value, volume in swept_volumes(arm, parameter, quality):
         known[value] = volume
-        yield _sweep_picture(arm, parameter, known)
+        volumes = {each: known[each] for each in sorted(known) if known[each] is not None}
+        ax = _axes(3.0)
+        ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
+        ax.axvline(parameter.shown, color=_HERE, lw=1.2, ls="--")
+        ax.set(xlabel=parameter.label, ylabel=unit.label("V", 3), xlim=parameter.limits)
+        here, missing = volumes.get(parameter.shown), len(known) - len(volumes)
+        text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
+        if missing:
+            text += f" · {missing} values make no design or take too long"
+        yield Picture(arm, _pixels(ax), text)
 
 
 def swept_volumes(
@@ -209,23 +218,6 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float | None:
             return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
     except (SoftreachError, OverBudget, MemoryError):
         return None
-
-
-def _sweep_picture(
-    arm: Manipulator,
-    parameter: ShownParameter,
-    known: Mapping[float, float | None],
-) -> Picture:
-    unit, ax = arm.length_unit, _axes(3.0)
-    volumes = {value: known[value] for value in sorted(known) if known[value] is not None}
-    ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
-    ax.axvline(parameter.shown, color=_HERE, lw=1.2, ls="--")
-    ax.set(xlabel=parameter.label, ylabel=unit.label("V", 3), xlim=parameter.limits)
-    here, missing = volumes.get(parameter.shown), len(known) - len(volumes)
-    text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
-    if missing:
-        text += f" · {missing} values make no design or take too long"
-    return Picture(arm, _pixels(ax), text)
 
 
 # The activations along a path of the tip.
