@@ -98,6 +98,8 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
     Raises:
         InvalidInput: As `section_curves`.
     """
+    from matplotlib.path import Path
+
     arm, plane = reach.arm, _plane(cut, reach.arm)
     view, at, unit = _VIEWS[plane.axis], plane.center * arm.length, arm.length_unit
     with all_cores:
@@ -114,6 +116,9 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
     for line in lines:
         ax.plot(*line.T, color=_LINE, lw=1.4)
     if lines:
+        inside = Path.make_compound_path(*map(Path, lines))
+        for cells in ax.images:  # which reach beyond the boundary by up to half of one
+            cells.set_clip_path(inside, ax.transData)
         points = np.concatenate(lines)
         room = 0.06 * np.ptp(points, axis=0).max()
         low, high = points.min(axis=0) - room, points.max(axis=0) + room
