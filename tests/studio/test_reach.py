@@ -173,6 +173,16 @@ def test_a_surface_of_four_bundles_has_the_colors_of_the_samples_nearby():
         assert len(surface_colors(reach, color).rgb) == len(reach.sheets.vertices)
 
 
+def test_samples_without_a_tip_tell_nothing_of_a_boundary():
+    *_, reach = stages(designs.redundant_trunk(), 11, SMALL, lambda: None)
+    lost = np.arange(reach.samples) % 3 == 0
+    status = np.where(lost, TipStatus.NO_EQUILIBRIUM, TipStatus.STABLE).astype(np.int8)
+    marked = replace(reach, cloud=schema.with_status(reach.cloud, status))
+    others = replace(reach, cloud=reach.cloud.isel(sample=~lost))
+    wanted = others.boundary.cloud.activation.values
+    np.testing.assert_array_equal(marked.boundary.cloud.activation.values, wanted)
+
+
 def test_a_surface_is_read_back_from_its_file():
     import trimesh
 
