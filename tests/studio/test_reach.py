@@ -351,11 +351,6 @@ def test_a_vector_that_cannot_be_is_refused(lce, field, wrong):
         loaded(lce, **{field: (0.0, wrong, 0.0)})
 
 
-def test_a_state_keeps_its_loads(lce):
-    state = StudioState(design=hanging(lce, 5.0))
-    assert StudioState.from_json(state.to_json()) == state
-
-
 def test_a_loaded_cloud_comes_before_its_volume(lce):
     first, second, fine = stages(hanging(lce, 5.0), 11, SMALL, lambda: None)
     assert (first.exact, first.fine, first.size) == (None, False, None)

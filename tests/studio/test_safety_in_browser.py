@@ -104,14 +104,6 @@ def test_no_text_of_a_file_or_its_name_is_markup(tab, names):
     assert ("color.json" in taken) == ("color.json" in names)
 
 
-def test_an_address_that_names_another_server_opens_no_page(browser, studio):
-    page = browser.new_page()
-    answer = page.goto(f"{studio.url}/?websocket=ws://127.0.0.1:9/x")
-    assert answer.status == 403
-    assert "names another server" in page.content()
-    page.close()
-
-
 @pytest.mark.large
 def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser, studio):
     with socket.create_server(("127.0.0.1", 0)) as elsewhere:
