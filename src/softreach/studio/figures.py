@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, cast
 
@@ -207,22 +208,18 @@ def swept_volumes(
     values = {round(float(value), 9) for value in steps} | {parameter.shown}
     for value in sorted(values, key=lambda value: abs(value - parameter.shown)):
         check_wanted()
-        try:
+        volume = None
+        with suppress(SoftreachError, OverBudget, MemoryError):
             design = changed(arm, {parameter.name: value * parameter.scale})
-        except SoftreachError:
-            yield value, None
-        else:
-            yield value, _volume(design, quality.coarse_accuracy, quality.tol)
+            volume = _volume(design, quality.coarse_accuracy, quality.tol)
+        yield value, volume
 
 
 @lru_cache(maxsize=512)
-def _volume(design: Manipulator, accuracy: float, tol: float) -> float | None:
-    try:
-        with all_cores:
-            solvable_rod(design)
-            return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
-    except (SoftreachError, OverBudget, MemoryError):
-        return None
+def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
+    with all_cores:
+        solvable_rod(design)
+        return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
 
 
 # The activations along a path of the tip.
