@@ -14,6 +14,7 @@ from softreach.atlas.command import Command
 from softreach.atlas.layout import PER_DESIGN, array_plans
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
+from softreach.schema import stored_names
 from softreach.support.arguments import as_dataset, as_given, as_instance, as_path, as_text
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.stores import ARRAYS, DIGEST, READING, Chunk, storage_errors
@@ -134,9 +135,9 @@ def open_atlas(store: StoreLike) -> xr.Dataset:
 
     Returns:
         Dataset over the parameters of a grid [SI units], or over `design`: the metrics (see their
-        attributes), quantiles of curvature, `status`, `message`, `unit_activation`, and `tip` [m]
-        if clouds were kept; as coordinates the parameters, the `length` [m] and the `number` of
-        each design.
+        attributes), quantiles of curvature, `status`, `unit_activation`, and `tip` [m] if clouds
+        were kept; as coordinates the parameters, the `length` [m], and the `number` of each design
+        with the `message` that says why it has no metrics.
 
     Raises:
         InvalidInput: There is no atlas.
@@ -217,6 +218,7 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
     numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
     coordinates["number"] = space.dims, numbers, {"long_name": "number of the design"}
     opened = raw.assign(_variables(store, content)).assign_coords(coordinates)
+    opened = stored_names(opened).set_coords("message")
     opened.encoding["source"] = str(store.location)
     return opened
 
@@ -224,7 +226,7 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
 def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     """Status, messages, and the metrics that were read."""
     command, shape, dims = store.command, store.command.space.shape, store.command.space.dims
-    texts = np.full(command.space.size, "", dtype=np.dtypes.StringDType())
+    texts = np.full(command.space.size, "", dtype=object)
     for index, message in content.messages.items():
         texts[index] = message
     plans = {plan.name: plan.attrs for plan in array_plans(command)}

@@ -155,7 +155,7 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
         try:
             opened.check_arrays()
             with opened.watch.raising(), xr.open_zarr(opened.place, **READING) as stored:
-                cloud = stored.load()
+                cloud = schema.stored_names(stored.load())
         finally:
             opened.check_root()
         for name in (ARRAYS, DIGEST):
