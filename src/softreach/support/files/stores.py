@@ -375,13 +375,11 @@ def foreign_entry(folder: Path) -> str:
         arrays = attributes_of(folder)[ARRAYS]
     except InvalidInput:
         return ROOT if (folder / ROOT).exists() else min(os.listdir(folder), default="")
-    own = {"", *arrays}
-    for parent, folders, files in os.walk(folder):
-        for name in sorted([*folders, *files]):
-            key = Path(parent, name).relative_to(folder).as_posix()
-            # A folder is one of an array, or holds its chunks.
-            chunk = Chunk.of_key(key if name in files or "/" in key else f"{key}/c")
-            if (chunk is None or chunk.array not in own) and not _PARTIAL.search(name):
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() or path.is_symlink():
+            key = path.relative_to(folder).as_posix()
+            chunk = Chunk.of_key(key)
+            if (chunk is None or chunk.array not in {"", *arrays}) and not _PARTIAL.search(key):
                 return key
     return ""
 
