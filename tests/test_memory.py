@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 from softreach.sampling import sample_cube
 from softreach.support import memory
 from softreach.support.errors import SoftreachWarning, no_warnings, warn
@@ -95,7 +95,7 @@ def sparse_hull() -> None:
     sr.concave_hull(cloud.tip.values, alpha=0.01)
 
 
-CAUSES = {"loads": lambda: tip_map(too_soft()), "hull": sparse_hull}
+CAUSES = {"loads": lambda: as_tip_map(too_soft()), "hull": sparse_hull}
 
 
 @pytest.mark.parametrize("cause", CAUSES.values(), ids=CAUSES.keys())

@@ -24,7 +24,7 @@ from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import flat_areas, unreachability
 from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.workspace import ReachableRegion, ReachableSolid, reachable_set
 
 SOFT = Material(young_modulus=2e5, poisson_ratio=0.45)
@@ -97,7 +97,7 @@ def test_two_bundles_have_the_area_that_green_tells():
     arm = planar(pairs=1, chamber=True).with_bounds(((0.0, 8.0), (0.0, 0.0), (0.0, 2e4)))
     found = reachable_set(arm)
     assert isinstance(found, ReachableRegion)
-    rod, edge = tip_map(arm), np.linspace(0.0, 1.0, 4001)
+    rod, edge = as_tip_map(arm), np.linspace(0.0, 1.0, 4001)
     around = np.concatenate([
         np.stack([edge, 0 * edge], 1), np.stack([1 + 0 * edge, edge], 1),
         np.stack([edge[::-1], 1 + 0 * edge], 1), np.stack([0 * edge, edge[::-1]], 1),

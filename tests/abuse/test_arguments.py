@@ -88,9 +88,9 @@ OF_OBJECTS = {
     "Manipulator.with_bounds": ARM.with_bounds,
     "Box.distance": sr.requirements.Box((0, 0, 0), (1, 1, 1)).distance,
     "Requirements.save": sr.Requirements().save,
-    "TipMap.tips": sr.rod.tip_map(ARM).tips,
+    "TipMap.tips": sr.rod.as_tip_map(ARM).tips,
 }
-SHEETS = {"box_over_length", "plot_cloud_sheet", "plot_hull_sheet", "plot_metric_map", "sheet_axes"}
+SHEETS = {"atlas_figures", "plot_cloud_sheet", "plot_hull_sheet", "plot_metric_map"}
 """Functions of an atlas, whose arguments are checked where they are used."""
 
 PUBLIC = {

@@ -177,7 +177,7 @@ def figures(
         out: Folder for the figures.
     """
     from softreach.atlas import open_atlas
-    from softreach.paper.atlas_figures import atlas_figures
+    from softreach.plot import atlas_figures
     from softreach.plot.style import pyplot, save_figure
     from softreach.support.arguments import as_integer
 

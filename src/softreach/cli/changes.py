@@ -137,7 +137,7 @@ def shown_in(unit: str | None, arm: Manipulator) -> Manipulator:
 
 def say_limits(arm: Manipulator) -> None:
     """Warn where the design leaves what the linear law covers."""
-    from softreach.arm.linear_law import law_warning
+    from softreach.arm.lines import law_warning
 
     if text := law_warning(arm):
         warn(text)

@@ -40,7 +40,7 @@ def cloud(
     from time import perf_counter
 
     from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, save_cloud
-    from softreach.rod.rods import tip_map
+    from softreach.rod.rods import as_tip_map
 
     arm = design_from(design, changes, unit)
     out = out or Path(f"{Path(design).stem}.zarr")
@@ -54,7 +54,7 @@ def cloud(
         "samples": (sampling.count, ""),
         "sampler": (arguments["sampler"], ""),
         "seed": (arguments["seed"], ""),
-        "steps per arm": (tip_map(arm, tol).steps, ""),
+        "steps per arm": (as_tip_map(arm, tol).steps, ""),
         "time to compute": (round(seconds, 3), "s"),
         **load_rows(arm),
         **_status_rows(dataset),

@@ -87,7 +87,7 @@ def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> N
 
 
 def _export_filament(arm: Manipulator, out: Path, overwrite: bool, unit: str | None) -> None:
-    from softreach.exchange.activefilaments.definition import FILAMENT_SCRIPT, write_design
+    from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
 
     options.refuse(_OTHER, unit=unit)
     options.check_output(out, FILAMENT_SCRIPT, overwrite)

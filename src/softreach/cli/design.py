@@ -180,8 +180,7 @@ def _rest_rows(arm: Manipulator) -> Rows:
     upright; nothing where moduli or densities are not known.
     """
     from softreach.arm.base import Base
-    from softreach.arm.load_number import load_number_faults
-    from softreach.arm.loads import GRAVITIES, Loads
+    from softreach.arm.loads import GRAVITIES, Loads, load_number_faults
 
     if load_number_faults(arm):
         return {}

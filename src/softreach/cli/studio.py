@@ -64,8 +64,7 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.serve.guard import new_token
-    from softreach.studio.serve.server import check_address, is_local
+    from softreach.studio.serve import check_address, is_local, new_token
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
@@ -101,10 +100,7 @@ def _write_static(
         )
     gaps = f", {counted(written.gaps, 'gap')}" if written.gaps else ""
     console.line(str(written.page))
-    console.line(
-        f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB; "
-        f"{written.computed} computed now"
-    )
+    console.line(f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB")
 
 
 def _warning(*, with_token: bool) -> str:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import base64
 import io
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from html import escape
 from importlib.resources import files
 from os import PathLike
 from typing import Any
@@ -16,7 +18,7 @@ from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
 from softreach.support.quantity import columns
 
-__all__ = ["REPORT", "Report", "Section", "check_libraries"]
+__all__ = ["REPORT", "Report", "Reported", "Section", "check_libraries"]
 
 REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
 """Formats of reports."""
@@ -65,6 +67,9 @@ class Report:
                 lines += section.points
         return "\n  ".join(lines)
 
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write one HTML file, to be read offline.
 
@@ -84,6 +89,20 @@ class Report:
         page = template.render(report=self, parts=list(zip(self.sections, pictures, strict=True)))
         with writing(path, overwrite=overwrite) as file:
             file.write(page.encode())
+
+
+class Reported(ABC):
+    """A result that shows itself by its report."""
+
+    @abstractmethod
+    def report(self) -> Report:
+        """All of it, to be printed, or saved as an .html file."""
+
+    def __repr__(self) -> str:
+        return str(self.report())
+
+    def _repr_html_(self) -> str:
+        return self.report()._repr_html_()
 
 
 def check_libraries() -> None:

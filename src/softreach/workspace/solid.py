@@ -258,11 +258,11 @@ class ReachableSolid(ReachableSet):
 
     @lazy
     def _sheets(self) -> Sheets:
-        rod = self.tip_map
+        tip_map = self.tip_map
         if self.route == "flux":
-            return box_sheets(rod)
-        if isinstance(self.image, Image) and rod.is_smooth and not rod.supports_unstable:
-            return outer_sheets(rod, self.image)
+            return box_sheets(tip_map)
+        if isinstance(self.image, Image) and tip_map.is_smooth and not tip_map.supports_unstable:
+            return outer_sheets(tip_map, self.image)
         return Sheets.of(self.surface())
 
     @lazy
