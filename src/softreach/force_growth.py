@@ -20,9 +20,6 @@ from softreach.rod.activation_box import ActivationBox
 from softreach.rod.loaded.pushing_tip import PushingTip, TipResponse
 from softreach.support.arrays import Array, Mask
 
-__all__ = ["FixedTip", "Grown", "Growth", "Stop"]
-
-
 _FIRST, _LONGEST, _SHORTEST = 0.05, 0.2, 1e-7  # largest change of an activation, of its range
 _AGAIN_FIRST = 0.01  # the same near the end
 _LOCAL = 1e-3  # below it the largest force is near, and bounds alone do not fix it

@@ -14,8 +14,6 @@ from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
-__all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
-
 Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 

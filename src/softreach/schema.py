@@ -22,28 +22,6 @@ if TYPE_CHECKING:
 
     from softreach.geometry.lattice import CellGrid
 
-__all__ = [
-    "AXES",
-    "a_cloud",
-    "a_configuration",
-    "activation_attributes",
-    "activation_symbols",
-    "activation_units",
-    "base_of",
-    "bundle_coordinates",
-    "cell_dataset",
-    "check_cloud",
-    "check_stored_cloud",
-    "cloud_dataset",
-    "configuration_dataset",
-    "frame_of",
-    "is_stable",
-    "provenance",
-    "storable",
-    "tip_cells",
-    "with_status",
-]
-
 AXES = ("x", "y", "z")
 
 

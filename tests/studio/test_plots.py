@@ -6,14 +6,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed
+from softreach.inverse.path import PathStatus
 from softreach.studio.figures import swept_volumes
 from softreach.studio.reach import Quality
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import MOST_POINTS, PlotSettings, StudioState, TipPath
+from softreach.studio.tabs.move import end_text
 from softreach.support.errors import InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
@@ -75,6 +78,15 @@ def test_a_state_keeps_its_path_and_its_plots():
 def test_a_path_that_cannot_be_followed_is_refused(points):
     with pytest.raises(InvalidInput, match="path"):
         TipPath.through(points)
+
+
+@pytest.mark.parametrize("end", [status for status in PathStatus if status > 0])
+def test_every_end_of_a_path_is_said_in_words(end):
+    known = {"status": ("point", [PathStatus.FOLLOWED, end]), "end_length": 0.2}
+    about = {"end": end.name.lower(), "end_bundle": "left", "end_bound": "lower"}
+    text = end_text(xr.Dataset(known, attrs=about), STATE.design)
+    assert text.endswith(".")
+    assert "{" not in text
 
 
 @pytest.mark.parametrize("changes", [{"shown": (1,)}, {"parameter": None}])

@@ -21,16 +21,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.support.arrays import Array, Mask
 
-__all__ = [
-    "Extreme",
-    "bending_at",
-    "bending_stations",
-    "has_exact_bending",
-    "largest_bending",
-    "sharpest_bending",
-    "smallest_bending",
-]
-
 _STATIONS = 101
 _PER_TURN = 24  # stations for each turn of one bundle relative to another
 _FEWEST = 9  # stations between two breakpoints

@@ -1,7 +1,8 @@
 """The body of an arm: what bends, and what acts in it and on it, wherever it is clamped.
 
 A body knows where it is not smooth, how stiff it is and what its bundles are; its tables and
-tensions follow from it alone. A `Manipulator` is a body with a base, drives and markers.
+tensions follow from it alone, and so do its mass and Λ, which says how much loads bend it. A
+`Manipulator` is a body with a base, drives and markers.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN, Actuator, Outline, Resultants
 from softreach.arm.along import Samples, values_along
-from softreach.arm.loads import Loads
+from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.number import number
 from softreach.arm.part import Part, faults_under
 from softreach.arm.profile import Profile
@@ -28,15 +29,11 @@ from softreach.support.arrays import Array, as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
-__all__ = [
-    "STRAIGHT",
-    "Body",
-    "RestShape",
-    "RestStrains",
-    "kind_faults",
-    "kinds_in_a_sequence",
-    "named_actuators",
-]
+VERIFIED_LOAD_NUMBER = 12.0
+"""Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
+
+# Exact for the square of a cubic, which is the mass of a piece of any profile.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -345,3 +342,53 @@ def named_actuators(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
         name = next(name for name in names if name not in taken)
         taken.add(name)
         yield actuator.replace(name=name)
+
+
+def mass(arm: Body) -> float:
+    """Mass of the arm [kg].
+
+    Raises:
+        InvalidDesign: A layer without a density.
+    """
+    inside = (arm.length * x for x in arm.section.breaks)
+    ends = np.array(sorted({0.0, *arm.profile.breakpoints, *inside, arm.length}))
+    half = 0.5 * np.diff(ends)[:, None]
+    z = ends[:-1, None] + half * (1.0 + _NODES)
+    per_length = arm.section.mass_per_length_at(arm.profile, z)
+    return float(np.sum(half * _WEIGHTS * per_length))
+
+
+def load_number(arm: Body) -> float:
+    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-], theory (79).
+
+    Without loads, w is the weight per length at the base under g = 9.81 m/s², and P is 0: Λ is
+    ρ g L³/(E R2²) for a solid arm of one material, and an upright cylinder buckles under its own
+    weight at 1.96. With loads, w is the weight under their gravity and the force per length beside
+    it, P the sum of all other forces, payload included, and of all moments over L. Sizes are added
+    whatever their directions, so that Λ bounds what bends the arm.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
+    """
+    if faults := load_number_faults(arm):
+        raise InvalidDesign(faults)
+    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
+    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
+    stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
+    return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
+
+
+def is_overloaded(arm: Body) -> bool:
+    """The load number is above what was verified, by more than rounding.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
+    """
+    return load_number(arm) > VERIFIED_LOAD_NUMBER * (1 + 1e-9)
+
+
+def load_number_faults(arm: Body) -> list[Fault]:
+    """Faults that keep the load number from being known."""
+    faults = arm.section.modulus_faults("where weight counts")
+    weighs = arm.loads is None or any(arm.loads.gravity)
+    return faults + (arm.section.density_faults("where weight counts") if weighs else [])

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["BundleNumbers", "Drive", "drive_faults"]
-
 _FINITE = Range(-MOST, MOST)
 
 
@@ -133,8 +131,8 @@ class Drive(Part):
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, or with numbers by the names in `numbers`."""
         own = [name for name in self.numbers if name != "dead_zone" and name in changes]
-        named = {name: changes.pop(name) for name in own}  # the size of all gains before one
-        for field, value in named.items():
+        for field in own:  # the size of all gains before one
+            value = changes.pop(field)
             if field == "gain":
                 gains = changes.get("gains", self.gains).items()
                 changes["gains"] = {name: math.copysign(value, gain) for name, gain in gains}

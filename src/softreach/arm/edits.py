@@ -22,21 +22,6 @@ from softreach.arm.material import named_material
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import InvalidInput
 
-__all__ = [
-    "ACTUATOR_KINDS",
-    "ring_label",
-    "with_actuator",
-    "with_actuator_name",
-    "with_actuator_ring",
-    "with_core",
-    "with_material",
-    "with_ring",
-    "with_ring_material",
-    "with_ring_name",
-    "without_actuator",
-    "without_ring",
-]
-
 ACTUATOR_KINDS = ("fiber", "oblique muscle", "radial muscle", "tendon", "chamber")
 
 _EXTENT = np.radians(40)

@@ -17,15 +17,6 @@ from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, as_rows
 from softreach.support.errors import Range
 
-__all__ = [
-    "law_warning",
-    "lengths_of_strains",
-    "limit_shortening",
-    "line_lengths",
-    "line_strains",
-    "pull_error",
-]
-
 _STEP = 1e-5  # of a piece, for derivatives along the arm
 _HALVINGS = 52
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from os import PathLike
-from typing import Any, Self, TypeVar
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +15,8 @@ from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
-from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence
+from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence, mass
 from softreach.arm.drives import Drive, drive_faults
-from softreach.arm.loads import mass
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section, name_faults
@@ -35,10 +35,6 @@ from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, 
 from softreach.support.files.text import write_text
 from softreach.support.lazy import lazy
 from softreach.support.units import UNITS, LengthUnit, as_unit, handy_unit
-
-Made = TypeVar("Made")
-
-__all__ = ["Manipulator", "a_manipulator", "scale_warnings"]
 
 _NAMES = 6  # of bundles that `repr` lists
 _LONG, _WIDE = 10.0, 1.0  # m, length and outer radius from which mm may be meant
@@ -166,21 +162,21 @@ class Manipulator(Body):
             faults.append(Fault("inner_radius", inner, allowed))
         elif allowed.admits(outer) and inner >= outer:
             faults.append(Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m"))
-        cone = {"length": length, "outer_radius": outer_radius, "taper": taper}
-        profile = _part_or_faults(faults, LinearTaper, **cone, tip_radius=tip_radius)
-        matter = {
-            "young_modulus": young_modulus,
-            "poisson_ratio": poisson_ratio,
-            "density": density,
-        }
-        material = _part_or_faults(faults, Material, **matter)
+        radii = {"outer_radius": outer_radius, "tip_radius": tip_radius}
+        profile = partial(LinearTaper, length=length, taper=taper, **radii)
+        matter = {"poisson_ratio": poisson_ratio, "density": density}
+        material = partial(Material, young_modulus=young_modulus, **matter)
+        for part in (profile, material):
+            try:
+                part()
+            except InvalidDesign as error:
+                faults += error.faults
         if activation_bounds is not None:
             faults += bounds_faults(activation_bounds, bundles)
-        if faults or profile is None or material is None:
+        if faults:
             raise InvalidDesign(faults)
-        ring = Ring(inner_ratio=inner_radius / outer_radius, material=material)
-        section = Section(rings=(ring,))
-        arm = cls(profile=profile, section=section, actuators=tuple(actuators))
+        section = Section(rings=(Ring(inner_ratio=inner / outer, material=material()),))
+        arm = cls(profile=profile(), section=section, actuators=tuple(actuators))
         return arm if activation_bounds is None else arm.with_bounds(activation_bounds)
 
     def with_bounds(self, activation_bounds: ArrayLike) -> Self:
@@ -314,19 +310,19 @@ class Manipulator(Body):
 
         They are what is called the activations of the arm in all results.
         """
-        return len(self.drives) + len(self.undriven)
+        return len(self.input_names)
 
     @lazy
     def input_names(self) -> tuple[str, ...]:
         """A name for each input."""
-        names = self.bundle_names
-        return (*(drive.name for drive in self.drives), *(names[k] for k in self.undriven))
+        alone = (self.bundle_names[k] for k in self.undriven)
+        return (*(drive.name for drive in self.drives), *alone)
 
     @lazy
     def input_units(self) -> tuple[str, ...]:
         """The unit of each input."""
-        units = self.bundle_units
-        return (*(drive.unit for drive in self.drives), *(units[k] for k in self.undriven))
+        alone = (self.bundle_units[k] for k in self.undriven)
+        return (*(drive.unit for drive in self.drives), *alone)
 
     @lazy
     def input_bounds(self) -> Array:
@@ -371,14 +367,6 @@ class Manipulator(Body):
 def a_manipulator(name: str, value: object) -> Manipulator:
     """An argument that is a design."""
     return as_instance(name, value, Manipulator, "a Manipulator")
-
-
-def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Made | None:
-    try:
-        return kind(**values)
-    except InvalidDesign as error:
-        faults += error.faults
-        return None
 
 
 def scale_warnings(arm: Manipulator) -> tuple[str, ...]:

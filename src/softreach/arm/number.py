@@ -25,24 +25,6 @@ from softreach.support.arguments import plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import Fault, InvalidInput, Range
 
-__all__ = [
-    "MOST",
-    "NamedFloats",
-    "Number",
-    "Shape",
-    "Station",
-    "alternatives",
-    "as_numbers",
-    "default_of",
-    "fields_of",
-    "is_path_name",
-    "number",
-    "own_fields",
-    "series_faults",
-    "stations",
-    "unit_suffix",
-]
-
 Shape = Literal["single", "along", "triple", "series", "stations", "several"]
 """One number, a function along the arm alone, a vector, several along the arm, their places, or
 several that are none of these."""

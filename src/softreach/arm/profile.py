@@ -22,8 +22,6 @@ from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, Range
 from softreach.support.lazy import lazy
 
-__all__ = ["LinearTaper", "PiecewiseTaper", "Profile", "SampledTaper"]
-
 # Enough for machine precision while a radius changes by less than tenfold between two stations.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEWTON_STEPS = 60

@@ -23,8 +23,6 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
 
-__all__ = ["Layer", "Measured", "Ring", "Section", "Stiffness", "name_faults"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Measured(Part):
@@ -177,11 +175,7 @@ class Section(Part):
         return [] if same else self.modulus_faults("where materials differ")
 
     def ring(self, which: int | str) -> Ring:
-        """A ring by its index or name.
-
-        Raises:
-            InvalidDesign: There is none.
-        """
+        """A ring by its index or name; raises as `ring_index`."""
         return self.rings[self.ring_index(which)]
 
     def ring_index(self, which: int | str) -> int:
@@ -257,8 +251,7 @@ class Section(Part):
             radius: R2 [m].
         """
         outer = np.asarray(radius, float)
-        area = np.pi * self._sum(_modulus, 2)
-        inertia = np.pi / 4 * self._sum(_modulus, 4)
+        area, inertia = np.pi * self._sum(_modulus, 2), np.pi / 4 * self._sum(_modulus, 4)
         shear = self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
         polar = np.pi / 4 * shear
         return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)

@@ -27,16 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-__all__ = [
-    "Centerline",
-    "arm_card",
-    "arm_surface",
-    "bundle_skins",
-    "bundle_surfaces",
-    "inside",
-    "marker_points",
-]
-
 _LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
 _SAME = 1e-9  # of the length, or of R2

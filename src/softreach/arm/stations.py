@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["PLACE", "Located", "Marker", "RigidPiece", "Span", "Stations", "placed"]
-
 Triple = tuple[float, float, float]
 
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
 """Declaration of the place of a named station."""
+
+_PLACE: dict[str, Any] = {"low": 0.0, "named": True}
 
 _SHORTEST = 1e-9  # of L, of a part between two places: below it, places round to one another
 
@@ -124,23 +124,11 @@ class Span(Located):
     end_over_length: float = number("Z1/L", "", "where it ends", above=0.0, high=1.0, default=1.0)
     """Z1/L, where it ends [-]."""
     start: float | str | None = number(
-        "Z0",
-        "m",
-        "where it begins",
-        low=0.0,
-        named=True,
-        instead_of="start_over_length",
-        default=None,
+        "Z0", "m", "where it begins", instead_of="start_over_length", default=None, **_PLACE
     )
     """Z0 [m], or the name of a station of the arm, in place of `start_over_length`."""
     end: float | str | None = number(
-        "Z1",
-        "m",
-        "where it ends",
-        above=0.0,
-        named=True,
-        instead_of="end_over_length",
-        default=None,
+        "Z1", "m", "where it ends", above=0.0, instead_of="end_over_length", default=None, **_PLACE
     )
     """Z1 [m], or the name of a station of the arm, in place of `end_over_length`."""
 
@@ -202,13 +190,7 @@ class Marker(Located):
     )
     """Z/L of its section [-]."""
     station: float | str | None = number(
-        "Z",
-        "m",
-        "where its section is",
-        low=0.0,
-        named=True,
-        instead_of="station_over_length",
-        default=None,
+        "Z", "m", "where its section is", instead_of="station_over_length", default=None, **_PLACE
     )
     """Z [m], or the name of a station of the arm, in place of `station_over_length`."""
     offset: Triple = number(
@@ -232,7 +214,7 @@ def placed(part: Made, stations: Mapping[str, float]) -> Made:
     """
     given = {field: getattr(part, field) for field in part.places}
     names = {
-        field: getattr(place, "name", place)
+        field: place.name if isinstance(place, Station) else place
         for field, place in given.items()
         if isinstance(place, str | Station)
     }

@@ -22,18 +22,6 @@ from softreach.arm.number import fields_of
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
 
-__all__ = [
-    "Tables",
-    "both_sides",
-    "check_extension",
-    "compliance",
-    "ends_over",
-    "jumps",
-    "quadrature",
-    "strain_stations",
-    "tables",
-]
-
 _STATIONS = 101
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _PIECES = 32

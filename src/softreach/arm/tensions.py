@@ -22,8 +22,6 @@ from softreach.arm.tables import quadrature, tables
 from softreach.support.arrays import Array, Mask
 from softreach.support.lazy import lazy
 
-__all__ = ["LengthLaw", "Tensions"]
-
 
 class Tensions(NamedTuple):
     """Tensions of the tendons that are driven by length."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import traceback
 from contextlib import suppress
-from importlib.metadata import version
 from typing import Annotated, Any, cast
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
+import softreach
 from softreach.cli.console import HelpConsole, console
 from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
@@ -24,7 +24,7 @@ _GROUPS = (
     ("Places", "places:solve places:track places:equilibria"),
     ("Output", "cloud:show convert:export convert:import"),
     ("Families", "atlas:atlas"),
-    ("More", "demo:demo demo:paper warmup:warmup"),
+    ("More", "demo:demo demo:example warmup:doctor demo:paper warmup:warmup"),
 )
 """Titles of the help, and commands behind the modules that they are in."""
 MODULES = {
@@ -62,9 +62,9 @@ A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a
 built-in design, such as minimal_trunk; softreach list designs has them all.
 Start with
 
-    softreach demo --out out
+    softreach reach minimal_trunk
 """,
-    version=lambda: version("softreach"),
+    version=lambda: softreach.__version__,
     exit_on_error=False,
     print_error=False,
     suppress_keyboard_interrupt=False,

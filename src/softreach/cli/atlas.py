@@ -153,7 +153,8 @@ def best(
     """
     from softreach.atlas import best_designs, open_atlas
 
-    designs = best_designs(open_atlas(store), metric, smallest=smallest, where=where, count=count)
+    atlas = open_atlas(store)
+    designs = best_designs(atlas, metric, smallest=smallest, where=where or (), count=count)
     console.rows(f"best {metric} of {store}", rows_of(designs), json)
 
 

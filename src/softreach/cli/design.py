@@ -180,7 +180,8 @@ def _rest_rows(arm: Manipulator) -> Rows:
     upright; nothing where moduli or densities are not known.
     """
     from softreach.arm.base import Base
-    from softreach.arm.loads import GRAVITIES, Loads, load_number_faults
+    from softreach.arm.body import load_number_faults
+    from softreach.arm.loads import GRAVITIES, Loads
 
     if load_number_faults(arm):
         return {}

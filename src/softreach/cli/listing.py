@@ -13,7 +13,7 @@ from softreach.cli.values import as_read
 
 listing = App(
     name="list",
-    help="""List designs, materials, actuators, metrics, objectives, or parameters of a design.
+    help="""List designs, examples, materials, actuators, metrics, objectives, or parameters.
 
 Example: softreach list parameters minimal_trunk
 """,
@@ -42,6 +42,25 @@ def designs(*, json: AsJson = False) -> None:
 
 def _summary(documented: object) -> str:
     return (documented.__doc__ or "").strip().partition("\n")[0]
+
+
+@listing.command
+def examples(*, json: AsJson = False) -> None:
+    """List the examples that softreach example writes, with their files.
+
+    Example: softreach list examples
+    """
+    from softreach.cli.demo import examples as known
+
+    records = [
+        {
+            "example": name,
+            "files": " ".join(file.name for file in files),
+            "description": files[0].read_text("utf-8").partition("\n")[0].lstrip("# ").rstrip("."),
+        }
+        for name, files in known().items()
+    ]
+    console.table(records, json)
 
 
 @listing.command

@@ -8,7 +8,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from softreach.arm.loads import load_number, mass
+from softreach.arm.body import load_number, mass
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameters, parameters_by_every_name
 from softreach.optimization.free_parameters import Values

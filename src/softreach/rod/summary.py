@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import Extreme
-from softreach.arm.driving import extension_range
-from softreach.arm.lines import law_warning, line_strains
-from softreach.arm.loads import (
+from softreach.arm.body import (
     VERIFIED_LOAD_NUMBER,
     is_overloaded,
     load_number,
     load_number_faults,
     mass,
 )
+from softreach.arm.driving import extension_range
+from softreach.arm.lines import law_warning, line_strains
 from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension

@@ -26,8 +26,6 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-    from softreach.studio.fields import Fields
-
 __all__ = ["Session"]
 
 Array = NDArray[np.float64]
@@ -59,7 +57,8 @@ class Session:
         """True once there is anything to keep."""
         self.state: StudioState = start.state
         self.found = Found(reach=start.reach)
-        self.panels: list[Fields] = []
+        self.panels: list[Callable[[], None]] = []
+        """Each shows again what has changed."""
         self.revision = 0
         """Number of changes that widgets have to follow, whatever they hold."""
         self.note, self.doing = "", ""
@@ -178,8 +177,8 @@ class Session:
     def show(self) -> None:
         """Let all panels show what has changed."""
         with self.lock:
-            for panel in self.panels:
-                panel.show()
+            for show in self.panels:
+                show()
 
     def say(self, note: str) -> None:
         """Show text to the reader."""

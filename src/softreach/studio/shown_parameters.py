@@ -66,29 +66,24 @@ def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
 # Sliders
 
 
-class _Slider(NamedTuple):
-    label: str
-    low: float
-    high: float
-    step: float
-
-
-_OF_ARM = {
-    "revolution": _Slider("revolution Ω [deg]", 1, 360, 1),
-    "taper": _Slider("taper φ [deg]", -2, 5, 0.05),
-    "radius_ratio": _Slider("inner / outer radius", 0, 1, 0.01),
-    "outer_radius": _Slider("outer radius", 0.02, 0.12, 5e-4),  # of L
-    "extent": _Slider("extent σ [deg]", 2, 120, 1),
-    "lower": _Slider("lowest γ", -4, 0, 0.01),
-    "upper": _Slider("highest γ", -1, 2, 0.01),
+_Slider = tuple[str, float, float, float]
+"""Label, ends and step."""
+_OF_ARM: dict[str, _Slider] = {
+    "revolution": ("revolution Ω [deg]", 1, 360, 1),
+    "taper": ("taper φ [deg]", -2, 5, 0.05),
+    "radius_ratio": ("inner / outer radius", 0, 1, 0.01),
+    "outer_radius": ("outer radius", 0.02, 0.12, 5e-4),  # of L
+    "extent": ("extent σ [deg]", 2, 120, 1),
+    "lower": ("lowest γ", -4, 0, 0.01),
+    "upper": ("highest γ", -1, 2, 0.01),
 }
-_OF_PART = {
-    "bundles": _Slider("bundles of {owner}", 1, 6, 1),
-    "offset": _Slider("offset of {owner} [deg]", 0, 360, 1),
-    "distance_ratio": _Slider("distance of {owner} / outer radius", 0, 1, 0.01),
-    "radius_ratio": _Slider("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
-    "extent": _Slider("extent of {owner} [deg]", 2, 120, 1),
-    "revolution": _Slider("revolution of {owner} [deg]", -360, 360, 1),
+_OF_PART: dict[str, _Slider] = {
+    "bundles": ("bundles of {owner}", 1, 6, 1),
+    "offset": ("offset of {owner} [deg]", 0, 360, 1),
+    "distance_ratio": ("distance of {owner} / outer radius", 0, 1, 0.01),
+    "radius_ratio": ("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
+    "extent": ("extent of {owner} [deg]", 2, 120, 1),
+    "revolution": ("revolution of {owner} [deg]", -360, 360, 1),
 }
 _ONE_FOR_ALL = ("extent", "revolution", "lower", "upper")
 """Fields that have a slider of their own only where parts differ."""
@@ -143,11 +138,9 @@ def _on_slider(
     arm: Manipulator, parameter: Parameter, units: _Units, slider: _Slider
 ) -> ShownParameter:
     more = f"{parameter.meaning}{_MORE.get(parameter.field, '')} (parameter {parameter.name})"
-    shown, label = _shown(arm, parameter, units, parameter.symbol, ""), slider.label
+    shown, (label, low, high, step) = _shown(arm, parameter, units, parameter.symbol, ""), slider
     label, hint = label.replace("{owner}", parameter.owner), f"{shown.label}: {more}"
-    return shown._replace(
-        label=label, hint=hint, low=slider.low, high=slider.high, step=slider.step
-    )
+    return shown._replace(label=label, hint=hint, low=low, high=high, step=step)
 
 
 def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
@@ -177,7 +170,7 @@ def _own_slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slide
         min(ends[1], high - step * allowed.open_high),
     )
     owner = f" of {parameter.owner}" if parameter.owner else ""
-    return _Slider(_titled(f"{parameter.symbol}{owner}", unit), *ends, step)
+    return _titled(f"{parameter.symbol}{owner}", unit), *ends, step
 
 
 def _slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | None:
@@ -188,24 +181,18 @@ def _slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | 
     if fixed and parameter.unit in ("1", "rad", "m") and not outside_arm:
         if parameter.unit == "m":
             scale = float(f"{arm.length / arm.length_unit.size:.12g}")
-            ends = (scale * end for end in fixed[1:])
-            fixed = _Slider(arm.length_unit.label(fixed.label), *ends)
+            low, high, step = (scale * end for end in fixed[1:])
+            fixed = arm.length_unit.label(fixed[0]), low, high, step
         return fixed if math.isfinite(value) else None
     if value == 0 or math.isnan(value):
         return None
-    name = _NAMES.get(parameter.symbol, parameter.symbol)
-    owner = f" of {_owner_name(arm, parameter.owner)}" if parameter.owner else ""
+    name, label = _NAMES.get(parameter.symbol, parameter.symbol), owner_label(parameter.owner)
+    rings = {f"ring {k}": ring.name for k, ring in enumerate(arm.section.rings)}
+    owner = f" of {rings.get(label) or label}" if label else ""
     unit, scale = _unit(parameter, units)
     size = value / scale
     ends = (0.01 if parameter.field == "young_modulus" else 0.0) * size, 2 * size
-    return _Slider(_titled(f"{name}{owner}", unit), min(ends), max(ends), abs(size) / 100)
-
-
-def _owner_name(arm: Manipulator, path: str) -> str:
-    """The part that owns a parameter, a ring by its own name if it has one."""
-    label = owner_label(path)
-    rings = {f"ring {k}": ring.name for k, ring in enumerate(arm.section.rings)}
-    return rings.get(label) or label
+    return _titled(f"{name}{owner}", unit), min(ends), max(ends), abs(size) / 100
 
 
 def owner_label(path: str) -> str:

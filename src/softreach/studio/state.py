@@ -22,8 +22,7 @@ from softreach.support.arrays import as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.toml import tables_of
 
-TOL = 1e-5
-"""Largest tip error, in L: far below a pixel."""
+TOL = 1e-5  # [L], the largest tip error: far below a pixel
 
 
 def rod_of(arm: Manipulator) -> TipMap:
@@ -49,6 +48,9 @@ def design_of_text(text: str, source: str) -> Manipulator:
     return arm
 
 
+_one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
+
+
 def solvable_rod(arm: Manipulator) -> TipMap:
     """The tip map of a design whose loads can be computed; slow the first time for a loaded arm.
 
@@ -56,15 +58,12 @@ def solvable_rod(arm: Manipulator) -> TipMap:
         InvalidInput: The arm is loaded so heavily that no number of steps suffices.
     """
     if arm.loads is not None:
-        with _one_at_a_time:  # jobs that draw and measure the same arm would both try for long
+        with _one_at_a_time:
             solvable = _is_solvable(arm)
         if not solvable:
             allowed = f"such that tips can be computed to {TOL:g} L"
             raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
     return rod_of(arm)
-
-
-_one_at_a_time = threading.Lock()
 
 
 @lru_cache(maxsize=64)
@@ -127,8 +126,7 @@ def _files_in(text: str) -> list[str]:
 
 
 VERSION = 3
-LEVELS = range(12, 22)
-"""The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
+LEVELS = range(12, 22)  # 2^level points: every such prefix of a Sobol sequence is even
 
 MOUSE = {
     "tip": "drags the tip",
@@ -139,8 +137,7 @@ MOUSE = {
 }
 """Uses of the mouse in the scene: name -> what the menu says."""
 
-MOST_POINTS = 2000
-"""Of a path: each is followed, drawn and kept in the state."""
+MOST_POINTS = 2000  # of a path: each is followed, drawn and kept in the state
 
 Vector = tuple[float, float, float]
 

@@ -23,7 +23,7 @@ StaleCheck = Callable[[], None]
 """Raises `Dropped` if what is being done is no longer wanted."""
 
 _PATIENCE = 0.1  # [s], after which whoever waits for a turn looks whether it is still wanted
-_REST, _LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
+_REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
 
 
 class Dropped(Exception):
@@ -140,7 +140,7 @@ def _return_memory(check: StaleCheck) -> None:
     """Return what work has freed; after a minute's rest also what is only kept to be quick."""
     rest(check, _REST)
     return_memory()
-    rest(check, _LONG_REST)
+    rest(check, LONG_REST)
     forget_prepared()
     return_memory()
 

@@ -19,16 +19,6 @@ from softreach.arm.stations import Span
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import Fault, InvalidDesign, Range
 
-__all__ = [
-    "MOST_BUNDLES",
-    "MOST_TURN",
-    "Actuator",
-    "Bounds",
-    "Outline",
-    "PolarActuator",
-    "Resultants",
-    "bounds_faults",
-]
 Bounds = tuple[float, float] | tuple[tuple[float, float], ...]
 
 MOST_TURN = 200 * math.pi

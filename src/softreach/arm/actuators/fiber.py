@@ -21,8 +21,6 @@ from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.support.arrays import Array
 
-__all__ = ["FiberArchitecture", "ObliqueMuscle", "RadialMuscle", "helical_rotation"]
-
 # Enough for machine precision between two samples of an angle.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 

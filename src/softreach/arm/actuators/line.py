@@ -19,8 +19,6 @@ from softreach.arm.section import Section
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault
 
-__all__ = ["Chamber", "LengthTendon", "Tendon"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Tendon(PolarActuator):

@@ -23,8 +23,6 @@ from softreach.arm.section import Ring, Section
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
 
-__all__ = ["RingIntegrals", "SectorActuator", "cone_integrals", "ring_integrals"]
-
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 # The integrands have poles at x = ±i/tan α. Beyond this |tan α| (86.4°) they are so near to a ring

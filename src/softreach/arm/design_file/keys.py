@@ -36,27 +36,6 @@ from softreach.arm.stations import Marker, RigidPiece
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
-__all__ = [
-    "ACTUATORS",
-    "KINDS",
-    "PROFILES",
-    "Key",
-    "Kind",
-    "Place",
-    "WrittenFloat",
-    "degrees_text",
-    "every_kind",
-    "field_keys",
-    "in_file_terms",
-    "in_file_units",
-    "keys_of",
-    "known_kinds",
-    "one_a_path",
-    "own_kind",
-    "own_kinds",
-    "radians",
-]
-
 PROFILES: Mapping[str, type[Profile]] = MappingProxyType(
     {"linear": LinearTaper, "piecewise": PiecewiseTaper, "sampled": SampledTaper}
 )

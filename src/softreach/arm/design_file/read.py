@@ -44,8 +44,6 @@ from softreach.support.files import toml
 from softreach.support.files.text import read_text
 from softreach.support.files.toml import WRONG, FaultReader, key_text, unknown_key
 
-__all__ = ["LONGEST", "document_of", "read", "text_of"]
-
 LONGEST = 250_000
 """Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
 
@@ -136,11 +134,11 @@ class _Reader(FaultReader):
             self._refuse("actuators", f"{len(listed):,} tables", f"must be at most {MOST_BUNDLES}")
             return {}
         fields: dict[str, Any] = {"profile": self._alone("profile", Profile)}
-        for name, raw in self._at_top("materials").items():
+        for name, raw in self._table(self._document, "materials").items():
             path = f"materials.{key_text(name)}"
             self._materials[name] = self._part(Material, raw, path, ("name",), name=name)
         fields["section"] = self._section()
-        places = {"places": self._at_top("stations")}
+        places = {"places": self._table(self._document, "stations")}
         fields["stations"] = self._made(Stations, Place("stations"), places)
         for name in ("actuators", "rigid_pieces", "drives", "markers"):
             fields[name] = self._several(name, LAYOUT[name][1])
@@ -148,7 +146,10 @@ class _Reader(FaultReader):
             del fields["drives"]
         for name in ("loads", "base", "rest"):
             fields[name] = self._alone(name, LAYOUT[name][1])
-        fields["display_unit"], fields["point"] = self._display_unit(), self._document.get("point")
+        display = self._table(self._document, "display")
+        self._check_keys(display, "display", ["unit"])
+        self.places["display_unit"] = Place("display.unit")
+        fields["display_unit"], fields["point"] = display.get("unit"), self._document.get("point")
         return {name: value for name, value in fields.items() if value is not None}
 
     def _alone(self, name: str, kind: type[Part]) -> Any:
@@ -157,7 +158,8 @@ class _Reader(FaultReader):
 
     def _several(self, name: str, kind: type[Part]) -> tuple[Any, ...]:
         """The sound parts of a list of tables, and where they stand by their paths in the arm."""
-        each = [(path, self._any(kind, raw, path)) for path, raw in self._listed(name)]
+        tables = self._tables(self._document, name)
+        each = [(path, self._any(kind, raw, path)) for raw, path in tables]
         sound = [(self.places[path], part) for path, part in each if part is not None]
         parts = [part for _, part in sound]
         names = [each.name for each in named_actuators(parts)] if kind is Actuator else []
@@ -299,23 +301,16 @@ class _Reader(FaultReader):
         return self._refuse(path, raw, _materials_text(raw, [*self._materials]), None)
 
     def _section(self) -> Section | None:
-        rings = [self._part(Ring, raw, path) for path, raw in self._listed("rings")]
+        rings = [self._part(Ring, raw, path) for raw, path in self._tables(self._document, "rings")]
         for k in range(len(rings)):
             path = f"rings[{k}].material"
             self.places.setdefault(path, Place(path, field_keys(Material)))
-        table = self._at_top("section")
+        table = self._table(self._document, "section")
         values, wrong = self._values(Section, table, "section")
         if not rings or None in rings:
             return None
         place = Place("section", field_keys(Section), table)
         return self._made(Section, place, values | {"rings": tuple(rings)}, wrong)
-
-    def _display_unit(self) -> Any:
-        raw = self._at_top("display")
-        for key in (key for key in raw if key != "unit"):
-            self._refuse(f"display.{key_text(key)}", raw[key], unknown_key(key, {"unit": "unit"}))
-        self.places["display_unit"] = Place("display.unit")
-        return raw.get("unit")
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""
@@ -335,20 +330,6 @@ class _Reader(FaultReader):
                 else unknown_key(key, {name: name for name in LAYOUT})
             )
             self._refuse(key_text(key), self._document[key], said)
-
-    def _at_top(self, key: str) -> dict[str, Any]:
-        value = self._document.get(key)
-        return value if isinstance(value, dict) else {}
-
-    def _listed(self, key: str) -> list[tuple[str, dict[str, Any]]]:
-        raw = self._document.get(key)
-        tables = [
-            (f"{key}[{k}]", each) for k, each in enumerate(raw if isinstance(raw, list) else ())
-        ]
-        for path, each in tables:
-            if not isinstance(each, dict):
-                self._refuse(path, each, "must be a table")
-        return [(path, each) for path, each in tables if isinstance(each, dict)]
 
     def _plain(self, value: Any, path: str) -> Any:
         """Lists as tuples, and tables of values along the arm as functions."""

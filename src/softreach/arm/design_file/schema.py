@@ -20,8 +20,6 @@ from softreach.arm.stations import Marker, RigidPiece
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
 
-__all__ = ["json_schema"]
-
 _Schema = dict[str, Any]
 
 _NUMBERS: _Schema = {"type": "array", "items": {"type": "number"}}

@@ -16,25 +16,17 @@ from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.files.toml import inline_table, key_text, value_text
 
-__all__ = ["display_text", "render"]
-
 _NAMES = {kind: name for kinds in KINDS.values() for name, kind in kinds.items()}
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 
-_FIRST = ("name", "unit", "ring", "length", "revolution")
-_LAST = (
-    "taper",
-    "offset",
-    "extent",
-    "bundles",
-    "activation_bounds",
-    "start_over_length",
-    "end_over_length",
-    "start",
-    "end",
+_ORDER = (
+    *("name", "unit", "ring", "length", "revolution"),
+    "",  # what distinguishes a kind
+    *("taper", "offset", "extent", "bundles", "activation_bounds"),
+    *("start_over_length", "end_over_length", "start", "end"),
 )
-"""Order of fields: between these stands what distinguishes a kind."""
+"""Order of fields."""
 
 
 def render(arm: Mapping[str, Any]) -> str:
@@ -128,9 +120,7 @@ def _pairs(part: Part, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str
 
 
 def _rank(field: str) -> int:
-    if field in _FIRST:
-        return _FIRST.index(field) - len(_FIRST)
-    return 1 + _LAST.index(field) if field in _LAST else 0
+    return _ORDER.index(field if field in _ORDER else "")
 
 
 def _text(key: str, value: Any) -> str:

@@ -17,7 +17,8 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.loads import Loads, load_number
+from softreach.arm.body import load_number
+from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.free import (
     ArmRod,

@@ -40,7 +40,7 @@ _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
 _POINTER = 0.012  # radius of what is clicked [L]
-_ROOM = 1.12  # times what would just fill the picture
+_ROOM, _ROOM_UPRIGHT = 1.12, 1.22  # times what would just fill the picture, with its numbers
 _GRAY = 170, 170, 175  # of the axes
 
 
@@ -53,7 +53,8 @@ def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
         direction: From the middle of the box to the camera.
         aspect: Width of the picture over its height.
     """
-    middle, radius = (low + high) / 2, _ROOM * float(np.linalg.norm(high - low)) / 2
+    room = _ROOM_UPRIGHT if aspect < _UPRIGHT else _ROOM
+    middle, radius = (low + high) / 2, room * float(np.linalg.norm(high - low)) / 2
     distance = radius / _half_sine(aspect)
     toward = direction / np.linalg.norm(direction)
     if aspect < _UPRIGHT:  # the sheet of a phone covers the lower half

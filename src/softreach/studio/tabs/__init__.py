@@ -38,7 +38,7 @@ def furnish(session: Session) -> None:
             for declare in declared:
                 panels.append(Fields(session))
                 declare(panels[-1])
-    session.panels = panels
+    session.panels = [panel.show for panel in panels]
 
     @session.client.scene.on_click()
     def _(event: Any) -> None:

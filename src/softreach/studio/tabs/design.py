@@ -298,7 +298,11 @@ def loads(panel: Fields) -> None:
     loaded = panel.session.state.design.loads is not None
     with panel.folder("base and loads", expanded=loaded):
         way = "Which way the straight arm points from its base, in the world"
-        panel.dropdown("base", _WAYS, of_design(_way, _pointing), way)
+        points = of_design(
+            lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
+            lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
+        )
+        panel.dropdown("base", _WAYS, points, way)
         where = "r(0): where the arm is clamped, as x, y, z in the world"
         panel.vector("base at [mm]", base_field("position"), where)
         turn = "ψ: turn of the base about the way the arm points"
@@ -323,17 +327,15 @@ def loads(panel: Fields) -> None:
             **GRAY,
         )
         follows = "design", "found.tip", "found.pointing", "found.posture"
-        panel.text(*follows, content=lambda s, found: tip_text(found, s.design) * _is_loaded(s))
-        panel.text("design", content=lambda state, _: _others(state.design))
+        panel.text(
+            *follows, content=lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+        )
 
+        def others(state: StudioState, _: Found) -> list[str]:
+            more = ", ".join(other_loads(state.design))
+            return [f"From the design file act too: {more}."] if more else []
 
-def _is_loaded(state: StudioState) -> bool:
-    return state.design.loads is not None
-
-
-def _others(arm: Manipulator) -> list[str]:
-    others = ", ".join(other_loads(arm))
-    return [f"From the design file act too: {others}."] if others else []
+        panel.text("design", content=others)
 
 
 def other_loads(arm: Manipulator) -> list[str]:
@@ -349,15 +351,6 @@ def gravity_name(state: StudioState) -> str:
     """Name of the gravity in the list of directions; "" for any other."""
     gravity = (state.design.loads or _NONE).gravity
     return next((name for name, known in GRAVITIES.items() if known == gravity), "")
-
-
-def _way(arm: Manipulator) -> str:
-    """Word for the way that an arm points; "" for a rotation."""
-    return arm.base.points if isinstance(arm.base.points, str) else ""
-
-
-def _pointing(arm: Manipulator, name: str) -> Manipulator:
-    return arm.replace(base=arm.base.replace(points=name)) if name else arm
 
 
 def base_field(name: str) -> Attribute:

@@ -28,7 +28,6 @@ from softreach.support.units import LengthUnit
 if TYPE_CHECKING:
     from viser import UploadedFile
 
-_HINT = "Say what the arm is for: what it misses is shown while you change it."
 _EMPTY = {
     "place to reach": "x, y, z in {unit}; empty: where the tip is",
     "place at the target": "nothing: the target of the tab Move",
@@ -39,13 +38,6 @@ _EMPTY = {
 }
 """Kind of need -> contents of its field, in words."""
 _ALL = "everything"
-_ABOUT = {
-    "add": "A place for the tip, a box for the arm at these places, or a limit",
-    "field": "Numbers with commas between them",
-    "remove": "One of the needs, or all of them",
-    "load": "Requirements as softreach check and softreach search read them",
-    "save": "The needs as a file for softreach check and softreach search",
-}
 
 
 def needs(panel: Fields) -> None:
@@ -53,9 +45,10 @@ def needs(panel: Fields) -> None:
     session, gui = panel.session, panel.gui
     wanted = lambda state, _: state.needs
     with panel.folder("requirements"):
-        panel.say(_HINT)
-        kind = gui.add_dropdown("add", tuple(_EMPTY), hint=_ABOUT["add"])
-        field = gui.add_text("numbers", "", hint=_ABOUT["field"])
+        panel.say("Say what the arm is for: what it misses is shown while you change it.")
+        about = "A place for the tip, a box for the arm at these places, or a limit"
+        kind = gui.add_dropdown("add", tuple(_EMPTY), hint=about)
+        field = gui.add_text("numbers", "", hint="Numbers with commas between them")
         unit = lambda: session.state.design.length_unit.name
         expected = panel.text("design", content=lambda *_: [_EMPTY[kind.value].format(unit=unit())])
         kind.on_update(lambda _: expected.say(_EMPTY[kind.value].format(unit=unit())))
@@ -64,11 +57,12 @@ def needs(panel: Fields) -> None:
             add_need(session, kind.value, field.value)
             field.value = ""
 
-        panel.button("Add to the needs", add, _ABOUT["add"])
+        panel.button("Add to the needs", add, about)
         panel.html("design", "found.check", content=lambda state, found: verdict(found, state))
-        refused = lambda _, found: _refusal(found)
+        refused = lambda _, found: markup.alert(found.check_refusal) if found.check_refusal else ""
         panel.html("found.check_refusal", content=refused)
-        part: Any = gui.add_dropdown("remove", (_ALL,), hint=_ABOUT["remove"], visible=False)
+        one = "One of the needs, or all of them"
+        part: Any = gui.add_dropdown("remove", (_ALL,), hint=one, visible=False)
 
         def offer(state: StudioState, _: Found) -> None:
             parts = tuple(needs_parts(requirements_of(state.needs), state.design.length_unit))
@@ -78,16 +72,13 @@ def needs(panel: Fields) -> None:
                 part.value = part.options[0]
 
         panel.follow("design", "needs", show=offer)
-        remove = lambda: _remove_need(session, part.value)
-        panel.button("Remove", remove, _ABOUT["remove"], wanted)
+        panel.button("Remove", lambda: _remove_need(session, part.value), one, wanted)
         read = lambda file: read_needs(session, file.name, file.content)
-        panel.upload("Load needs (TOML)", read, _ABOUT["load"], **GRAY)
+        about = "Requirements as softreach check and softreach search read them"
+        panel.upload("Load needs (TOML)", read, about, **GRAY)
         save = lambda: session.send("needs.toml", session.state.needs.encode())
-        panel.button("Save needs (TOML)", save, _ABOUT["save"], wanted, **GRAY)
-
-
-def _refusal(found: Found) -> str:
-    return markup.alert(found.check_refusal) if found.check_refusal else ""
+        about = "The needs as a file for softreach check and softreach search"
+        panel.button("Save needs (TOML)", save, about, wanted, **GRAY)
 
 
 def verdict(found: Found, state: StudioState) -> str:
@@ -280,7 +271,9 @@ def calibrate(panel: Fields) -> None:
             panel.steps(
                 "sample",
                 "found.bench",
-                at=lambda _, found: _sample_of(found.bench),
+                at=lambda _, found: (
+                    (found.bench.number, len(found.bench.data) - 1) if found.bench else (0, 1)
+                ),
                 move=lambda number: _step_to(session, number),
                 hint=_ABOUT_SAMPLE,
             )
@@ -291,7 +284,7 @@ def calibrate(panel: Fields) -> None:
             panel.button("Fit", lambda: session.follow("fit"), _ABOUT_FIT)
             panel.html("found.bench", content=lambda _, found: _summary(found.bench))
             about = "Makes the calibrated arm the design; can be undone"
-            fitted = lambda state, found: _fitted(found.bench, state) is not None
+            fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
             panel.button("Apply", lambda: _apply(session), about, fitted)
 
 
@@ -330,17 +323,9 @@ def _step_to(session: Session, number: int) -> None:
         _pose(session, replace(session.found.bench, number=number))
 
 
-def _sample_of(bench: Bench | None) -> tuple[int, int]:
-    """The pose that is shown, and the last."""
-    return (0, 1) if bench is None else (bench.number, len(bench.data) - 1)
-
-
-def _fitted(bench: Bench | None, state: StudioState) -> Any:
-    return None if bench is None else bench.fitted(state.design)
-
-
 def _apply(session: Session) -> None:
-    arm = _fitted(session.found.bench, session.state)
+    bench = session.found.bench
+    arm = bench.fitted(session.state.design) if bench is not None else None
     if arm is None:
         raise InvalidInput("design", "changed since the fit", "the one that was fitted")
     session.update(lambda state: state.replace(design=arm))

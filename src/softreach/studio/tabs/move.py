@@ -85,8 +85,7 @@ def _gap(state: StudioState, found: Found) -> str:
 
 _KINDS = {"N": "tension", "Pa": "pressure"}
 """Kinds of inputs by their units."""
-_MOST = 40
-"""Sliders: a page with hundreds takes minutes to build."""
+_MOST = 40  # sliders: a page with hundreds takes minutes to build
 
 
 def activation(panel: Fields) -> None:
@@ -122,22 +121,20 @@ def _activation(bundle: int) -> Attribute:
 
 def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
     """Label and bounds of every bundle."""
-    inputs = zip(activation_symbols(arm.input_units), arm.input_names, arm.input_units, strict=True)
-    bounds = rod_of(arm).box.bounds
-    return [(_label(*each), *ends) for each, ends in zip(inputs, bounds, strict=True)]
-
-
-def _label(symbol: str, name: str, unit: str) -> str:
-    kind = _KINDS.get(unit)
-    words = f"{symbol} {name}" if kind is None else f"{kind} of {name}"
-    return words if unit == "1" else f"{words} [{unit}]"
+    symbols, units = activation_symbols(arm.input_units), arm.input_units
+    kinds = [_KINDS.get(unit) for unit in units]
+    labels = [
+        (f"{kind} of {name}" if kind else f"{symbol} {name}") + (unit != "1") * f" [{unit}]"
+        for kind, symbol, name, unit in zip(kinds, symbols, arm.input_names, units, strict=True)
+    ]
+    return [(label, *ends) for label, ends in zip(labels, rod_of(arm).box.bounds, strict=True)]
 
 
 # A target, and every activation that reaches it
 
 _TARGET_HINT = "Every activation that reaches a place: drag the tip there, type it, or click."
-_NEAR = 1e-4
-"""Change of activation, in ranges, below which the arm is in a solution."""
+_HERE = "\N{CHECK MARK} "
+_NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
 
 
 def target(panel: Fields) -> None:
@@ -182,10 +179,9 @@ def _solutions(panel: Fields, _: object) -> None:
         button = panel.button(text, act, "Moves the arm to this solution")
 
         def mark(state: StudioState, _: Found, row: Any = row, button: Any = button) -> None:
+            label = button.label.removeprefix(_HERE)
             is_here = _is_near(row, state)
-            button.color = "green" if is_here else None
-            label = ", ".join(f"{value:.4g}" for value in row)
-            button.label = f"\N{CHECK MARK} {label}" if is_here else label
+            button.color, button.label = "green" * is_here or None, _HERE * is_here + label
 
         panel.follow("design", "activation", show=mark)
 

@@ -28,7 +28,10 @@ def status(panel: Fields) -> None:
     known = "found.reach", "found.free", "found.check", "found.key", "found.refusal"
     panel.html("design", *known, *_WORK, content=lambda _, found: _numbers(session, found))
     cancel = panel.button(
-        _CANCEL, lambda: (session.cancel if session.busy else session.resume)(), _ABOUT_CANCEL
+        _CANCEL,
+        lambda: (session.cancel if session.busy else session.resume)(),
+        _ABOUT_CANCEL,
+        visible=False,
     )
 
     def offer(_: StudioState, found: Found) -> None:
