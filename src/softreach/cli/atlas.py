@@ -162,7 +162,9 @@ def best(
     """
     from softreach.atlas import best_designs, open_atlas
 
-    designs = best_designs(open_atlas(store), metric, smallest=smallest, where=where, count=count)
+    designs = best_designs(
+        open_atlas(store), metric, smallest=smallest, where=where or (), count=count
+    )
     columns = {str(name): column for name, column in designs.variables.items()}
     rows: Rows = {
         name: as_read(column.values, str(column.attrs.get("units", "1")))
