@@ -75,9 +75,6 @@ def plot_cloud(
         box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
         unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the cloud knows it, else m.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: Unknown view, bundle, color or unit, or no finite tip.
         MissingExtra: matplotlib is not installed.
@@ -146,9 +143,6 @@ def plot_slab(
         key: As in `plot_cloud`.
         box: As in `plot_cloud`.
         unit: As in `plot_cloud`.
-
-    Returns:
-        The axes, in that unit.
 
     Raises:
         InvalidInput: Not a view along an axis, unknown color, or no tip in the slab.

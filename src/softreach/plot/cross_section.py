@@ -63,9 +63,6 @@ def plot_cross_section(
             materials, or bundles other than fibers.
         unit: As in `plot_arm`.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: A station off the arm.
         MissingExtra: matplotlib is not installed.
