@@ -16,7 +16,7 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
-from softreach.rod.rods import tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
@@ -78,7 +78,7 @@ class Intermediates:
     @cached_property
     def rod(self) -> TipMap:
         """The tip map of the design, to the tolerance of the command."""
-        return tip_map(self.arm, self.command.tol)
+        return as_tip_map(self.arm, self.command.tol)
 
     @cached_property
     def tips(self) -> Array:

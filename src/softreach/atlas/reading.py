@@ -19,7 +19,7 @@ from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN, array_plans
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
-from softreach.rod.rods import tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
     as_dataset,
@@ -204,7 +204,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     if (status := int(row["status"])) not in KNOWN:
         raise InvalidInput("design", at, "done", f"its status is {status}")
     arm = command.space.design(int(row["number"]))
-    rod = tip_map(arm, command.tol)
+    rod = as_tip_map(arm, command.tol)
     activation = activations_of(rod, opened["unit_activation"].values)
     drawn: Any = {"seed": command.seed, "sampler": command.sampler, "tol": command.tol}
     if rod.supports_unstable:

@@ -108,7 +108,7 @@ def reproduce_paper(
         NotWritten: The folder cannot be written to.
     """
     # What is missing is reported now, not after a quarter of an hour.
-    check_installed(("matplotlib", "plot"), ("skimage", "surface"), ("jinja2", "paper"))
+    check_installed(("matplotlib", "plot"), ("skimage", "surface"), ("jinja2", "report"))
     pyplot()
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)

@@ -100,7 +100,7 @@ def plot_cross_section(
 
 def _needs_legend(arm: Manipulator) -> bool:
     """True where colors alone leave open what is what."""
-    plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.bundle_courses) == {"along"}
+    plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.fiber_directions) == {"along"}
     return not plain or len(_section_materials(arm.section)) > 1
 
 
@@ -221,7 +221,7 @@ def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> lis
     outline = arm.outline(z)
     sizes = (outline.center[0], outline.extent, outline.inner_ratio[0], outline.outer_ratio[0])
     return [
-        _Placed(k, outline.shape[k], arm.bundle_courses[k], *(float(size[k]) for size in sizes))
+        _Placed(k, outline.shape[k], arm.fiber_directions[k], *(float(size[k]) for size in sizes))
         for k in bundles
         if outline.acts[0, k]
     ]

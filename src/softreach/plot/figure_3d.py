@@ -153,7 +153,7 @@ class Scene:
         dots = Dots(tips, coloring.rgb[chosen])
         size = point_size(len(tips), np.array([tips.min(axis=0), tips.max(axis=0)]))
         self.parts.append(PagePart(name, dots, size=size))
-        self.keys += _page_keys(coloring.key)
+        self.keys += page_keys(coloring.key)
 
     def add_set(self, reached: Any) -> None:
         """A reachable set: its surface, or the points of a curve."""
@@ -291,7 +291,8 @@ def _kind(thing: Any) -> str:
     raise InvalidInput("data", as_given(thing), allowed)
 
 
-def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
+def page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
+    """A key as pages have it: colors that stand for something each, and a scale of numbers."""
     marks = [(label, css_color(rgb)) for label, rgb in key_entries(key)]
     if not isinstance(key, ScalarKey):
         return [] if key is None else [Swatches(marks, key.title)]

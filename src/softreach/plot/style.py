@@ -18,7 +18,7 @@ from softreach.picture.page import Figure3D
 from softreach.picture.projection import View, view_angles
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
-from softreach.support.errors import InvalidInput, MissingExtra, Range, check_date
+from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
 
@@ -61,9 +61,8 @@ def pyplot() -> Any:
 
     Raises:
         MissingExtra: matplotlib is not installed.
-        InvalidInput: The environment names a backend that it does not have, or no date.
+        InvalidInput: The environment names a backend that it does not have.
     """
-    check_date()
     try:
         from matplotlib import pyplot as plt
     except ModuleNotFoundError as error:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import quad
 
-from softreach.arm.actuators.ring_integrals import ring_integrals
+from softreach.arm.actuators.sector import ring_integrals
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
 from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, Verdict, judged
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.summary import describe
 from softreach.support.errors import InvalidDesign
 from softreach.workspace import reachable_set
@@ -134,7 +134,7 @@ def _errors(ratio: float, taper: float, angle: float) -> list[float]:
 
 def _rotation_errors(arm: Manipulator, angle: float) -> dict[str, float]:
     """Errors of the printed fiber rotation: from the integral, and near φ = 0 from its limit."""
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     z, radius = 0.7 * rod.length, describe(arm).base_radius
     slope, limit = np.tan(angle) * np.hypot(1, np.tan(_TAPER)), np.tan(angle) * z / radius
 
