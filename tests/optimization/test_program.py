@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import softreach as sr
-from softreach.arm.load_number import mass
+from softreach.arm.body import mass
 from softreach.arm.parameters import changed, find_parameter
 from softreach.optimization import sensitivity
 from softreach.optimization.free_parameters import free_parameters

@@ -292,9 +292,9 @@ def test_many_places_are_met_in_blocks_that_change_nothing(monkeypatch):
 )
 def test_what_lies_between_the_stations_is_within_the_stated_error(keep):
     from softreach.requirements.poses import Body
-    from softreach.rod.rods import tip_map
+    from softreach.rod.rods import as_tip_map
 
-    rod, poses = tip_map(ARM), np.concatenate([GAMMA, [[-1.6, 0.0, 0.0], [-1.6, -1.6, -1.6]]])
+    rod, poses = as_tip_map(ARM), np.concatenate([GAMMA, [[-1.6, 0.0, 0.0], [-1.6, -1.6, -1.6]]])
     rows = np.arange(len(poses))
     fine = Body.of(rod, poses, 4800).missed(keep, rows)[0]
     for parts in (16, 48):

@@ -297,12 +297,12 @@ def _with_tensions(
 def _strains(at: _Explicit, state: RodState) -> tuple[Array, Array]:
     """ω dZ (n, step, 3, 3) and (ζ - 1) dZ (n, step, 3) at the nodes."""
     table, gamma = at.table, state.gamma
-    growth = table.length * (1.0 + np.einsum("kij,nj->nki", table.growth, gamma))
+    rest_length = table.length * (1.0 + np.einsum("kij,nj->nki", table.rest_length_factor, gamma))
     bend = np.einsum("kicj,nj->nkic", table.curvature, gamma)
-    bend = growth[..., None] * (bend + table.compliance[..., 1:] * state.moment)
+    bend = rest_length[..., None] * (bend + table.compliance[..., 1:] * state.moment)
     thrust = np.einsum("nkic,kic->nki", state.directors[..., 2, :], table.force)
     rise = table.length * np.einsum("kij,nj->nki", table.extension, gamma)
-    return bend, rise + growth * table.compliance[..., 0] * thrust
+    return bend, rise + rest_length * table.compliance[..., 0] * thrust
 
 
 def _explicit_shortening(at: _Explicit, change: _Explicit, bend: Array, rise: Array) -> Array:

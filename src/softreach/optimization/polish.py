@@ -11,7 +11,7 @@ import numpy as np
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
 from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
@@ -167,7 +167,7 @@ class _Program:
         poses = np.empty((0, 0))
         if len(problem.requirements.places):
             case = problem.case(self._start.values, self._accuracy)
-            box = tip_map(case.arm).box
+            box = as_tip_map(case.arm).box
             gamma = np.nan_to_num(case.check.poses.reshape(-1, box.bundles))
             poses = np.clip(box.to_cube(box.clip(gamma))[:, box.free], 0.0, 1.0)
         self._shape = poses.shape

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 
-from softreach.arm.load_number import mass
+from softreach.arm.body import mass
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, MetricFailed

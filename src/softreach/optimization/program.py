@@ -8,14 +8,14 @@ from functools import cache, partial
 
 import numpy as np
 
-from softreach.arm.load_number import load_number, mass
+from softreach.arm.body import load_number, mass
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameters, parameters_by_every_name
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import SETS, DesignCase, Goal, Problem
 from softreach.requirements.poses import PoseRules, effort_scales
 from softreach.requirements.regions import Region
-from softreach.rod.rods import effective, in_steps, refined, tip_map
+from softreach.rod.rods import as_tip_map, effective, in_steps, refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
@@ -58,7 +58,7 @@ class DesignPoint:
     def rods(self) -> tuple[TipMap, ...]:
         """Its tip map under each payload."""
         if not self.like:
-            return tuple(refined(tip_map(arm), _TOL) for arm in self.arms)
+            return tuple(refined(as_tip_map(arm), _TOL) for arm in self.arms)
         pairs = zip(self.arms, self.like, strict=True)
         return tuple(in_steps(arm, rod.steps, rod) for arm, rod in pairs)
 

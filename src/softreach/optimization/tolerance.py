@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
 from softreach.optimization.deviations import TOL, FirstOrder, Spread, deviations_of, region_places
 from softreach.requirements.requirements import Requirements, Target, with_payload
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support import parallel
@@ -107,7 +107,7 @@ def tolerance(
     checked = as_integer("checked", checked, 0, samples)
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     seed, progress = as_integer("seed", seed, 0), as_progress(progress)
-    if (count := tip_map(deviations.arm).box.dimension) < 3:
+    if (count := as_tip_map(deviations.arm).box.dimension) < 3:
         found = counted(count, "free bundle")
         raise NotPossible(f"a tolerance needs three free bundles or more, and this arm has {found}")
     with no_warnings():
@@ -339,7 +339,7 @@ def _places(target: Target) -> Array:
 def _starts(first: FirstOrder, target: Target) -> list[Array]:
     """Places of the cube to search from: of all solutions of the design, and of a grid."""
     arm, places = first.deviations.arm, _places(target)
-    box, solutions = tip_map(arm).box, solve_inverse(arm, places)
+    box, solutions = as_tip_map(arm).box, solve_inverse(arm, places)
     rows = [solutions.nearest_activations]
     for number in range(int(solutions.counts.max(initial=0))):
         has = solutions.counts > number
@@ -356,7 +356,7 @@ def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[A
     places = _places(target)
     within, held = max(target.within, TOL * arm.length), np.ones(len(places), bool)
     for payload in first.needs.payloads or (None,):
-        rod, gaps = tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
+        rod, gaps = as_tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
         for start in starts:
             left = np.flatnonzero(gaps > within)
             if len(left):

@@ -34,7 +34,7 @@ from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.bending import bending_over_bounds
 from softreach.rod.kinematics import configuration
-from softreach.rod.rods import in_steps, tip_map
+from softreach.rod.rods import as_tip_map, in_steps
 from softreach.schema import AXES, provenance
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
@@ -296,7 +296,7 @@ def checked(
         rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
         if choose is descended:  # on the way, with shapes in no more steps than tips
-            rod = tip_map(loaded, _ROUGH_TOL)
+            rod = as_tip_map(loaded, _ROUGH_TOL)
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
         posed.append(solved(rules, needs.places, needs.within, step, choose))
         for target in needs.targets:

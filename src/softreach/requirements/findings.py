@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from softreach.arm.body import load_number, mass
 from softreach.arm.driving import inner_arm
-from softreach.arm.load_number import load_number, mass
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import ends_over, quadrature, tables
 from softreach.atlas.intermediates import Intermediates

@@ -19,7 +19,7 @@ from softreach.requirements.parts import Keep
 from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 from softreach.support import parallel
@@ -86,7 +86,7 @@ class PoseRules:
     @property
     def rod(self) -> TipMap:
         """The tip map of the arm, whose activations are its inputs."""
-        return tip_map(self.arm) if self.known_rod is None else self.known_rod
+        return as_tip_map(self.arm) if self.known_rod is None else self.known_rod
 
     def judged(self, gamma: Array) -> Judged:
         """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""
@@ -287,7 +287,7 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
         return _without_equilibrium(rules, places)
     best = _best(rules, solutions)
     broken = (best.excess.sum(axis=1) > 0.0) & (solutions.statuses == Status.REACHED)
-    if (tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
+    if (as_tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
         rows = np.flatnonzero(broken)
         with no_warnings():
             family = solve_inverse(

@@ -20,7 +20,7 @@ from softreach.support.quantity import columns
 
 __all__ = ["REPORT", "Report", "Reported", "Section", "check_libraries"]
 
-REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
+REPORT: Formats = {".html": FileFormat(("jinja2",), "report")}
 """Formats of reports."""
 
 _DPI = 160
@@ -111,7 +111,7 @@ def check_libraries() -> None:
     Raises:
         MissingExtra: matplotlib or Jinja2 is not installed.
     """
-    check_installed(("matplotlib", "plot"), ("jinja2", "paper"))
+    check_installed(("matplotlib", "plot"), ("jinja2", "report"))
 
 
 def _template() -> Any:
