@@ -66,7 +66,7 @@ def oracle_rod(arm: Manipulator, body: ArmBody, gamma, loads: Loads) -> tuple[ro
         torsion=lambda z: at(z)[2],
         mass=lambda z: at(z)[3],
         stretch=lambda z: at(z)[4],
-        growth=lambda z: at(z)[5],
+        rest_length_factor=lambda z: at(z)[5],
         curvature=lambda z: at(z)[6:],
         breaks=breaks,
     ), rod.Loads(
@@ -89,9 +89,9 @@ def _sections(arm: Manipulator, body: ArmBody, gamma, z):
     """K0, K1, K3, mass per length, ζ̂, η and û at stations, shape (station, 9)."""
     table, yields = tables(arm, z), body.compliance(z)
     stiff = [1.0 / np.maximum(one, 1e-300) for one in yields]
-    stretch, growth = 1.0 + table.extension @ gamma, 1.0 + table.growth @ gamma
+    stretch, eta = 1.0 + table.extension @ gamma, 1.0 + table.rest_length_factor @ gamma
     bend = table.curvature @ gamma
-    return np.column_stack([*stiff, body.mass_per_length(z), stretch, growth, bend])
+    return np.column_stack([*stiff, body.mass_per_length(z), stretch, eta, bend])
 
 
 def _polynomials(values: Callable, ends: list[float]) -> Callable:

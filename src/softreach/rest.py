@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.rod.rods import tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipStatus
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 __all__ = ["Rest", "rest"]
@@ -19,9 +19,9 @@ __all__ = ["Rest", "rest"]
 class Rest:
     """Equilibrium of an arm that nothing drives."""
 
-    activation: NDArray[np.float64]
+    activation: Array
     """The activation of least size within the bounds, zero where these hold it [unit]."""
-    tip: NDArray[np.float64]
+    tip: Array
     """Of the loaded arm in the world [m]; NaN without equilibrium."""
     sag: float
     """Distance by which the loads move the tip [m]; NaN without equilibrium."""
@@ -49,9 +49,9 @@ def rest(arm: Manipulator) -> Rest:
     held = arm
     if arm.bundles and not arm.drives:
         held = arm.with_bounds(np.stack([activation, activation], axis=1))
-    held_map = with_unstable(tip_map(held, warn=False))
+    held_map = with_unstable(as_tip_map(held, warn=False))
     (tip,), (status,) = held_map.tips_and_status(activation[None])
-    free = tip_map(held.replace(loads=None)).tips(activation[None])[0]
+    free = as_tip_map(held.replace(loads=None)).tips(activation[None])[0]
     sag = float(np.linalg.norm(tip - free))
     return Rest(
         activation=activation,

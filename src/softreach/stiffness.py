@@ -6,17 +6,17 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.free import ArmRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import of_tip, tip_map
+from softreach.rod.rods import as_tip_map, of_tip
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
-from softreach.support.arrays import as_directions, as_floats
+from softreach.support.arrays import Array, as_directions, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ __all__ = [
     "stiffness_along",
     "tip_compliance",
 ]
-
-Array = NDArray[np.float64]
 
 
 def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
@@ -55,7 +53,7 @@ def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float
             (ζ <= 0); or a tip map of another kind than the arm's own.
         InvalidDesign: A material has no Young's modulus.
     """
-    rod = tip_map(arm, tol)
+    rod = as_tip_map(arm, tol)
     return _compliance(rod, rod.check_activations("activations", activations))
 
 
@@ -147,25 +145,16 @@ def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
         axes = principal_compliances(matrices[rows])
         largest[rows], smallest[rows] = axes.largest, axes.smallest
         soft[rows] = axes.displacements[:, 0]
-    named = {"units": "m/N", "scale": "log"}
+    each, size = ("sample", "axis"), {"units": "m/N", "scale": "log"}
+    most, least = ({"long_name": f"{which} compliance"} for which in ("largest", "smallest"))
+    whole = {"units": "m/N", "long_name": "compliance of the tip"}
+    along = {"units": "1", "long_name": "direction of the largest compliance"}
     return xr.Dataset(
         {
-            "compliance": (
-                ("sample", "axis", "force"),
-                matrices,
-                {"units": "m/N", "long_name": "compliance of the tip"},
-            ),
-            "largest_compliance": ("sample", largest, named | {"long_name": "largest compliance"}),
-            "smallest_compliance": (
-                "sample",
-                smallest,
-                named | {"long_name": "smallest compliance"},
-            ),
-            "softest_direction": (
-                ("sample", "axis"),
-                soft,
-                {"units": "1", "long_name": "direction of the largest compliance"},
-            ),
+            "compliance": ((*each, "force"), matrices, whole),
+            "largest_compliance": ("sample", largest, size | most),
+            "smallest_compliance": ("sample", smallest, size | least),
+            "softest_direction": (each, soft, along),
         },
         {"axis": list(AXES), "force": list(AXES)},
         cloud.attrs,
@@ -195,7 +184,7 @@ def yielding_rod(rod: TipMap) -> LoadedRod:
 def _compliance(rod: TipMap, activations: ArrayLike) -> Array:
     """∂r/∂F [m/N] in the frame of a tip map, shape (n, 3, 3)."""
     gamma = rod.box.check(activations)
-    at = tip_map(rod).inputs.activations(gamma)
+    at = as_tip_map(rod).inputs.activations(gamma)
     matrices, turn = yielding_rod(rod).compliance(at), rod.pose.rotation
     return matrices if rod.pose.is_identity else turn @ matrices @ turn.T
 

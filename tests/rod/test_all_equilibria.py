@@ -12,7 +12,7 @@ import softreach as sr
 from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.cloud.curvature import strain_ranges
-from softreach.rod import TipStatus, free_bundles, tip_map
+from softreach.rod import TipStatus, as_tip_map, free_bundles
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import all_equilibria as equilibria_by_degree
 from softreach.rod.loaded import flood
@@ -45,7 +45,7 @@ def trunk(load, gravity=UP, arm=TRUNK, **loads):
 def test_their_number_is_odd_and_one_is_the_branch_of_the_unloaded_arm(gravity, load, most):
     arm = trunk(load, gravity)
     for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (3, 3)):
-        every, branch = sr.equilibria(arm, gamma), tip_map(arm).rod.equilibria(gamma[None])
+        every, branch = sr.equilibria(arm, gamma), as_tip_map(arm).rod.equilibria(gamma[None])
         assert every.complete
         assert every.degree == 1
         assert len(every) % 2 == 1
@@ -201,7 +201,7 @@ def test_turning_gravity_and_the_arm_changes_nothing_but_the_directions():
 @pytest.mark.parametrize("restrict", [free_bundles, with_unstable])
 def test_those_of_a_view_are_those_of_the_arm(restrict):
     arm = trunk(12.0, arm=TRUNK.with_bounds([(-5 / 3, 0), (-0.5, -0.5), (-5 / 3, 0)]))
-    whole, gamma = tip_map(arm), np.array([-0.03, -0.5, -0.1])
+    whole, gamma = as_tip_map(arm), np.array([-0.03, -0.5, -0.1])
     expected = sr.equilibria(whole, gamma)
     assert len(expected) == 3
     rod = restrict(whole)
@@ -434,7 +434,7 @@ def test_loads_that_no_walk_can_follow_are_refused_in_one_line(loads):
         rod.status(rod.box.corners())
     assert "\n" not in str(refused.value)
     with pytest.raises(InvalidInput, match="loads"):
-        strain_ranges(tip_map(rod), np.zeros(1))
+        strain_ranges(as_tip_map(rod), np.zeros(1))
 
 
 def stubby(share):
@@ -469,7 +469,7 @@ def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_on
     assert not has_tip(rod.status(rod.box.corners())).any()
     assert rod.steps >= FreeRod(rod.arm, 1e-4).steps
     with pytest.raises(InvalidInput, match="has an equilibrium"):
-        strain_ranges(tip_map(rod), np.array([0.1]))
+        strain_ranges(as_tip_map(rod), np.array([0.1]))
 
 
 def test_steps_that_are_not_found_are_not_searched_again(monkeypatch):

@@ -64,7 +64,7 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
         loaded.set()
 
     monkeypatch.setattr(Session, "_follow_change", follow)
-    monkeypatch.setattr(softreach.studio.app, "_load_libraries", load)
+    monkeypatch.setattr(softreach.studio.app, "load_libraries", load)
     with Studio(studio.start) as other, connected(other):
         until(lambda: seen)
     assert seen[0] == (True, True, True, "computing", True)
@@ -150,7 +150,7 @@ def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):
 
 
 def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, monkeypatch):
-    go, furnish = threading.Event(), softreach.studio.app._furnish
+    go, furnish = threading.Event(), softreach.studio.app.furnish
     entered = threading.Event()
 
     def waits(*given):
@@ -158,7 +158,7 @@ def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, m
         assert go.wait(PATIENCE)
         furnish(*given)
 
-    monkeypatch.setattr(softreach.studio.app, "_furnish", waits)
+    monkeypatch.setattr(softreach.studio.app, "furnish", waits)
     with connected(studio):
         assert entered.wait(PATIENCE)
     until(lambda: not studio.server.get_clients())

@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.number import series_faults, stations
 from softreach.arm.part import Part
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault
 from softreach.support.lazy import lazy
 
 __all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic", "values_along"]
-
-Array = NDArray[np.float64]
 
 _INTERPOLATIONS = ("cubic", "linear")
 

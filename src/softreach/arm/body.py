@@ -13,18 +13,18 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN, Actuator, Outline, Resultants
-from softreach.arm.along import AlongArm, Samples
+from softreach.arm.along import Samples, values_along
 from softreach.arm.loads import Loads
 from softreach.arm.number import number
 from softreach.arm.part import Part, faults_under
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section, Stiffness, name_faults
 from softreach.arm.stations import Located, RigidPiece, Stations, placed
-from softreach.support.arrays import as_stations, read_only
+from softreach.support.arrays import Array, as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
@@ -69,13 +69,7 @@ class RestShape(Part):
     def curvature(self, x: Array) -> Array:
         """û [1/m] at x = Z/L, shape (station, 3)."""
         each = (self.curvature_x, self.curvature_y, self.twist)
-        return np.stack([a(x) if isinstance(a, AlongArm) else np.full(len(x), a) for a in each], 1)
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Z/L inside (0, 1) where it is not smooth."""
-        each = (self.curvature_x, self.curvature_y, self.twist)
-        return tuple(x for a in each if isinstance(a, AlongArm) for x in a.breaks)
+        return np.stack([values_along(value, x) for value in each], axis=1)
 
 
 STRAIGHT = RestShape()
@@ -95,7 +89,6 @@ class RestStrains(Actuator):
     shape: RestShape
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
-        del profile, section
         return Resultants(np.zeros((len(z), 1)), np.zeros((len(z), 3, 1)))
 
     def curvature(self, profile: Profile, z: Array) -> Array:
@@ -103,7 +96,6 @@ class RestStrains(Actuator):
         return self.shape.curvature(z / profile.length)
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        del section
         zero = np.zeros((len(z), 1))
         return Outline(
             center=zero,
@@ -114,11 +106,9 @@ class RestStrains(Actuator):
             acts=self.acts(profile, z),
         )
 
-    def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        return tuple(profile.length * x for x in self.shape.breaks)
-
-
-Array = NDArray[np.float64]
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return self.shape.breaks
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -284,7 +274,7 @@ class Body:
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
     @property
-    def bundle_courses(self) -> tuple[str, ...]:
+    def fiber_directions(self) -> tuple[str, ...]:
         """Direction of contraction within each bundle; see `Actuator.fiber_direction`."""
         return tuple(actuator.fiber_direction for actuator in self.bundle_actuators)
 
@@ -292,14 +282,14 @@ class Body:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)
         each = [part.outline(self.profile, self.section, stations) for part in self.actuators]
-        each = each or [Outline.empty(len(stations))]
+        nothing = np.empty((len(stations), 0))
         return Outline(
-            center=np.concatenate([part.center for part in each], axis=1),
-            extent=np.concatenate([part.extent for part in each]),
-            inner_ratio=np.concatenate([part.inner_ratio for part in each], axis=1),
-            outer_ratio=np.concatenate([part.outer_ratio for part in each], axis=1),
+            center=np.concatenate([nothing, *(part.center for part in each)], axis=1),
+            extent=np.concatenate([np.empty(0), *(part.extent for part in each)]),
+            inner_ratio=np.concatenate([nothing, *(part.inner_ratio for part in each)], axis=1),
+            outer_ratio=np.concatenate([nothing, *(part.outer_ratio for part in each)], axis=1),
             shape=tuple(shape for part in each for shape in part.shape),
-            acts=np.concatenate([part.acts for part in each], axis=1),
+            acts=np.concatenate([nothing.astype(bool), *(part.acts for part in each)], axis=1),
         )
 
 

@@ -17,6 +17,7 @@ from softreach.arm.body import STRAIGHT, RestStrains
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import ends_over, range_of_extension, strain_stations, tables
 from softreach.arm.tensions import LengthLaw, Tensions
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
@@ -30,8 +31,6 @@ __all__ = [
     "pilot",
     "without_dead_zones",
 ]
-
-Array = NDArray[np.float64]
 
 _MOST_CORNERS = 1024
 _INSIDE = 256
@@ -97,7 +96,7 @@ class Driving:
             return False
         if not self.has_length_tendons:
             return True
-        if self.arm.loads is not None or law.has_growth:
+        if self.arm.loads is not None or law.changes_rest_length:
             return False
         low, high = self.driven.input_bounds.T
         tensions = law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))
@@ -155,8 +154,7 @@ class Driving:
         return offsets
 
     @lazy
-    def _pulls(self) -> NDArray[np.bool_]:
-        """Bundles that drives cannot push: tendons driven by tension, shape (inner bundle,)."""
+    def _pulls(self) -> Mask:
         pulls = np.zeros(self.law.arm.bundles, bool)
         for k, actuator in enumerate(self.arm.bundle_actuators):
             by_tension = isinstance(actuator, Tendon) and not isinstance(actuator, LengthTendon)

@@ -1,4 +1,4 @@
-"""Loads on an arm beside its actuators: gravity, a payload, forces and moments."""
+"""Loads on an arm beside its actuators, its mass, and Λ, which says how much loads bend it."""
 
 from __future__ import annotations
 
@@ -7,16 +7,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
+import numpy as np
+
 from softreach.arm.number import number
 from softreach.arm.part import Part
-from softreach.support.errors import Fault
+from softreach.support.errors import Fault, InvalidDesign
 
 if TYPE_CHECKING:
     from softreach.arm.base import Base
+    from softreach.arm.body import Body
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["GRAVITIES", "GRAVITY", "Loads", "PointLoad"]
+__all__ = [
+    "GRAVITIES",
+    "GRAVITY",
+    "VERIFIED_LOAD_NUMBER",
+    "Loads",
+    "PointLoad",
+    "is_overloaded",
+    "load_number",
+    "load_number_faults",
+    "mass",
+]
 
 Triple = tuple[float, float, float]
 
@@ -31,7 +44,13 @@ GRAVITIES: Mapping[str, Triple] = {
 }
 """Gravity by name in the world, whose z points up [m/s²]."""
 
+VERIFIED_LOAD_NUMBER = 12.0
+"""Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
+
 _ZERO: Triple = (0.0, 0.0, 0.0)
+
+# Exact for the square of a cubic, which is the mass of a piece of any profile.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,3 +161,53 @@ class Loads(Part):
         dead = ("gravity", "tip_force", "tip_moment", "force_per_length")
         turned = {name: base.directions_to_base(getattr(self, name)) for name in dead}
         return self.replace(point_loads=points, **turned)
+
+
+def mass(arm: Body) -> float:
+    """Mass of the arm [kg].
+
+    Raises:
+        InvalidDesign: A layer without a density.
+    """
+    inside = (arm.length * x for x in arm.section.breaks)
+    ends = np.array(sorted({0.0, *arm.profile.breakpoints, *inside, arm.length}))
+    half = 0.5 * np.diff(ends)[:, None]
+    z = ends[:-1, None] + half * (1.0 + _NODES)
+    per_length = arm.section.mass_per_length_at(arm.profile, z)
+    return float(np.sum(half * _WEIGHTS * per_length))
+
+
+def load_number(arm: Body) -> float:
+    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-], theory (79).
+
+    Without loads, w is the weight per length at the base under g = 9.81 m/s², and P is 0: Λ is
+    ρ g L³/(E R2²) for a solid arm of one material, and an upright cylinder buckles under its own
+    weight at 1.96. With loads, w is the weight under their gravity and the force per length beside
+    it, P the sum of all other forces, payload included, and of all moments over L. Sizes are added
+    whatever their directions, so that Λ bounds what bends the arm.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
+    """
+    if faults := load_number_faults(arm):
+        raise InvalidDesign(faults)
+    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
+    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
+    stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
+    return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
+
+
+def is_overloaded(arm: Body) -> bool:
+    """The load number is above what was verified, by more than rounding.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
+    """
+    return load_number(arm) > VERIFIED_LOAD_NUMBER * (1 + 1e-9)
+
+
+def load_number_faults(arm: Body) -> list[Fault]:
+    """Faults that keep the load number from being known."""
+    faults = arm.section.modulus_faults("where weight counts")
+    weighs = arm.loads is None or any(arm.loads.gravity)
+    return faults + (arm.section.density_faults("where weight counts") if weighs else [])

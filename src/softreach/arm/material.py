@@ -44,9 +44,7 @@ class Material(Part):
         InvalidDesign: A field is out of its range.
     """
 
-    young_modulus: float | None = number(
-        "E", "Pa", "Young's modulus", low=0.0, open_low=True, default=None
-    )
+    young_modulus: float | None = number("E", "Pa", "Young's modulus", above=0.0, default=None)
     """E, Young's modulus [Pa]; None where it cancels."""
     poisson_ratio: float = number("ν", "", "Poisson's ratio", low=0.0, high=0.5, default=0.5)
     """ν, Poisson's ratio [-]."""

@@ -61,11 +61,10 @@ def _definitions() -> dict[str, _Schema]:
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
-    kinds = {**PROFILES, **ACTUATORS}
-    definitions |= {
-        name: _table(kind, kind.__doc__ or "", kind=name) for name, kind in kinds.items()
+    return definitions | {
+        name: _table(kind, kind.__doc__ or "", kind=name)
+        for name, kind in {**PROFILES, **ACTUATORS}.items()
     }
-    return definitions
 
 
 def _top() -> dict[str, _Schema]:

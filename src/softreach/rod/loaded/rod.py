@@ -17,8 +17,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.load_number import load_number
-from softreach.arm.loads import Loads
+from softreach.arm.loads import Loads, load_number
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.free import (
     ArmRod,
@@ -303,10 +302,10 @@ class LoadedRod(ArmRod):
     def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
         """The strains at stations Z [m], from m and n in the directors of the shapes there."""
         axial, bending, torsion = _compliance_at(self.body, z.tobytes())
-        u, extension, growth = linear_strains(tables_at(self.arm, z), gamma)
-        extension = extension + growth * shapes.force[..., 2] * axial
+        u, extension, eta = linear_strains(tables_at(self.arm, z), gamma)
+        extension = extension + eta * shapes.force[..., 2] * axial
         yielded = np.stack([bending, bending, torsion], axis=1)
-        return per_length(u + shapes.moment * yielded, extension, growth)
+        return per_length(u + shapes.moment * yielded, extension, eta)
 
 
 @lru_cache(maxsize=64)

@@ -101,8 +101,8 @@ class Solver:
         edges = self.tables.edges(np.array([]), self.steps)[::-1]
         z = self.tables.arm.profile.station(edges)
         force = self.shapes(gamma[rows], z, equilibria.of(rows)).force[..., 2]
-        _, extension, growth = linear_strains(tables(self.tables.arm, z), gamma[rows])
-        extension = extension + growth * force * self.tables.body.compliance(z)[0]
+        _, extension, eta = linear_strains(tables(self.tables.arm, z), gamma[rows])
+        extension = extension + eta * force * self.tables.body.compliance(z)[0]
         squeezed = rows[(extension <= 0.0).any(axis=1)]
         equilibria.tips[squeezed] = np.nan
         equilibria.status[squeezed] = TipStatus.NO_EQUILIBRIUM

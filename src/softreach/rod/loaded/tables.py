@@ -98,9 +98,10 @@ def load_phase(arm: Manipulator, loads: Loads, body: ArmBody) -> LoadPhase:
         swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
         table = tables(arm, z)
         longest, grown = (
-            1.0 + ends_over(part, arm.bounds).T for part in (table.extension, table.growth)
+            1.0 + ends_over(part, arm.bounds).T
+            for part in (table.extension, table.rest_length_factor)
         )
-        relative = grown[1] / longest[0] if table.growth is not table.extension else 1.0
+        relative = grown[1] / longest[0] if table.has_forces else 1.0
         squeeze = float((force * axial * relative).max())
         rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
     steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
@@ -293,7 +294,7 @@ class LoadTables:
             rest_frames.pack_lengths(
                 measure,
                 at.extension.reshape(*z.shape, bundles),
-                at.growth.reshape(*z.shape, bundles),
+                at.rest_length_factor.reshape(*z.shape, bundles),
             ),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
@@ -308,11 +309,11 @@ class LoadTables:
         gauss = s[:, 1:].ravel()[:, None] + wide[:, None] * np.array(magnus.NODES)
         z = profile.station(gauss)
         at = tables(self.arm, z.ravel())
-        growth = at.growth.reshape(*z.shape, bundles)  # whose rotations alone are asked for
+        resting = at.rest_length_factor.reshape(*z.shape, bundles)  # only rotations are needed
         pieces = rod.pack(
             wide[:, None] * profile.radius(z),
-            growth,
-            growth,
+            resting,
+            resting,
             at.curvature.reshape(*z.shape, 3, bundles),
         )
         pieces[:, 3::4, -1] += self.twist  # u3 at rest
