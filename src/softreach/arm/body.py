@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN, Actuator, Outline, Resultants
 from softreach.arm.along import Samples, values_along
-from softreach.arm.loads import GRAVITY, Loads
+from softreach.arm.loads import Loads
 from softreach.arm.number import number
 from softreach.arm.part import Part, faults_under
 from softreach.arm.profile import Profile
@@ -143,16 +143,10 @@ class Body:
             "rest": (RestShape, "must be a RestShape, such as RestShape(curvature_x=2.0)"),
             "loads": (Loads | None, "must be Loads or None"),
         }
-        wrong = [
-            Fault(field, value, allowed)
-            for field, (kind, allowed) in kinds.items()
-            if not isinstance(value := getattr(self, field), kind)
-        ]
-        return [
-            *wrong,
-            *kinds_in_a_sequence("rigid_pieces", self.rigid_pieces, RigidPiece),
-            *kind_faults(self.actuators),
-        ]
+        given = [(field, getattr(self, field), *kind) for field, kind in kinds.items()]
+        wrong = [Fault(name, x, text) for name, x, kind, text in given if not isinstance(x, kind)]
+        pieces = kinds_in_a_sequence("rigid_pieces", self.rigid_pieces, RigidPiece)
+        return [*wrong, *pieces, *kind_faults(self.actuators)]
 
     def _settle(self) -> list[Fault]:
         """Give actuators names, and parts the places of the stations that they name."""
@@ -372,8 +366,7 @@ def load_number(arm: Body) -> float:
     """
     if faults := load_number_faults(arm):
         raise InvalidDesign(faults)
-    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
-    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
+    per_length, force = (arm.loads or Loads()).sizes(arm.section, arm.profile)
     stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
 
