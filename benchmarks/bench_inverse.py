@@ -49,9 +49,9 @@ def by_scipy(arm, targets: np.ndarray) -> np.ndarray:
     """One solution for each target: least_squares with the exact Jacobian."""
     from scipy.optimize import least_squares
 
-    from softreach.rod import tip_map
+    from softreach.rod import as_tip_map
 
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     _, cloud, tree = prepared(arm)
     starts = cloud[tree.query(targets)[1]]
     found = np.empty_like(starts)

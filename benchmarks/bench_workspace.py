@@ -21,7 +21,7 @@ import softreach as sr
 from benchmarks.memory import peak_bytes, reset_peak
 from benchmarks.tasks import family_arm
 from softreach.arm.parameters import changed, parameters
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.support.parallel import undivided
 from softreach.workspace import reachable_set
 
@@ -130,7 +130,7 @@ def route_row(name: str, bounds: tuple[float, float], repeat: int) -> str:
     from softreach.workspace.reach import rasterized_set
 
     arm = bounded_arm(name, bounds)
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     found = reachable_set(rod)
     work: tuple[Callable[[], object], ...] = (
         lambda: reachable_set(rod),

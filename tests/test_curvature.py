@@ -18,7 +18,7 @@ from softreach.cloud.curvature import (
     strain_ranges,
     stream_statistics,
 )
-from softreach.rod.rods import refined, tip_map
+from softreach.rod.rods import as_tip_map, refined
 from softreach.support.errors import InvalidInput
 from tests.kinds import any_arms, fibers_and_a_tendon
 from tests.laws import arms, in_box
@@ -136,7 +136,7 @@ def stations(arm):
 @given(arm=arms())
 def test_strains_are_the_tables_times_the_activations(arm):
     z, gamma = stations(arm), in_box(arm, 20)
-    table, (curvature, extension) = tables(arm, z), tip_map(arm).strains(gamma, z)
+    table, (curvature, extension) = tables(arm, z), as_tip_map(arm).strains(gamma, z)
     scale = np.abs(table.curvature).max()
     assert table.rest_length_factor is table.extension
     u = np.einsum("scb,nb->nsc", table.curvature, gamma)
@@ -148,7 +148,7 @@ def test_a_force_leaves_curvature_per_length_at_rest_and_fibers_take_it_along():
     """dᵢ' = η Uγ × dᵢ = ζ u × dᵢ with η of the fibers alone."""
     arm = fibers_and_a_tendon()
     z, gamma = stations(arm), in_box(arm, 20)
-    table, (curvature, extension) = tables(arm, z), tip_map(arm).strains(gamma, z)
+    table, (curvature, extension) = tables(arm, z), as_tip_map(arm).strains(gamma, z)
     np.testing.assert_allclose(extension, 1 + gamma @ table.extension.T, rtol=1e-12)
     eta = 1 + gamma[:, :2] @ table.extension[:, :2].T
     rate = eta[..., None] * np.einsum("scb,nb->nsc", table.curvature, gamma)
@@ -157,7 +157,7 @@ def test_a_force_leaves_curvature_per_length_at_rest_and_fibers_take_it_along():
 
 def test_a_sample_has_the_same_strains_to_the_last_bit_whatever_is_beside_it(trunk):
     gamma = in_box(trunk, 1000)
-    strains = partial(tip_map(trunk).strains, stations=stations(trunk))
+    strains = partial(as_tip_map(trunk).strains, stations=stations(trunk))
     whole = strains(gamma)
     for part in (slice(0, 1), slice(3, 500), slice(7, 1000, 13)):
         np.testing.assert_array_equal(strains(gamma[part]).curvature, whole.curvature[part])
@@ -166,7 +166,7 @@ def test_a_sample_has_the_same_strains_to_the_last_bit_whatever_is_beside_it(tru
 
 @given(arm=arms())
 def test_the_range_of_the_box_holds_all_strains_and_its_corners_reach_it(arm):
-    z, rod = stations(arm), tip_map(arm)
+    z, rod = stations(arm), as_tip_map(arm)
     inside, corners = rod.strains(in_box(arm, 50), z), rod.strains(rod.box.corners(), z)
     for name, ends in zip(QUANTITIES, strain_ranges(rod, z), strict=True):
         slack = 1e-12 * max(1.0, np.abs(ends).max())
@@ -180,7 +180,7 @@ def test_the_range_of_the_box_holds_all_strains_and_its_corners_reach_it(arm):
 
 @given(arm=any_arms())
 def test_the_range_of_the_box_holds_all_strains_of_fibers_and_forces(arm):
-    z, rod = stations(arm), tip_map(arm, 1e-4)
+    z, rod = stations(arm), as_tip_map(arm, 1e-4)
     gamma = np.concatenate([in_box(arm, 50), rod.box.corners()])
     for name, ends in zip(QUANTITIES, strain_ranges(rod, z), strict=True):
         slack, values = (
@@ -198,7 +198,7 @@ def quantities(strains):
 
 
 def test_a_refined_map_is_as_near_as_asked_and_a_coarser_one_is_not_made(trunk):
-    rod = tip_map(trunk, 1e-4)
+    rod = as_tip_map(trunk, 1e-4)
     assert refined(rod, 1e-3) is rod
     fine = refined(rod, 1e-9)
     assert (fine.arm, fine.tol) == (trunk, 1e-9)

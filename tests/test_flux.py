@@ -12,7 +12,7 @@ import pytest
 from softreach.arm import Loads, Manipulator, designs
 from softreach.arm.parameters import changed
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
 from softreach.workspace.flux import grid_faces, signed_volume
@@ -193,7 +193,7 @@ ONE_TO_ONE = {
 def test_flux_and_raster_agree_within_the_error_of_the_raster(name):
     arm = ONE_TO_ONE[name]
     found = solid(arm)
-    raster = rasterized_set(tip_map(arm), 72, None, 1e-3)
+    raster = rasterized_set(as_tip_map(arm), 72, None, 1e-3)
     assert found.route == "flux"
     assert abs(found.volume - raster.volume) < raster.volume_error + found.volume_error
     assert found.volume_error < 1e-3 * raster.volume_error + 1e-8 * found.volume
@@ -216,7 +216,7 @@ def test_the_flux_agrees_with_points_counted_in_the_set(name):
 
 def test_the_flux_is_the_integral_of_det_j_whether_the_map_folds_or_not():
     for arm in (ARM, designs.minimal_trunk(np.radians(75), np.radians(3))):
-        rod = tip_map(arm, 1e-9)
+        rod = as_tip_map(arm, 1e-9)
         x, w = np.polynomial.legendre.leggauss(20)
         cube = np.stack(np.meshgrid(*[(1 + x) / 2] * 3, indexing="ij"), -1).reshape(-1, 3)
         weights = np.einsum("i,j,k->ijk", w, w, w).ravel() / 8

@@ -9,7 +9,7 @@ from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import Status, prepared_map, solve_inverse
 from softreach.inverse.path import track_path
-from softreach.rod import configuration, free_bundles, tip_map, tip_positions
+from softreach.rod import as_tip_map, configuration, free_bundles, tip_positions
 from softreach.support.errors import InvalidInput
 from tests.laws import in_box
 
@@ -31,7 +31,7 @@ def without(arm: Manipulator, bundle: int) -> Manipulator:
 
 def test_results_name_the_bundles_that_their_tip_map_has():
     arm = holding(designs.redundant_trunk(), {1: -0.5})
-    rod, gamma = free_bundles(tip_map(arm)), [-0.4, -0.8, -0.3]
+    rod, gamma = free_bundles(as_tip_map(arm)), [-0.4, -0.8, -0.3]
     names = [name for k, name in enumerate(arm.bundle_names) if k != 1]
     shape = configuration(rod, gamma, 5)
     assert shape.bundle.values.tolist() == names
@@ -58,7 +58,7 @@ def apart(activations: np.ndarray, offsets: np.ndarray, gamma: np.ndarray) -> np
 @pytest.mark.parametrize("bundle", range(4))
 def test_the_tip_map_of_the_free_bundles_is_that_of_all_on_a_face_of_the_box(bundle):
     arm = holding(designs.redundant_trunk(), {bundle: -0.3})
-    whole, part = tip_map(arm), free_bundles(tip_map(arm))
+    whole, part = as_tip_map(arm), free_bundles(as_tip_map(arm))
     gamma = in_box(arm, 40)
     free = np.delete(gamma, bundle, axis=1)
     assert part.box.names == tuple(np.delete(arm.bundle_names, bundle))
@@ -78,7 +78,7 @@ def test_the_tip_map_of_the_free_bundles_is_that_of_all_on_a_face_of_the_box(bun
 
 
 def test_the_tip_map_of_an_arm_without_held_bundles_is_itself_that_of_its_free_ones(trunk):
-    rod = tip_map(trunk)
+    rod = as_tip_map(trunk)
     assert free_bundles(rod) is rod
 
 
@@ -133,7 +133,7 @@ def test_five_bundles_with_two_held_are_a_problem_of_three(pair):
     assert (found.statuses == Status.REACHED).all()
     assert apart(found.activations, found.offsets, gamma).max() < 1e-6
     assert found.residuals.max() < 1e-10
-    slopes = np.delete(tip_map(arm).tips_and_slopes(found.activations)[1], pair, axis=2)
+    slopes = np.delete(as_tip_map(arm).tips_and_slopes(found.activations)[1], pair, axis=2)
     assert np.allclose(found.conditions, np.linalg.cond(slopes), rtol=1e-3)
 
 

@@ -10,7 +10,7 @@ from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import Solutions, Status, branches, prepared_map, solve_inverse
 from softreach.inverse.path import PathStatus, track_path
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 from softreach.rod.kinematics import configuration, tip_positions
 from softreach.support.errors import InvalidInput
 from softreach.workspace import reachable_set
@@ -119,14 +119,14 @@ def test_two_activations_with_one_tip_are_both_found(folded):
 def fold_points(arm: Manipulator, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Activations where det J = 0, by bisection, and the null directions there."""
     gamma = random_activations(arm, 4000, seed=2)
-    positive = np.linalg.det(tip_map(arm).tips_and_slopes(gamma)[1]) > 0
+    positive = np.linalg.det(as_tip_map(arm).tips_and_slopes(gamma)[1]) > 0
     count = min(n, int(positive.sum()), int((~positive).sum()))
     a, b = gamma[positive][:count], gamma[~positive][:count]
     for _ in range(60):
         middle = 0.5 * (a + b)
-        up = np.linalg.det(tip_map(arm).tips_and_slopes(middle)[1]) > 0
+        up = np.linalg.det(as_tip_map(arm).tips_and_slopes(middle)[1]) > 0
         a, b = np.where(up[:, None], middle, a), np.where(up[:, None], b, middle)
-    return a, np.linalg.svd(tip_map(arm).tips_and_slopes(a)[1])[2][:, 2]
+    return a, np.linalg.svd(as_tip_map(arm).tips_and_slopes(a)[1])[2][:, 2]
 
 
 @pytest.mark.parametrize("distance", [1e-2, 1e-3, 1e-4])
@@ -191,7 +191,7 @@ def test_no_point_of_a_dense_cloud_is_nearer_than_the_nearest_point():
 def test_just_outside_the_surface_the_gap_is_the_distance(trunk):
     gamma = random_activations(trunk, 300)
     gamma[:, 0] = 0.0
-    tips, slopes = tip_map(trunk).tips_and_slopes(gamma)
+    tips, slopes = as_tip_map(trunk).tips_and_slopes(gamma)
     normal = np.cross(slopes[:, :, 1], slopes[:, :, 2])
     normal *= np.sign((normal * slopes[:, :, 0]).sum(axis=1))[:, None]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -222,7 +222,7 @@ def test_solutions_do_not_depend_on_which_targets_share_a_thread(folded, monkeyp
 
 def test_the_condition_number_is_that_of_the_position_jacobian(folded):
     solutions = solve_inverse(folded, tip_positions(folded, random_activations(folded, 200)))
-    slopes = tip_map(folded).tips_and_slopes(solutions.activations)[1]
+    slopes = as_tip_map(folded).tips_and_slopes(solutions.activations)[1]
     assert np.allclose(solutions.conditions, np.linalg.cond(slopes), rtol=1e-3)
 
 
@@ -282,7 +282,7 @@ def test_an_arm_its_tip_map_and_what_was_prepared_of_it_give_equal_answers(folde
     targets = tip_positions(folded, random_activations(folded, 20))
     answers = [
         solve_inverse(arm, targets).to_dataset()
-        for arm in (folded, tip_map(folded), prepared_map(folded))
+        for arm in (folded, as_tip_map(folded), prepared_map(folded))
     ]
     assert all(answer.identical(answers[0]) for answer in answers)
 
@@ -448,8 +448,8 @@ def test_a_branch_ends_at_a_fold():
         track = track_path(arm, path, start=gamma)
         ends.append(track.attrs["end"])
         if ends[-1] == "fold":
-            slopes = tip_map(arm).tips_and_slopes(track.end_activation.values[None])[1][0]
-            first = tip_map(arm).tips_and_slopes(gamma[None])[1][0]
+            slopes = as_tip_map(arm).tips_and_slopes(track.end_activation.values[None])[1][0]
+            first = as_tip_map(arm).tips_and_slopes(gamma[None])[1][0]
             assert abs(np.linalg.det(slopes)) < 0.05 * abs(np.linalg.det(first))
     assert "fold" in ends
     assert "bound" in ends

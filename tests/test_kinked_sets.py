@@ -21,7 +21,7 @@ from softreach.arm import (
 )
 from softreach.arm.actuators import LengthTendon
 from softreach.arm.loads import PointLoad
-from softreach.rod.rods import effective, free_bundles, measured_bundles, tip_map
+from softreach.rod.rods import as_tip_map, effective, free_bundles, measured_bundles
 from softreach.workspace import (
     ReachableCurve,
     ReachableSolid,
@@ -148,13 +148,20 @@ def test_four_tendons_by_length_reach_circular_arcs():
 
 
 def test_a_tip_map_knows_whether_it_is_smooth_through_every_wrapper():
-    kinked, plain = tip_map(driven((-1.0, 1.0), 0.1)), tip_map(driven((-0.2, 0.2), offset=1.0))
-    for rod, smooth in ((kinked, False), (plain, True), (tip_map(by_length(3, (0, 0.02))), False)):
-        placed = tip_map(rod.arm.replace(base=rod.arm.base.replace(points="down")))
+    kinked, plain = (
+        as_tip_map(driven((-1.0, 1.0), 0.1)),
+        as_tip_map(driven((-0.2, 0.2), offset=1.0)),
+    )
+    for rod, smooth in (
+        (kinked, False),
+        (plain, True),
+        (as_tip_map(by_length(3, (0, 0.02))), False),
+    ):
+        placed = as_tip_map(rod.arm.replace(base=rod.arm.base.replace(points="down")))
         for each in (rod, placed, free_bundles(rod), measured_bundles(rod), effective(rod)):
             assert each.is_smooth == smooth, each
     taut = by_length(3, (0.0, 0.004), tendon_stiffness=500.0, pretension=10.0)
-    assert tip_map(taut).is_smooth
+    assert as_tip_map(taut).is_smooth
     assert effective(plain) is plain
     beyond = effective(kinked)
     inputs = beyond.inputs.driving.with_dead_zones(np.array([[0.4, -0.3, 1e5], [0.0, 0.0, 0.0]]))
@@ -180,7 +187,7 @@ def loaded(station: float, *others) -> Manipulator:
 def test_tips_move_evenly_with_the_place_where_a_moment_acts():
     pulled = [[0.02, 0.0, 0.0]]
     stations = np.linspace(0.138, 0.15, 7)  # the piece of integrals ends at the last
-    tips = np.array([tip_map(loaded(z), 1e-8).tips(pulled)[0] for z in stations])
+    tips = np.array([as_tip_map(loaded(z), 1e-8).tips(pulled)[0] for z in stations])
     assert np.abs(np.diff(tips, 4, axis=0)).max() < 1e-9  # jumps of 3e-4 m where a piece is cut
 
 
@@ -189,6 +196,6 @@ def test_a_fiber_given_by_its_angle_may_lie_beside_a_tendon_by_length_under_load
     straight = FiberArchitecture(helical_angle=0.0, **bounds)
     turned = FiberArchitecture(revolution=0.0, **bounds)
     one, other = (
-        tip_map(loaded(0.14, each)).tips([[0.02, 0, 0, -0.05]]) for each in (straight, turned)
+        as_tip_map(loaded(0.14, each)).tips([[0.02, 0, 0, -0.05]]) for each in (straight, turned)
     )
     np.testing.assert_allclose(one, other, atol=1e-9)

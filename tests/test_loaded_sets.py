@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 import softreach as sr
 from softreach.arm import Loads, Manipulator, designs
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held
 from softreach.workspace import ReachableSolid, ReachableSurface, reachable_set
 from softreach.workspace.lifted_grid import LiftedGrid
@@ -31,7 +31,7 @@ def loaded(name: str, grams: float, points: str = "down") -> Manipulator:
 
 @cache
 def held(name: str, grams: float, points: str, n: int) -> Held:
-    rod = tip_map(loaded(name, grams, points))
+    rod = as_tip_map(loaded(name, grams, points))
     m = rod.box.dimension
     cube = np.indices((n + 1,) * m).reshape(m, -1).T / n
     found = rod.held(rod.box.from_free_cube(cube), (n + 1,) * m)
@@ -81,7 +81,7 @@ def test_all_that_is_held_is_in_the_set(snapping):
 
 
 def test_a_finer_grid_agrees_to_the_errors(snapping):
-    finer = rasterized_set(tip_map(loaded("lce", 10)), 2 * snapping.cells, None, 0.05)
+    finer = rasterized_set(as_tip_map(loaded("lce", 10)), 2 * snapping.cells, None, 0.05)
     assert abs(finer.volume - snapping.volume) < finer.volume_error + snapping.volume_error
     assert snapping.volume_error < 0.1 * snapping.volume
     assert finer.hysteresis_share == pytest.approx(snapping.hysteresis_share, abs=0.01)
@@ -112,7 +112,7 @@ def test_what_is_torn_is_one_surface_of_the_stated_volume(name, grams, points):
 
 
 def test_sheets_of_two_bundles_hang_together():
-    grid = LiftedGrid.of(tip_map(loaded("tentacle", 20)), 32)
+    grid = LiftedGrid.of(as_tip_map(loaded("tentacle", 20)), 32)
     size = len(grid.tips)
     starts, ends = grid.cells[:, [0, 0, 1, 2]].ravel(), grid.cells[:, [1, 2, 3, 3]].ravel()
     graph = coo_array((np.ones(len(starts)), (starts, ends)), shape=(size, size))
@@ -149,7 +149,7 @@ def test_the_area_of_sheets_is_that_of_finer_grids_to_its_error():
     found = reachable_set(two)
     assert isinstance(found, ReachableSurface)
     assert found.area_error < 0.1 * found.area
-    grid = LiftedGrid.of(tip_map(two), 192)
+    grid = LiftedGrid.of(as_tip_map(two), 192)
     corners = grid.tips[grid.cells]
     sides = np.diff(corners[:, [[0, 1], [0, 3], [0, 2]]], axis=2)[:, :, 0]
     areas = [np.linalg.norm(np.cross(sides[:, k], sides[:, k + 1]), axis=1) for k in (0, 1)]

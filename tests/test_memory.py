@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 from softreach.sampling import sample_cube
 from softreach.support import memory
 from softreach.support.errors import SoftreachWarning, no_warnings, warn
@@ -57,7 +57,9 @@ def test_without_a_limit_the_system_says_what_is_free(container, files):
 
 
 def test_a_cloud_for_which_there_is_no_memory_is_refused():
-    with pytest.raises(sr.InvalidInput, match=r"^n = 10.*of memory, of which .* GB are free$"):
+    with pytest.raises(
+        sr.errors.NotPossible, match=r"^n = 10.*of memory, of which .* GB are free$"
+    ):
         sr.compute_cloud(sr.designs.minimal_trunk(), 10**12)
 
 
@@ -65,7 +67,7 @@ def test_cells_for_which_there_is_no_memory_are_refused(trunk, monkeypatch):
     image = dataclasses.replace(sr.reachable_set(trunk, accuracy=0.05).image)  # nothing counted
     monkeypatch.setattr(memory, "_NOTICED", 0)
     monkeypatch.setattr(memory, "free_memory", lambda: 100.0)
-    with pytest.raises(sr.InvalidInput, match="cells of the lattice = "):
+    with pytest.raises(sr.errors.NotPossible, match="cells of the lattice = "):
         _ = image.counts
 
 
@@ -93,7 +95,7 @@ def sparse_hull() -> None:
     sr.concave_hull(cloud.tip.values, alpha=0.01)
 
 
-CAUSES = {"loads": lambda: tip_map(too_soft()), "hull": sparse_hull}
+CAUSES = {"loads": lambda: as_tip_map(too_soft()), "hull": sparse_hull}
 
 
 @pytest.mark.parametrize("cause", CAUSES.values(), ids=CAUSES.keys())

@@ -8,7 +8,7 @@ from scipy.optimize import lsq_linear
 
 from softreach.arm import designs
 from softreach.inverse.direction import Objective, minimize
-from softreach.rod import ActivationBox, configuration, tip_map
+from softreach.rod import ActivationBox, as_tip_map, configuration
 from softreach.workspace.search import CLOSELY, nearest_tips
 from tests.laws import in_box
 
@@ -49,7 +49,7 @@ def test_searches_do_not_depend_on_each_other():
 
 @pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk])
 def test_no_bundle_brings_the_nearest_tip_nearer_to_a_target_out_of_reach(design):
-    rod, rng = tip_map(design()), np.random.default_rng(4)
+    rod, rng = as_tip_map(design()), np.random.default_rng(4)
     targets = 1.5 * rng.normal(size=(40, 3)) / np.sqrt(3) * rod.length
     found = nearest_tips(rod, in_box(rod.arm, 40), targets, 1e-10, CLOSELY)
     far = found.distance > 1e-3
@@ -80,14 +80,14 @@ def differences(function, gamma: np.ndarray, step: float = 1e-6) -> np.ndarray:
 )
 def test_the_gradient_of_an_objective_is_its_derivative(terms):
     # Directions and Jacobians have steps of their own; the finer they are, the nearer they agree.
-    rod, rng = tip_map(designs.redundant_trunk(), tol=1e-10), np.random.default_rng(2)
+    rod, rng = as_tip_map(designs.redundant_trunk(), tol=1e-10), np.random.default_rng(2)
     gamma = in_box(rod.arm, 9)
     direction = rng.normal(size=(9, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     arrays = {"multiplier": rng.normal(size=(9, 3)), "near": in_box(rod.arm, 9, seed=5)}
     chosen = {name: arrays.get(name, value) for name, value in terms.items()}
     targets = rng.normal(size=(9, 3))
-    objective = Objective(rod=rod, targets=targets, direction=direction, **chosen)
+    objective = Objective(tip_map=rod, targets=targets, direction=direction, **chosen)
     which = np.array([3, 3, 0, 8, 1, 2, 7, 5, 4])
     expected = differences(lambda x: objective(which, x)[0], gamma)
     gradient = objective(which, gamma)[1]
@@ -96,7 +96,7 @@ def test_the_gradient_of_an_objective_is_its_derivative(terms):
 
 def test_tip_motions_are_tips_slopes_tangents_and_the_turn_of_tangents():
     arm = designs.redundant_trunk()
-    rod, gamma = tip_map(arm), in_box(arm, 30)
+    rod, gamma = as_tip_map(arm), in_box(arm, 30)
     motions = rod.tip_motions(gamma)
     tips, slopes = rod.tips_and_slopes(gamma)
     rounding = {"rtol": 0.0, "atol": 1e-14}  # two kernels: one with turns, one without

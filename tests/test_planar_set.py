@@ -24,7 +24,7 @@ from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import flat_areas, unreachability
 from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.workspace import ReachableRegion, ReachableSolid, reachable_set
 
 SOFT = Material(young_modulus=2e5, poisson_ratio=0.45)
@@ -97,7 +97,7 @@ def test_two_bundles_have_the_area_that_green_tells():
     arm = planar(pairs=1, chamber=True).with_bounds(((0.0, 8.0), (0.0, 0.0), (0.0, 2e4)))
     found = reachable_set(arm)
     assert isinstance(found, ReachableRegion)
-    rod, edge = tip_map(arm), np.linspace(0.0, 1.0, 4001)
+    rod, edge = as_tip_map(arm), np.linspace(0.0, 1.0, 4001)
     around = np.concatenate([
         np.stack([edge, 0 * edge], 1), np.stack([1 + 0 * edge, edge], 1),
         np.stack([edge[::-1], 1 + 0 * edge], 1), np.stack([0 * edge, edge[::-1]], 1),
@@ -166,7 +166,7 @@ def test_every_command_that_gives_a_volume_gives_the_area(tmp_path, region, caps
     shown = printed_json(capsys, "reach", path, "--out", mesh)
     assert mesh.stat().st_size > 1000
     assert shown["unreachability"] == pytest.approx(region.unreachability)
-    assert region.area == pytest.approx(shown["area_in_one_plane_m2"])
+    assert region.area == pytest.approx(shown["area_m2"])
     shown = printed_json(capsys, "volume", path, "--n", 4096, "--alpha", "10mm")
     assert 0.0 < shown["unreachability"] < 1.0
     assert shown["area_in_one_plane_m2"] < shown["convex_area_m2"]

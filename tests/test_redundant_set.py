@@ -11,7 +11,7 @@ from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import ReachableSolid, reachable_set
 from softreach.workspace.redundant import smallest_memory
@@ -139,7 +139,7 @@ def test_more_bundles_reach_more():
 
 def test_little_memory_means_larger_cells_a_larger_error_and_a_warning():
     arm = designs.redundant_trunk()
-    least = smallest_memory(tip_map(arm))
+    least = smallest_memory(as_tip_map(arm))
     with pytest.warns(SoftreachWarning, match="more memory"):
         found = solid(arm, accuracy=1e-3, memory=least)
     assert found.image.reached.size < 2.5e4

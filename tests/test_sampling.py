@@ -20,7 +20,7 @@ from softreach.cloud.redundancy import activation_distance, redundancy_summary, 
 from softreach.cloud.volume import concave_hull, convex_hull, unreachability
 from softreach.export import export_cloud
 from softreach.plot.coloring import color_samples
-from softreach.rod import configuration, tip_map
+from softreach.rod import as_tip_map, configuration
 from softreach.rod.rods import free_bundles
 from softreach.sampling import SAMPLERS, cube_blocks, sample_cube
 from softreach.support.errors import InvalidInput
@@ -300,7 +300,7 @@ def test_dexterity_is_nan_where_the_arm_cannot_be(lossy):
     assert lost.any()
     assert np.array_equal(np.isnan(found.manipulability.values), lost)
     assert np.array_equal(found.orientation.values == 0, lost)
-    _, slope = tip_map(arm).tips_and_slopes(plain.activation.values[:50])
+    _, slope = as_tip_map(arm).tips_and_slopes(plain.activation.values[:50])
     expected = np.abs(np.linalg.det(slope))
     good = ~lost[:50]
     assert np.allclose(found.manipulability.values[:50][good], expected[good], rtol=1e-9)
@@ -350,7 +350,7 @@ def test_a_cloud_of_free_bundles_is_that_of_the_arm():
     arm = designs.lce_arm()
     low, high = arm.bounds.T
     held = arm.with_bounds([(low[0], high[0]), (low[1], high[1]), (low[2], low[2])])
-    part, whole = compute_cloud(free_bundles(tip_map(held)), 50), compute_cloud(held, 50)
+    part, whole = compute_cloud(free_bundles(as_tip_map(held)), 50), compute_cloud(held, 50)
     assert np.array_equal(part.activation.values, whole.activation.values)
     assert np.array_equal(part.tip.values, whole.tip.values)
 

@@ -21,7 +21,7 @@ from softreach.inverse import solve_inverse
 from softreach.rest import rest
 from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import tip_jacobian, tip_positions
-from softreach.rod.rods import free_bundles, tip_map
+from softreach.rod.rods import as_tip_map, free_bundles
 from softreach.rod.tip_map import TipStatus
 from softreach.stiffness import (
     cloud_compliance,
@@ -110,7 +110,9 @@ def test_an_arm_without_loads_yields_as_one_under_loads_of_zero():
     zero = rubber(TRUNK, Loads(gravity=(0.0, 0.0, 0.0)))
     free = rubber(TRUNK, None)
     np.testing.assert_array_equal(tip_compliance(free, GAMMA), tip_compliance(zero, GAMMA))
-    np.testing.assert_array_equal(tip_compliance(tip_map(free), GAMMA), tip_compliance(zero, GAMMA))
+    np.testing.assert_array_equal(
+        tip_compliance(as_tip_map(free), GAMMA), tip_compliance(zero, GAMMA)
+    )
 
 
 def test_an_arm_without_modulus_is_refused_by_the_name_of_the_material():
@@ -377,16 +379,16 @@ NAMES = ("taper", "outer_radius", "extent", "lower")
 
 
 def derivatives(arm: Manipulator, names: tuple[str, ...], tol: float) -> TipDerivatives:
-    return TipDerivatives(tip_map(arm, tol), list(find_parameters(arm, names).values()))
+    return TipDerivatives(as_tip_map(arm, tol), list(find_parameters(arm, names).values()))
 
 
 def places(arm: Manipulator, n: int = 40) -> Array:
-    return np.random.default_rng(0).random((n, tip_map(arm).box.dimension))
+    return np.random.default_rng(0).random((n, as_tip_map(arm).box.dimension))
 
 
 def by_six_neighbors(arm: Manipulator, name: str, cube: Array, tol: float, step: float) -> Array:
     shifts = shifts_along(arm, find_parameters(arm, (name,))[name], 3, step)
-    rods = [tip_map(each, tol) for each in shifts.arms]
+    rods = [as_tip_map(each, tol) for each in shifts.arms]
     tips = [rod.tips(rod.box.from_free_cube(cube)) for rod in rods]
     return np.tensordot(shifts.weights, tips, 1)
 
@@ -412,7 +414,7 @@ def test_under_loads_they_are_as_good_as_equilibria_are_found():
 
 def test_by_a_bound_the_tip_moves_as_its_activation_does():
     arm = designs.minimal_trunk()
-    rod, cube = tip_map(arm, 1e-9), places(arm)
+    rod, cube = as_tip_map(arm, 1e-9), places(arm)
     found = derivatives(arm, ("left.lower", "right.upper"), 1e-9).at(cube)
     slopes = rod.tips_and_slopes(rod.box.from_free_cube(cube))[1]
     names = [actuator.name for actuator in arm.actuators]
@@ -427,7 +429,7 @@ def test_by_a_bound_the_tip_moves_as_its_activation_does():
 def test_all_actuators_turned_turn_the_tip_about_the_axis():
     arm = changed(designs.minimal_trunk(), {"left.offset": 0.3})
     names = tuple(f"{actuator.name}.offset" for actuator in arm.actuators)
-    rod, cube = tip_map(arm), places(arm)
+    rod, cube = as_tip_map(arm), places(arm)
     tips = rod.tips(rod.box.from_free_cube(cube))
     found = derivatives(arm, names, 1e-6).at(cube).sum(axis=2)
     assert found == pytest.approx(np.cross([0.0, 0.0, 1.0], tips), abs=1e-5)
@@ -495,7 +497,7 @@ def test_it_is_where_the_tip_map_puts_the_tip_without_activation():
     found = rest(arm)
     np.testing.assert_array_equal(found.activation, 0.0)
     np.testing.assert_allclose(
-        found.tip, tip_map(arm).tips(np.zeros((1, arm.bundles)))[0], atol=2e-6 * arm.length
+        found.tip, as_tip_map(arm).tips(np.zeros((1, arm.bundles)))[0], atol=2e-6 * arm.length
     )
     free = np.array([0.0, 0.0, arm.length])
     assert found.sag == pytest.approx(math.dist(found.tip, free), rel=1e-9)
@@ -517,5 +519,5 @@ def test_an_arm_without_loads_is_refused(trunk):
 
 def test_a_tip_map_beyond_the_verified_loads_warns_and_one_within_does_not():
     with pytest.warns(SoftreachWarning, match="load number is above 12"):
-        tip_map(at_load_number(12.5, (0, 0, 1)))
-    tip_map(at_load_number(11.9, (0, 0, 1)))
+        as_tip_map(at_load_number(12.5, (0, 0, 1)))
+    as_tip_map(at_load_number(11.9, (0, 0, 1)))

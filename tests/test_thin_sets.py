@@ -22,7 +22,7 @@ from softreach.arm import (
 from softreach.cli.app import run
 from softreach.inverse import solve_inverse
 from softreach.inverse.solutions import Status
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
 from softreach.workspace.redundant import cells_of
 
@@ -130,9 +130,9 @@ def test_a_sheet_of_microns_has_a_thickness_and_leads_with_it(capsys):
     assert solid(designs.minimal_trunk(), accuracy=0.1).shell is None
     assert run(["reach", "three_tendon_robot", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
-    assert next(iter(shown)).startswith("area_middle_of_the_shell")
+    assert next(iter(shown)).startswith("shell_area")
     # the wrap of the same set, which knows nothing of its faces, pushes tips to both sides
-    wrap = cells_of(tip_map(robot), 0.2 / 24).wrap
+    wrap = cells_of(as_tip_map(robot), 0.2 / 24).wrap
     assert wrap.volume_of_tips.value == pytest.approx(found.volume, rel=5e-3)
     assert wrap.area / 2 == pytest.approx(area.value, rel=1e-3)
 
@@ -165,7 +165,7 @@ def test_kinks_leave_thin_sheets_a_mesh_that_holds_their_corners():
 
 def test_a_tip_rounded_to_millimeters_is_reached_within_one(capsys):
     robot = designs.three_tendon_robot()
-    rod = tip_map(robot)
+    rod = as_tip_map(robot)
     target = rod.tips(rod.box.from_cube(np.array([[0.3, 0.8, 0.1]])))[0].round(3)
     (strict,), (loose,) = (solve_inverse(robot, target, within=size) for size in (0.0, 1e-3))
     assert strict.status != Status.REACHED

@@ -11,7 +11,7 @@ import pytest
 
 from softreach.arm import Loads, Manipulator, designs
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held, TipMap, TipStatus
 from softreach.support.errors import InvalidInput
 from softreach.workspace import (
@@ -255,4 +255,4 @@ def test_an_arm_that_is_stable_everywhere_loses_nothing():
     assert found.lost_share == found.hysteresis_share == 0.0
     assert "posture" not in repr(found)
     assert "lost_share" not in reachable_set(ARM, accuracy=0.05).to_dataset()
-    assert tip_map(arm).supports_unstable
+    assert as_tip_map(arm).supports_unstable

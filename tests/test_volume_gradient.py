@@ -18,7 +18,7 @@ from softreach.arm import (
     designs,
 )
 from softreach.arm.parameters import changed, find_parameter, parameters
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
@@ -57,7 +57,7 @@ def test_where_the_flux_holds_it_is_exact_to_a_millionth(narrow, names):
     """By each parameter, or along a direction in which all change the volume alike."""
 
     def raster(arm):
-        return rasterized_set(tip_map(arm, 1e-9), 42, None, 3e-3).volume
+        return rasterized_set(as_tip_map(arm, 1e-9), 42, None, 3e-3).volume
 
     rows = [narrow.parameters.index(name) for name in names]
     assert narrow.route == "flux"
@@ -168,7 +168,7 @@ def test_it_is_that_of_volumes_of_designs_of_which_all_parts_moved(name):
 
     def volume(step):
         moved = changed(arm, dict(zip(own, values + ways(name, values) * step, strict=True)))
-        return rasterized_set(tip_map(moved, 1e-9), 42, None, 3e-3).volume
+        return rasterized_set(as_tip_map(moved, 1e-9), 42, None, 3e-3).volume
 
     at = [volume(k * h) for k in (-2, -1, 1, 2)]
     expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h)
@@ -177,7 +177,7 @@ def test_it_is_that_of_volumes_of_designs_of_which_all_parts_moved(name):
 
 def test_the_signed_volume_grows_at_a_bound_by_what_the_face_sweeps():
     # ∂/∂upper ∫ det J dγ = ∫ det J over the face
-    rod = tip_map(NARROW, 1e-11)
+    rod = as_tip_map(NARROW, 1e-11)
     x, w = np.polynomial.legendre.leggauss(16)
     face = np.stack(np.meshgrid((1 + x) / 2, (1 + x) / 2, indexing="ij"), -1).reshape(-1, 2)
     cube = np.column_stack([np.ones(len(face)), face])
@@ -196,7 +196,7 @@ def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
     assert found.route == "raster"
 
     def raster(arm):
-        return rasterized_set(tip_map(arm), 60, 0.01, 1e-2).volume
+        return rasterized_set(as_tip_map(arm), 60, 0.01, 1e-2).volume
 
     h = 2e-2 * find_parameter(arm, name).value(arm)
     expected = difference(arm, {name: h}, raster) / h
@@ -281,7 +281,7 @@ def test_loaded_arms_have_derivatives_too():
     assert found.route == "raster"
 
     def volume(arm):
-        return rasterized_set(tip_map(arm), 32, None, 0.02).volume
+        return rasterized_set(as_tip_map(arm), 32, None, 0.02).volume
 
     value = find_parameter(arm, "upper").value(arm)
     steps = 0.1
@@ -373,7 +373,7 @@ def test_five_bundles_have_derivatives_of_finer_volumes():
 @of_some
 def test_what_moves_in_two_halves_of_space_is_what_moves(arm):
     samples, parameter = boundary_samples(rough(arm, "taper").solid.image), "taper"
-    tips = TipDerivatives(tip_map(arm), [find_parameter(arm, parameter)])
+    tips = TipDerivatives(as_tip_map(arm), [find_parameter(arm, parameter)])
     slopes, right = tips.at(samples.cube), samples.places[:, 0] > 0.0
     halves = [samples.derivative(slopes, weights)[0] for weights in (right, ~right)]
     assert sum(halves) == pytest.approx(samples.derivative(slopes)[0], rel=1e-12)
@@ -381,7 +381,7 @@ def test_what_moves_in_two_halves_of_space_is_what_moves(arm):
     volume = (samples.area * samples.places).sum() / 3.0
     assert volume == pytest.approx(rough(arm, "taper").solid.volume, rel=0.05)
     # A tip map takes each sample's activation to where the boundary is.
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     off = rod.tips(rod.box.from_free_cube(samples.cube)) - samples.places
     assert np.median(np.linalg.norm(off, axis=1)) < 0.01
 
@@ -392,7 +392,7 @@ def test_what_moves_in_one_half_is_the_volume_s_derivative_there():
     solid = rough(arm, "taper").solid
     names = [f"{actuator.name}.offset" for actuator in arm.actuators]
     samples = boundary_samples(solid.image)
-    tips = TipDerivatives(tip_map(arm), [find_parameter(arm, name) for name in names])
+    tips = TipDerivatives(as_tip_map(arm), [find_parameter(arm, name) for name in names])
     found = samples.derivative(tips.at(samples.cube), samples.places[:, 0] > 0.0).sum()
     # ω × r = (-y, x, 0): through the plane x = 0 into x > 0 flows ∫ -y over the cut.
     grid = solid.grid

@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud
 from softreach.geometry.hull import convex_hull
 from softreach.inverse import solve_inverse
-from softreach.rod import tip_map, tip_positions
+from softreach.rod import as_tip_map, tip_positions
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import (
     ReachableCurve,
@@ -68,7 +68,7 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2
-        fine = rasterized_set(tip_map(coarse.arm), 2 * coarse.cells, cell, 3e-3)
+        fine = rasterized_set(as_tip_map(coarse.arm), 2 * coarse.cells, cell, 3e-3)
         assert abs(fine.volume - coarse.volume) < fine.volume_error + coarse.volume_error
         assert abs(several(fine) - several(coarse)) < coarse.multiplicity_error
         assert abs(fine.fold_volume - coarse.fold_volume) < coarse.fold_volume_error
@@ -90,7 +90,7 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
     # An independent route: Sobol points instead of Gauss nodes, |det J| instead of signed.
     arm = folded.arm
     cube = sampling.sample_cube("sobol", 1 << 16, 3, seed=1)
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     _, slopes = rod.tips_and_slopes(rod.box.from_cube(cube))
     integral = np.abs(np.linalg.det(slopes)).mean() * rod.box.volume
     again = sum((k - 1) * volume for k, volume in folded.multiplicity.items())
@@ -139,7 +139,7 @@ def test_away_from_folds_and_faces_the_count_is_that_of_the_inverse(revolution_d
 
 def test_how_much_is_reached_twice_is_what_the_inverse_finds(folded):
     # The coarea formula: a place that c activations reach appears c times, |det J| wide in all.
-    arm, rod = folded.arm, tip_map(folded.arm)
+    arm, rod = folded.arm, as_tip_map(folded.arm)
     gamma = rod.box.from_cube(sampling.sample_cube("sobol", 1 << 13, 3, seed=2))
     tips, slopes = rod.tips_and_slopes(gamma)
     times = solve_inverse(arm, tips).counts
@@ -197,7 +197,7 @@ def test_volume_scales_with_the_cube_of_the_length(best):
 
 
 def test_a_tip_map_is_asked_as_its_arm_is(trunk):
-    found = solid(tip_map(trunk, 1e-5), accuracy=0.1)
+    found = solid(as_tip_map(trunk, 1e-5), accuracy=0.1)
     assert found.arm == trunk
     assert found.volume == solid(trunk, accuracy=0.1, tol=1e-5).volume
 
@@ -270,7 +270,9 @@ def test_two_free_bundles_sweep_an_area(trunk):
 def fine_grid(arm: Manipulator, n: int) -> np.ndarray:
     """Activations of n^2 points of two free bundles, corners included."""
     ticks = np.linspace(0, 1, n)
-    return tip_map(arm).box.from_free_cube(np.stack(np.meshgrid(ticks, ticks), -1).reshape(-1, 2))
+    return as_tip_map(arm).box.from_free_cube(
+        np.stack(np.meshgrid(ticks, ticks), -1).reshape(-1, 2)
+    )
 
 
 def test_one_free_bundle_draws_a_curve():

@@ -15,7 +15,7 @@ from softreach.inverse import solve_inverse
 from softreach.inverse.request import as_activations, as_targets
 from softreach.rod.loaded.pushing_tip import PushingTip
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.stiffness import yielding_rod
@@ -74,7 +74,7 @@ def blocked_force(
     """
     as_directions("direction", direction)
     progress = as_progress(progress)
-    rod = tip_map(arm, tol)
+    rod = as_tip_map(arm, tol)
     if rod.arm.drives or any(isinstance(part, LengthTendon) for part in rod.arm.actuators):
         hint = "ask the arm whose tendons are driven by tension, without drives"
         raise InvalidInput("arm", "driven", "one whose activations load its sections", hint)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.rod.rods import tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipStatus
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -48,8 +48,8 @@ def rest(arm: Manipulator) -> Rest:
     # Nothing but rest is asked for, and the steps need suit no other activation.
     plain = bool(arm.bundles) and not arm.drives
     held = arm.with_bounds(np.stack([activation, activation], axis=1)) if plain else arm
-    held_map = with_unstable(tip_map(held, warn=False))
+    held_map = with_unstable(as_tip_map(held, warn=False))
     (tip,), (status,) = held_map.tips_and_status(activation[None])
-    free = tip_map(held.replace(loads=None)).tips(activation[None])[0]
+    free = as_tip_map(held.replace(loads=None)).tips(activation[None])[0]
     sag = float(np.linalg.norm(tip - free))
     return Rest(activation, tip, sag, sag / arm.length, TipStatus(int(status)))

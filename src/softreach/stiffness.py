@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.free import ArmRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import of_tip, tip_map
+from softreach.rod.rods import as_tip_map, of_tip
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
@@ -53,7 +53,7 @@ def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float
             (ζ <= 0); or a tip map of another kind than the arm's own.
         InvalidDesign: A material has no Young's modulus.
     """
-    rod = tip_map(arm, tol)
+    rod = as_tip_map(arm, tol)
     return _compliance(rod, rod.check_activations("activations", activations))
 
 
@@ -184,7 +184,7 @@ def yielding_rod(rod: TipMap) -> LoadedRod:
 def _compliance(rod: TipMap, activations: ArrayLike) -> Array:
     """∂r/∂F [m/N] in the frame of a tip map, shape (n, 3, 3)."""
     gamma = rod.box.check(activations)
-    at = tip_map(rod).inputs.activations(gamma)
+    at = as_tip_map(rod).inputs.activations(gamma)
     matrices, turn = yielding_rod(rod).compliance(at), rod.pose.rotation
     return matrices if rod.pose.is_identity else turn @ matrices @ turn.T
 

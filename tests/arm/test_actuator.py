@@ -26,7 +26,7 @@ from softreach.arm.parameters import changed
 from softreach.arm.tables import tables
 from softreach.cli.app import run
 from softreach.export import export_cloud
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.summary import design_warnings
 from softreach.support.errors import InvalidDesign
 from tests.cable import Cable
@@ -227,7 +227,7 @@ def test_inputs_are_drives_and_then_the_bundles_that_none_names():
     assert arm.input_names == ("x", "y", "fiber")
     assert arm.input_units == ("turns", "turns", "1")
     np.testing.assert_array_equal(arm.input_bounds, [[-1, 1], [-1, 1], [-0.5, 0]])
-    assert tip_map(arm).box.names == arm.input_names
+    assert as_tip_map(arm).box.names == arm.input_names
 
 
 def test_an_antagonistic_pair_pulls_one_tendon_and_releases_the_other():
@@ -263,7 +263,7 @@ PULLED = {"kind": LengthTendon, "activation_bounds": (-0.02, 0.02), "tendon_stif
 @pytest.mark.parametrize(("kind", "gain"), [({}, 0.8), (PULLED, 0.01)])
 def test_slopes_are_those_of_differences(kind, gain):
     arm = pairs(four(**kind), gain=gain, dead_zone=0.05)
-    rod, step = tip_map(arm, 1e-9), 1e-6
+    rod, step = as_tip_map(arm, 1e-9), 1e-6
     rng = np.random.default_rng(2)
     x = rod.box.low + rng.random((20, rod.box.bundles)) * rod.box.widths
     slopes = rod.tips_and_slopes(x)[1]

@@ -229,7 +229,7 @@ def test_a_cloud_of_a_loaded_arm_says_which_samples_are_stable(trunk):
     cloud = sr.compute_cloud(heavy, n=3000)
     assert set(np.unique(cloud.status)) > {0}
     np.testing.assert_array_equal(~has_tip(cloud.status), np.isnan(cloud.tip).any("axis"))
-    rod = sr.rod.tip_map(heavy)
+    rod = sr.rod.as_tip_map(heavy)
     np.testing.assert_array_equal(cloud.status, rod.status(cloud.activation.values))
     assert "status" not in sr.compute_cloud(trunk, n=10)
 

@@ -36,7 +36,7 @@ from softreach.arm.driving import extension_range
 from softreach.arm.tables import check_extension, tables
 from softreach.requirements import Limits, Requirements
 from softreach.rod.bending import bending_over_bounds
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.summary import describe, design_warnings
 from softreach.support.errors import InvalidDesign
 from tests.laws import arm_of, arms, in_box, single
@@ -523,7 +523,7 @@ def test_no_pose_of_forces_bends_more_or_less_than_the_exact_range(count, seed):
     z = np.linspace(0, arm.length, 4)
     least, most = bending_at(arm, z)
     gamma = np.random.default_rng(seed).uniform(*arm.input_bounds.T, (500, arm.inputs))
-    curvature = tip_map(arm).strains(gamma, z).curvature
+    curvature = as_tip_map(arm).strains(gamma, z).curvature
     kappa = np.hypot(curvature[..., 0], curvature[..., 1])
     assert (kappa.max(axis=0) <= most * (1 + 1e-9)).all()
     assert (kappa.min(axis=0) >= least * (1 - 1e-9)).all()

@@ -27,10 +27,9 @@ from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command
 from softreach.cli.app import run
-from softreach.paper.atlas_figures import hulls_of
 from softreach.picture.projection import view_axes
-from softreach.plot import box_over_length, plot_metric_map
-from softreach.plot.atlas import panel_extent
+from softreach.plot import plot_metric_map
+from softreach.plot.sheets import box_over_length, hull_over_length, panel_extent
 from softreach.support.errors import InvalidInput
 from tests.atlas.families import (
     SMALL,
@@ -80,17 +79,17 @@ def test_designs_with_more_bundles_share_the_activations_of_the_others(tmp_path)
 
 
 def test_best_designs_are_the_best_that_meet_the_constraints(paper):
-    found = best_designs(paper, "volume", where={"taper": (None, 0.01)}, count=3)
+    found = best_designs(paper, "volume", where="taper<=0.01", count=3)
     truth = np.sort(paper.volume.sel(taper=0.0).values)[::-1]
     np.testing.assert_array_equal(found.volume, truth[:3])
-    for where in (["taper_deg<=0.57"], "taper<=0.01", {"taper_deg": (None, 0.57)}):
+    for where in (["taper_deg<=0.57"], "taper_deg<0.57"):
         assert best_designs(paper, "volume", where=where, count=3).identical(found)
     between = best_designs(paper, "volume", where=["taper_deg>=0.9", "taper_deg<=2.1"], count=99)
     taper = np.degrees(between.taper)
     assert 0.9 < taper.min() <= taper.max() < 2.1  # both constraints of one name
     least = best_designs(paper, "unreachability", smallest=True)
     np.testing.assert_allclose(least.unreachability, [paper.unreachability.min()])
-    assert best_designs(paper, "volume", where={"volume": (9.0, None)}).sizes["rank"] == 0
+    assert best_designs(paper, "volume", where=["volume>=9"]).sizes["rank"] == 0
     with pytest.raises(InvalidInput, match="metric = volumes: must be one of"):
         best_designs(paper, "volumes")
 
@@ -215,11 +214,10 @@ def test_maps_and_hulls_of_an_atlas_over_length_are_relative_to_each_length(tmp_
     best = float((atlas.volume / np.array([0.5, 2.0]) ** 3).max())
     marked = plot_metric_map(atlas, "volume").texts[-1].get_text()
     assert marked == f"{best:.3f}"
-    hull_at = hulls_of(atlas)
-    for column in range(2):
-        for row in range(2):
-            volume = float(over_length(atlas, "volume")[column, row])
-            np.testing.assert_allclose(hull_at(column, row).volume, volume, rtol=1e-3)
+    for place in np.ndindex(2, 2):
+        volume = over_length(atlas, "volume")[place]
+        cloud = atlas_cloud(atlas, revolution=volume.revolution, length=volume["length"])
+        np.testing.assert_allclose(hull_over_length(cloud, 0.5).volume, volume, rtol=1e-3)
 
 
 # `softreach atlas`: what it prints, draws and refuses
@@ -322,7 +320,7 @@ def test_a_file_names_the_same_paths(table):
 
 def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
     pytest.importorskip("matplotlib")
-    from softreach.plot import plot_metric_map, sheet_axes
+    from softreach.plot.atlas import plot_metric_map, sheet_axes
 
     atlas = varied(tmp_path / "a.zarr")
     across, up = sheet_axes(atlas)

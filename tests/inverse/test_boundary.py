@@ -10,7 +10,7 @@ from softreach.arm import Loads, designs
 from softreach.inverse import PathStatus, Status, solve_inverse
 from softreach.inverse.drag import Drag
 from softreach.inverse.path import track_path
-from softreach.rod import tip_map, tip_positions
+from softreach.rod import as_tip_map, tip_positions
 
 TOL = 1e-6
 
@@ -26,7 +26,7 @@ def check_reached(arm, targets, tol):
     found = solve_inverse(arm, targets, tol=tol)
     assert (found.statuses == Status.REACHED).all()
     assert found.residuals.max() <= tol * arm.length
-    tips = tip_map(arm, tol).tips_and_slopes(found.activations)[0]
+    tips = as_tip_map(arm, tol).tips_and_slopes(found.activations)[0]
     missed = np.linalg.norm(tips - np.repeat(targets, found.counts, axis=0), axis=1)
     assert np.abs(missed - found.residuals).max() <= 1e-11 * arm.length
     assert np.allclose(np.linalg.norm(found.nearest - targets, axis=1), found.gaps, atol=1e-10)
@@ -67,7 +67,7 @@ def test_exact_tips_on_bounds_are_reached_by_maps_of_any_tolerance(bundles, tol)
 def test_an_activation_on_a_bound_is_found_beside_others_that_lead_to_its_tip(place):
     arm = designs.minimal_trunk(np.radians(36), np.radians(3))
     gamma = activations(arm, 200, place)
-    gamma = gamma[np.linalg.cond(tip_map(arm).tips_and_slopes(gamma)[1]) < 1e3]  # not at a fold
+    gamma = gamma[np.linalg.cond(as_tip_map(arm).tips_and_slopes(gamma)[1]) < 1e3]  # not at a fold
     found = check_reached(arm, tip_positions(arm, gamma, tol=1e-12), TOL)
     assert (found.counts > 1).any()
     for solution, wanted in zip(found, gamma, strict=True):
@@ -85,7 +85,7 @@ def test_an_activation_on_a_bound_is_found_beside_others_that_lead_to_its_tip(pl
 def test_a_proof_says_more_than_the_error_of_tips(trunk, tol):
     gamma = np.random.default_rng(0).uniform(*trunk.bounds.T, (20, 3))
     gamma[:, 0] = 0.0
-    tips, slopes = tip_map(trunk, tol).tips_and_slopes(gamma)
+    tips, slopes = as_tip_map(trunk, tol).tips_and_slopes(gamma)
     normal = np.cross(slopes[:, :, 1], slopes[:, :, 2])
     normal *= np.sign((normal * slopes[:, :, 0]).sum(axis=1))[:, None]
     normal *= tol * trunk.length / np.linalg.norm(normal, axis=1)[:, None]

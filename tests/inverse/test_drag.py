@@ -9,7 +9,7 @@ import softreach as sr
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.inverse.drag import Drag
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipStatus
 
 TRUNK = designs.minimal_trunk()
@@ -95,6 +95,6 @@ def test_a_loaded_arm_is_led_through_stable_equilibria_alone():
     start = tuple(0.3 * arm.bounds[:, 0])
     begin = tip_of(arm, start)
     found = dragged(arm, start, way(begin, begin + [0.06, 0.0, 0.05], 6))
-    status = tip_map(arm, 1e-6).status([one.activation for one in found])
+    status = as_tip_map(arm, 1e-6).status([one.activation for one in found])
     assert (status == TipStatus.STABLE).all()
     assert found[0].gap == 0.0

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from softreach.arm import Drive, designs
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import prepared_map, solve_inverse
-from softreach.rod import TipMap, tip_map, tip_positions
+from softreach.rod import TipMap, as_tip_map, tip_positions
 from tests.inverse.test_many_bundles import changes, six_bundles
 from tests.kinds import fibers_and_a_tendon
 
@@ -50,7 +50,7 @@ def least_from_many_starts(
 @pytest.mark.parametrize("place", ["interior", "edges"])
 def test_no_search_from_many_starts_finds_less(design, place):
     arm = design()
-    rod, rng = tip_map(arm), np.random.default_rng(0)
+    rod, rng = as_tip_map(arm), np.random.default_rng(0)
     gamma = activations(arm, 2, place, seed=5)
     if design is designs.redundant_trunk and place == "interior":
         gamma[0] = OVERLOOKED
@@ -90,7 +90,7 @@ def pulled_in_pairs() -> Manipulator:
     ],
 )
 def test_the_remainder_of_the_linearization_is_within_the_bounds_of_its_cell_and_of_all(design):
-    rod, rng = prepared_map(design()).rod, np.random.default_rng(0)
+    rod, rng = prepared_map(design()).tip_map, np.random.default_rng(0)
     for cells in (1.5, 4, 30):
         half = rod.box.widths / 2 / cells
         center = rng.uniform(rod.box.low + half, rod.box.high - half, (4000, len(half)))

@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse import PathStatus, Status, prepared_map, solve_inverse
 from softreach.inverse.drag import Drag
 from softreach.inverse.path import track_path
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 from softreach.rod.kinematics import configuration
 from softreach.rod.loaded.all_equilibria import equilibria
 from softreach.rod.loaded.rod import LoadedRod
@@ -27,7 +27,7 @@ TARGETS = slice(40, 60)  # with one tip of several stable activations among them
 
 def loaded(arm: Manipulator) -> LoadedRod:
     """The tip map that has equilibria."""
-    rod = tip_map(arm).rod
+    rod = as_tip_map(arm).rod
     assert isinstance(rod, LoadedRod)
     return rod
 
@@ -56,7 +56,7 @@ def stable(heavy, samples):
     """Stable activations, the tips that they are solved for, and the answers."""
     gamma, found = samples
     gamma = gamma[found.status == TipStatus.STABLE][TARGETS]
-    targets = tip_map(heavy).tips_and_slopes(gamma)[0]
+    targets = as_tip_map(heavy).tips_and_slopes(gamma)[0]
     return gamma, targets, solve_inverse(heavy, targets)
 
 
@@ -70,7 +70,7 @@ def stable(heavy, samples):
 def test_tips_under_general_loads_are_solved_back(loads):
     arm = designs.lce_arm().replace(loads=loads)
     gamma = np.random.default_rng(1).uniform(arm.bounds[:, 0], arm.bounds[:, 1], (8, 3))
-    solutions = solve_inverse(arm, tip_map(arm).tips(gamma))
+    solutions = solve_inverse(arm, as_tip_map(arm).tips(gamma))
     for solution, wanted in zip(solutions, gamma, strict=True):
         assert solution.status is Status.REACHED
         assert np.abs(solution.activations - wanted).max(axis=1).min() < 1e-6
@@ -183,8 +183,8 @@ def test_a_dragged_arm_stays_in_the_posture_in_which_it_was_left(aside, beyond):
         dragged = drag.to(activation, place)
         assert dragged is not None
         assert dragged.gap == 0.0
-        assert np.allclose(dragged.rod.tips([dragged.activation])[0], dragged.tip, atol=1e-9)
-        shape = configuration(dragged.rod, dragged.activation, 2)
+        assert np.allclose(dragged.tip_map.tips([dragged.activation])[0], dragged.tip, atol=1e-9)
+        shape = configuration(dragged.tip_map, dragged.activation, 2)
         assert np.allclose(shape.position.values[-1], place, atol=1e-6 * aside.length)
         activation = dragged.activation
 
@@ -198,7 +198,7 @@ SNAPPING = [
 @pytest.mark.parametrize(("start", "ahead"), SNAPPING)
 def test_a_path_ends_by_name_where_its_posture_loses_its_stability(start, ahead):
     arm = designs.lce_arm().replace(loads=Loads(gravity=(9.81, 0.0, 0.0), payload=0.015))
-    begin, ahead = tip_map(arm).tips([start])[0], np.array(ahead) / np.linalg.norm(ahead)
+    begin, ahead = as_tip_map(arm).tips([start])[0], np.array(ahead) / np.linalg.norm(ahead)
     track = track_path(arm, begin + np.linspace(0.0, 0.08, 5)[:, None] * ahead, start)
     assert track.attrs["end"] == "snaps"
     assert (track.status[track.status != PathStatus.FOLLOWED] == PathStatus.SNAPS).all()
@@ -218,7 +218,7 @@ def test_solutions_say_where_the_arm_leans_to_one_of_two_sides():
     """Both tendons pulled alike keep a hanging tentacle in its plane, up to the pitchfork."""
     arm = Manipulator.load(EXAMPLES / "tentacle.toml")
     arm = arm.replace(loads=arm.loads.replace(payload=0.02))
-    targets = tip_map(arm).tips([[6.0, 6.0], [6.3, 6.3]])
+    targets = as_tip_map(arm).tips([[6.0, 6.0], [6.3, 6.3]])
     planar, leaning = solve_inverse(arm, targets)
     assert planar.leans.tolist() == [False]
     assert leaning.leans.tolist() == [True]

@@ -10,7 +10,7 @@ from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import Solutions, Status, solve_inverse
-from softreach.rod import tip_map, tip_positions
+from softreach.rod import as_tip_map, tip_positions
 from tests.laws import in_box
 
 
@@ -94,7 +94,7 @@ def test_the_least_change_is_stationary_among_the_activations_that_reach_the_tar
     # γ - near = Jᵀy for the bundles between their bounds; at a bound it may only push outward.
     arm, near = designs.redundant_trunk(), np.array([-0.8, -0.2, -1.0, -0.5])
     found = solve_inverse(arm, tip_positions(arm, in_box(arm, 100, seed=4)), near=near)
-    gamma, slopes = found.activations, tip_map(arm).tips_and_slopes(found.activations)[1]
+    gamma, slopes = found.activations, as_tip_map(arm).tips_and_slopes(found.activations)[1]
     low, high = arm.bounds.T
     checked = 0
     for at, slope in zip(gamma, slopes, strict=True):
@@ -112,7 +112,7 @@ def test_the_least_change_is_stationary_among_the_activations_that_reach_the_tar
 
 def test_no_tip_is_farther_from_the_base_than_the_longest_arm():
     for arm in (designs.redundant_trunk(), six_bundles()):
-        rod = tip_map(arm)
+        rod = as_tip_map(arm)
         assert np.linalg.norm(rod.tips(rod.box.corners()), axis=1).max() <= rod.farthest()
 
 

@@ -11,10 +11,10 @@ from scipy.optimize import lsq_linear, minimize
 from softreach.arm import designs
 from softreach.inverse.least_change import sqp
 from softreach.inverse.request import Request
-from softreach.kernels.box.box_newton import box_steps
+from softreach.kernels.box.bounded_descent import box_steps
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.complementarity import complementary
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 from tests.inverse.test_many_bundles import six_bundles
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -209,7 +209,7 @@ norm = np.linalg.norm
 
 def searches(design, n):
     """A tip map, targets to reach with little change, and starts, some targets beyond reach."""
-    rod, rng = tip_map(design()), np.random.default_rng(3)
+    rod, rng = as_tip_map(design()), np.random.default_rng(3)
     gamma, near, start = rng.uniform(rod.box.low, rod.box.high, (3, n, rod.box.bundles))
     targets = rod.tips(gamma)
     targets[::7] *= 1.2

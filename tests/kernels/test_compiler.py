@@ -36,11 +36,11 @@ SCRIPT = """
 import hashlib
 import numpy as np
 import softreach as sr
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 
 arm = sr.designs.redundant_trunk()
 gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (500, 4))
-results = (*tip_map(arm).tip_twists(gamma), sr.tip_positions(arm, gamma))
+results = (*as_tip_map(arm).tip_twists(gamma), sr.tip_positions(arm, gamma))
 for values in results:
     print(hashlib.sha256(values.tobytes()).hexdigest())
 """

@@ -25,7 +25,7 @@ from softreach.kernels.box.simplices import (
 )
 from softreach.kernels.image import contour, raster
 from softreach.kernels.image.activation_mesh import ActivationMesh, face_planes
-from softreach.rod import tip_map, tip_positions
+from softreach.rod import as_tip_map, tip_positions
 from tests.inverse.test_many_bundles import six_bundles
 from tests.kernels.maps import Quadratic, mesh_of, random_quadratic, sampled
 from tests.laws import arm_of
@@ -227,7 +227,7 @@ def test_stretches_are_the_determinant_of_a_quadratic_map():
 
 @pytest.fixture(scope="module")
 def seeds() -> Seeds:
-    rod = tip_map(six_bundles(), tol=1e-3)
+    rod = as_tip_map(six_bundles(), tol=1e-3)
     gamma = np.random.default_rng(0).uniform(rod.box.low, rod.box.high, (20_000, rod.box.bundles))
     return Seeds(gamma, rod.tips(gamma), rod)
 
@@ -329,7 +329,7 @@ def depth(planes: np.ndarray, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", [(108, 2), (36, 3), (0, 0), *range(6)])
 def test_no_tip_is_farther_from_its_linear_interpolant_than_estimated(name):
     arm, rng = any_arm(name), np.random.default_rng(0)
-    mesh, _ = activation_cells(tip_map(arm, TOL), CELLS)
+    mesh, _ = activation_cells(as_tip_map(arm, TOL), CELLS)
     tetrahedron, v, weights, gamma = sampled(mesh, 30_000, rng)
     tip = tip_positions(arm, gamma, TOL)
     error = np.linalg.norm(tip - np.einsum("ni,nik->nk", weights, mesh.tip[v]), axis=1)

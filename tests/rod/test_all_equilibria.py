@@ -12,11 +12,11 @@ import softreach as sr
 from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.cloud.curvature import strain_ranges
-from softreach.rod import TipStatus, free_bundles, tip_map
+from softreach.rod import TipStatus, as_tip_map, free_bundles
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import all_equilibria as equilibria_by_degree
-from softreach.rod.loaded import following
-from softreach.rod.loaded import steps as loaded_steps
+from softreach.rod.loaded import flood
+from softreach.rod.loaded import rod as loaded_rod
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
@@ -45,7 +45,7 @@ def trunk(load, gravity=UP, arm=TRUNK, **loads):
 def test_their_number_is_odd_and_one_is_the_branch_of_the_unloaded_arm(gravity, load, most):
     arm = trunk(load, gravity)
     for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (3, 3)):
-        every, branch = sr.equilibria(arm, gamma), tip_map(arm).rod.equilibria(gamma[None])
+        every, branch = sr.equilibria(arm, gamma), as_tip_map(arm).rod.equilibria(gamma[None])
         assert every.complete
         assert every.degree == 1
         assert len(every) % 2 == 1
@@ -201,7 +201,7 @@ def test_turning_gravity_and_the_arm_changes_nothing_but_the_directions():
 @pytest.mark.parametrize("restrict", [free_bundles, with_unstable])
 def test_those_of_a_view_are_those_of_the_arm(restrict):
     arm = trunk(12.0, arm=TRUNK.with_bounds([(-5 / 3, 0), (-0.5, -0.5), (-5 / 3, 0)]))
-    whole, gamma = tip_map(arm), np.array([-0.03, -0.5, -0.1])
+    whole, gamma = as_tip_map(arm), np.array([-0.03, -0.5, -0.1])
     expected = sr.equilibria(whole, gamma)
     assert len(expected) == 3
     rod = restrict(whole)
@@ -330,7 +330,7 @@ def test_a_smooth_branch_is_not_lost_under_a_little_more_load():
 def test_a_search_that_is_cut_short_is_undecided(heavy, monkeypatch):
     """Nothing is said of what was not followed to its end."""
     gamma = np.array([[-0.72288394, -0.72127314, -4.22473062]])
-    monkeypatch.setattr(following, "_MOST_STEPS", 1)
+    monkeypatch.setattr(flood, "_MOST_STEPS", 1)
     found = heavy.solver.empty(1)
     Postures.of(heavy.solver).by_line(gamma, np.array([0]), found)
     assert found.status[0] == TipStatus.UNDECIDED
@@ -434,7 +434,7 @@ def test_loads_that_no_walk_can_follow_are_refused_in_one_line(loads):
         rod.status(rod.box.corners())
     assert "\n" not in str(refused.value)
     with pytest.raises(InvalidInput, match="loads"):
-        strain_ranges(tip_map(rod), np.zeros(1))
+        strain_ranges(as_tip_map(rod), np.zeros(1))
 
 
 def stubby(share):
@@ -469,7 +469,7 @@ def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_on
     assert not has_tip(rod.status(rod.box.corners())).any()
     assert rod.steps >= FreeRod(rod.arm, 1e-4).steps
     with pytest.raises(InvalidInput, match="has an equilibrium"):
-        strain_ranges(tip_map(rod), np.array([0.1]))
+        strain_ranges(as_tip_map(rod), np.array([0.1]))
 
 
 def test_steps_that_are_not_found_are_not_searched_again(monkeypatch):
@@ -481,7 +481,7 @@ def test_steps_that_are_not_found_are_not_searched_again(monkeypatch):
         return find(postures, gamma)
 
     monkeypatch.setattr(Postures, "find", counted)
-    monkeypatch.setattr(loaded_steps, "_MOST_STEPS", 4)
+    monkeypatch.setattr(loaded_rod, "_MOST_STEPS", 4)
     rod = LoadedRod(weighed(STIFF_TRUNK, 2.5, (9.81, 0.0, 0.0)), 1e-9)
     for _ in range(2):
         with pytest.raises(InvalidInput, match="reachable within 4 steps"):
@@ -493,7 +493,7 @@ def test_a_few_activations_near_the_loss_of_stability_do_not_choose_the_steps(mo
     """Nor do they have a design refused."""
     rod = LoadedRod(weighed(STIFF_TRUNK, 2.5, (9.81, 0.0, 0.0)), 1e-6)
     expected = rod.steps
-    judged = loaded_steps.tip_differences
+    judged = loaded_rod.tip_differences
 
     def magnified(solver, gamma, known):
         found = judged(solver, gamma, known)

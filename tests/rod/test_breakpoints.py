@@ -28,7 +28,7 @@ from softreach.arm import (
 from softreach.arm.tables import tables
 from softreach.kernels.rod import tips as rod
 from softreach.rod.free import FreeRod
-from softreach.rod.rods import in_steps, tip_map
+from softreach.rod.rods import as_tip_map, in_steps
 from tests.kinds import any_arms, driven
 from tests.laws import in_box
 from tests.rod.test_steps import tip_error
@@ -297,7 +297,7 @@ def test_many_samples_of_a_radius_cost_no_more_steps_than_tips_need(kind, loads)
     material = Material(young_modulus=1e7, poisson_ratio=0.5, density=1000.0)
     section = Section(rings=(Ring(inner_ratio=0.5, material=material),))
     arm = Manipulator(profile=profile, section=section, actuators=tuple(fibers), loads=loads)
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     assert rod.steps < 50
     assert arm.profile.slender_coordinate(0.6123) in FreeRod(arm, 1e-6).rule.edges(rod.steps)
     gamma = in_box(arm, 30)

@@ -14,7 +14,7 @@ from softreach.arm import designs
 from softreach.arm.tables import tables
 from softreach.kernels.rod import reference
 from softreach.rod.free import FreeRod
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidInput
 from tests.kinds import fibers_and_a_tendon
 from tests.laws import arm_of, arms, in_box, integrated_tip, single
@@ -145,7 +145,7 @@ def test_kernels_equal_the_reference(arm):
 def test_derivatives_are_the_complex_step_derivatives_of_the_reference(arm):
     gamma = in_box(arm, 2)
     nodes = nodes_of(arm, 1e-6)
-    jacobian, (_, slopes) = sr.tip_jacobian(arm, gamma), tip_map(arm).tips_and_slopes(gamma)
+    jacobian, (_, slopes) = sr.tip_jacobian(arm, gamma), as_tip_map(arm).tips_and_slopes(gamma)
     scale = np.array([1, 1, 1, 1 / arm.length, 1 / arm.length, 1 / arm.length])[:, None]
     for sample, bundle in itertools.product(range(2), range(arm.bundles)):
         stepped = gamma[sample].astype(complex)
@@ -261,7 +261,7 @@ def test_an_arm_that_an_activation_would_shorten_to_nothing_has_no_tips(trunk):
 
 def test_a_tip_map_may_stand_for_its_arm(trunk):
     gamma = in_box(trunk, 10)
-    rod = tip_map(trunk, 1e-9)
+    rod = as_tip_map(trunk, 1e-9)
     np.testing.assert_array_equal(sr.tip_positions(rod, gamma), rod.tips(gamma))
     np.testing.assert_array_equal(sr.tip_jacobian(rod, gamma), rod.tip_twists(gamma)[1])
     assert sr.configuration(rod, gamma, 7).identical(sr.configuration(trunk, gamma, 7, tol=1e-9))

@@ -24,7 +24,7 @@ from softreach.arm import (
 from softreach.arm.tensions import LengthLaw
 from softreach.cli.app import run
 from softreach.rod import TipStatus
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.sampling import SAMPLERS
 from softreach.support.errors import InvalidDesign
 from softreach.workspace import ReachablePoint
@@ -91,7 +91,7 @@ def test_a_tendon_that_is_anchored_halfway_is_shortened_there_alone():
     halfway = arm_of(tendons(1, end_over_length=0.5, activation_bounds=(0.0, 0.005)))
     (tension,) = tensions_of_lengths(halfway, [[0.005]])[0]
     assert tension == pytest.approx(0.01 / LENGTH / (1 / K0 + DISTANCE**2 / K1), rel=1e-12)
-    assert np.isfinite(tip_map(halfway).tips([[0.005]])).all()
+    assert np.isfinite(as_tip_map(halfway).tips([[0.005]])).all()
 
 
 def test_a_soft_cable_stretches_in_series():
@@ -151,7 +151,7 @@ def test_a_pretension_needs_a_cable_that_stretches():
 def tip_misses(arm, count, seed=0):
     """Distances of tips from those of least energy [m]."""
     pulled = random_activations(arm, count, seed)
-    tips = tip_map(arm, 1e-10).tips(pulled)
+    tips = as_tip_map(arm, 1e-10).tips(pulled)
     return [math.dist(tip, PulledArm(arm, x).tip()) for tip, x in zip(tips, pulled, strict=True)]
 
 
@@ -184,7 +184,7 @@ def heavy(arm, payload=0.02, gravity=(0.0, 9.81, 0.0)):
 
 def loaded_miss(arm, pulled):
     """Distance of the tip from that of least energy [m]."""
-    return math.dist(tip_map(arm, 1e-9).tips([pulled])[0], HeavyPulledArm(arm, pulled).tip())
+    return math.dist(as_tip_map(arm, 1e-9).tips([pulled])[0], HeavyPulledArm(arm, pulled).tip())
 
 
 def test_a_tip_under_loads_is_that_of_least_energy():
@@ -222,7 +222,7 @@ def test_slopes_under_loads_are_those_of_differences(loads):
     """Dead loads have a linear response; those that follow the tip are moved by hand."""
     arm = heavy(arm_of(tendons(3)))
     arm = arm.replace(loads=arm.loads.replace(**loads))
-    rod, step = tip_map(arm, 1e-10), 1e-6
+    rod, step = as_tip_map(arm, 1e-10), 1e-6
     pulled = np.array([[0.004, 0.006, 0.005], [0.01, -0.01, 0.002]])
     slopes = rod.tips_and_slopes(pulled)[1]
     for k, unit in enumerate(np.eye(3)):
@@ -232,12 +232,12 @@ def test_slopes_under_loads_are_those_of_differences(loads):
 
 def test_a_displacement_beyond_the_length_is_told():
     with pytest.raises(InvalidDesign, match=r"displacement_bounds.*reaches extension ζ = -"):
-        tip_map(arm_of(tendons(1, activation_bounds=(0.0, 1.5), distance=1e-4)))
+        as_tip_map(arm_of(tendons(1, activation_bounds=(0.0, 1.5), distance=1e-4)))
 
 
 def test_a_length_driven_arm_has_clouds_sets_and_inverses():
     arm = arm_of(tendons(3), tendons(1, name="out", end_over_length=0.5, offset=1.0))
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     cloud = compute_cloud(arm, n=64)
     assert cloud.activation.attrs["units"] == "m"
     np.testing.assert_allclose(rod.tips(cloud.activation.values), cloud.tip, atol=1e-12)
@@ -249,7 +249,7 @@ def test_a_length_driven_arm_has_clouds_sets_and_inverses():
 def test_the_set_of_a_length_driven_arm_holds_its_tips():
     arm = arm_of(tendons(3, activation_bounds=(0.0, 0.02)))
     region = reachable_set(arm, accuracy=0.02)
-    tips = tip_map(arm).tips(random_activations(arm, 50))
+    tips = as_tip_map(arm).tips(random_activations(arm, 50))
     assert np.mean(region.contains(tips)) > 0.9
     assert not region.contains([[0.0, 0.0, 1.1 * LENGTH]]).any()
 
@@ -283,14 +283,14 @@ both = pytest.mark.parametrize("arm", [FREE, THICK], ids=["free", "loaded"])
 def test_a_tip_force_bends_an_elastica(load):
     force = load * BENDING / ONE**2
     bent = rod(sr.Loads(gravity=(0, 0, 0), tip_force=(force, 0, 0)))
-    tip = tip_map(bent, 1e-9).tips(AT_REST)[0]
+    tip = as_tip_map(bent, 1e-9).tips(AT_REST)[0]
     np.testing.assert_allclose(tip[[0, 2]], elastica.tip_loaded(load), atol=2e-8)
 
 
 @pytest.mark.parametrize("load", [1.0, 4.0, 10.0, 50.0])
 def test_a_heavy_cantilever_drops_as_published(load):
     gravity = load * BENDING / (WEIGHT * ONE**3)
-    tip = tip_map(rod(sr.Loads(gravity=(0, gravity, 0))), 1e-9, warn=False).tips(AT_REST)[0]
+    tip = as_tip_map(rod(sr.Loads(gravity=(0, gravity, 0))), 1e-9, warn=False).tips(AT_REST)[0]
     np.testing.assert_allclose(tip[[1, 2]], elastica.heavy(load), atol=2e-7)
 
 
@@ -316,7 +316,7 @@ def test_it_has_one_tip_and_shape(arm):
     shape = sr.configuration(arm, [])
     np.testing.assert_allclose(shape.position[-1], tip[0], atol=1e-6)
     assert shape.sizes["bundle"] == 0
-    np.testing.assert_array_equal(tip_map(arm).status(np.zeros((3, 0))), [TipStatus.STABLE] * 3)
+    np.testing.assert_array_equal(as_tip_map(arm).status(np.zeros((3, 0))), [TipStatus.STABLE] * 3)
     with pytest.raises(sr.InvalidInput, match=r"\(n, 0\)"):
         sr.tip_positions(arm, np.zeros((1, 1)))
 
@@ -338,8 +338,8 @@ def test_its_reachable_set_is_a_point(arm):
 
 @both
 def test_the_inverse_reaches_its_tip_and_nothing_else(arm):
-    tip = tip_map(arm, 1e-10).tips(AT_REST)[0]
-    here, elsewhere = sr.solve_inverse(tip_map(arm, 1e-10), [tip, tip + [0.0, 0.1, 0.0]])
+    tip = as_tip_map(arm, 1e-10).tips(AT_REST)[0]
+    here, elsewhere = sr.solve_inverse(as_tip_map(arm, 1e-10), [tip, tip + [0.0, 0.1, 0.0]])
     assert here.activations.shape == (1, 0)
     assert elsewhere.status.name == "UNREACHABLE"
     assert elsewhere.gap == pytest.approx(0.1, abs=1e-6)

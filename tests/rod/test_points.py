@@ -8,7 +8,7 @@ import pytest
 import softreach as sr
 from softreach.arm import Base, Drive, Marker
 from softreach.inverse.path import track_path
-from softreach.rod import marker_positions, tip_map
+from softreach.rod import as_tip_map, marker_positions
 from softreach.rod.rods import in_steps, measured_bundles
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.laws import in_box
@@ -45,7 +45,10 @@ NAMES = ["beside", "tool", "inside"]
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("made", ARMS.values(), ids=ARMS)
 def test_a_point_is_where_its_marker_is_and_moves_as_it_does(made, name):
-    rod, k = tip_map(made, 1e-9, point=name), [marker.name for marker in made.markers].index(name)
+    rod, k = (
+        as_tip_map(made, 1e-9, point=name),
+        [marker.name for marker in made.markers].index(name),
+    )
     gamma, step = 0.9 * in_box(made, 10) + 0.05 * rod.box.widths, 1e-4
     places = marker_positions(made, gamma, 1e-9)[:, k]
     np.testing.assert_allclose(rod.tips(gamma), places, atol=2e-9 * LENGTH)
@@ -66,14 +69,14 @@ def test_a_point_is_where_its_marker_is_and_moves_as_it_does(made, name):
 @pytest.mark.parametrize("tol", [1e-4, 1e-7])
 @pytest.mark.parametrize("name", NAMES)
 def test_the_tolerance_is_that_of_the_point(name, tol):
-    exact, gamma = tip_map(ARMS["free"], 1e-11, point=name), in_box(ARMS["free"], 500)
-    apart = tip_map(ARMS["free"], tol, point=name).tips(gamma) - exact.tips(gamma)
+    exact, gamma = as_tip_map(ARMS["free"], 1e-11, point=name), in_box(ARMS["free"], 500)
+    apart = as_tip_map(ARMS["free"], tol, point=name).tips(gamma) - exact.tips(gamma)
     assert np.linalg.norm(apart, axis=1).max() <= tol * LENGTH
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_bounds_of_the_linearization_hold_for_points(name):
-    rod = tip_map(ARMS["free"], 1e-9, point=name)
+    rod = as_tip_map(ARMS["free"], 1e-9, point=name)
     rng, half = np.random.default_rng(2), 0.1 * rod.box.widths
     centers = rod.box.from_cube(rng.uniform(0.1, 0.9, (200, 3)))
     change = half * rng.uniform(-1, 1, (200, 3))
@@ -112,9 +115,9 @@ def test_inverse_paths_and_clouds_are_of_the_point():
 def test_a_point_is_part_of_the_design_and_of_its_file():
     made = arm(point="tool")
     assert sr.Manipulator.from_toml(made.to_toml()) == made != arm()
-    assert tip_map(made) == tip_map(arm(), point="tool")
-    assert measured_bundles(tip_map(made)).point == AHEAD
-    assert in_steps(made, 9, tip_map(made)).point == AHEAD
+    assert as_tip_map(made) == as_tip_map(arm(), point="tool")
+    assert measured_bundles(as_tip_map(made)).point == AHEAD
+    assert in_steps(made, 9, as_tip_map(made)).point == AHEAD
 
 
 def test_unknown_points_are_refused_in_one_line():

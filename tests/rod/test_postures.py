@@ -13,11 +13,11 @@ from scipy.optimize import minimize
 import softreach as sr
 from softreach.arm import Manipulator, designs
 from softreach.arm.loads import Loads
-from softreach.rod.loaded import following
+from softreach.rod.loaded import flood
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.tables import ArmBody
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import by_lines, oracle_rod
 from tests.oracles.chain import Chain
@@ -62,7 +62,7 @@ def test_strict_steps_along_lines_lead_to_the_same_postures(name, monkeypatch):
     found = rod.equilibria(gamma)
     assert (found.status == TipStatus.STABLE).mean() >= share
     for limit in ("_CORRECTION", "_CORRECTION_OF_NODES"):
-        monkeypatch.setattr(following, limit, 0.1 * getattr(following, limit))
+        monkeypatch.setattr(flood, limit, 0.1 * getattr(flood, limit))
     strictly = by_lines(rod.solver, gamma)
     both = (found.status == TipStatus.STABLE) & (strictly.status == TipStatus.STABLE)
     assert both.mean() > 0.98
@@ -111,7 +111,7 @@ def test_a_chain_that_hangs_and_is_pulled_comes_to_rest_in_the_posture(name, sam
 
 def test_a_hanging_arm_leans_to_a_side_where_its_plane_of_symmetry_loses_its_stability():
     """At a pitchfork: continuously, and to the other side with the other twist."""
-    rod = tip_map(example("tentacle", 0.02), 1e-8)
+    rod = as_tip_map(example("tentacle", 0.02), 1e-8)
     postures = Postures.of(rod.rod.solver)
     planar = postures.find(np.array([[6.25, 6.25]]))
     assert planar.status[0] == TipStatus.STABLE
@@ -141,7 +141,7 @@ def test_a_hanging_arm_leans_to_a_side_where_its_plane_of_symmetry_loses_its_sta
 )
 def test_a_tentacle_that_hangs_first_is_where_a_shooting_from_the_base_has_it(payload, gamma, tip):
     """By DOP853 from the base [mm], refined; under up to 500 g, in one to eight segments."""
-    found, status = tip_map(example("tentacle", payload), warn=False).tips_and_status([gamma])
+    found, status = as_tip_map(example("tentacle", payload), warn=False).tips_and_status([gamma])
     assert status[0] == TipStatus.STABLE
     np.testing.assert_allclose(1e3 * found[0], tip, atol=1e-3)
 
@@ -166,7 +166,7 @@ def test_the_compliance_under_500_g_is_the_difference_of_tips():
     """To 1e-5 of itself, along eight segments."""
     arm, force, gamma = example("tentacle", 0.5), np.array([3e-3, -2e-3, 4e-3]), [[8.0, 2.0]]
     there, at, back = (
-        tip_map(
+        as_tip_map(
             arm.replace(loads=arm.loads.replace(tip_force=tuple(sign * force))), 1e-10, warn=False
         )
         for sign in (1, 0, -1)

@@ -17,7 +17,7 @@ from softreach.arm.bending import bending_at
 from softreach.arm.loads import PointLoad
 from softreach.forces import blocked_force
 from softreach.rest import rest
-from softreach.rod import tip_map
+from softreach.rod import as_tip_map
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.rods import free_bundles
 from softreach.stiffness import cloud_compliance, tip_compliance
@@ -97,7 +97,7 @@ def test_tendons_far_off_the_axis_bend_alike(loads):
 
 @pytest.mark.parametrize("loads", [None, sr.Loads(payload=0.02)])
 def test_slopes_are_those_of_the_tips(loads):
-    rod = sr.rod.tip_map(_hanging(curvature_x=3.0, twist=1.0).replace(loads=loads), 1e-9)
+    rod = sr.rod.as_tip_map(_hanging(curvature_x=3.0, twist=1.0).replace(loads=loads), 1e-9)
     x, step = np.array([[0.7, 0.3, 1.2]]), 1e-4
     tips, slopes = rod.tips_and_slopes(x)
     for k, d in enumerate(step * np.eye(3)):
@@ -317,7 +317,7 @@ class TestEquivariance:
     def test_more_than_three_bundles_find_the_same_places_and_directions(self):
         arm = sr.designs.redundant_trunk()
         posed, gamma = arm.replace(base=POSE), in_box(arm, 5)
-        motions = tip_map(arm).tip_motions(gamma)
+        motions = as_tip_map(arm).tip_motions(gamma)
         wanted = {"direction": motions.directions}
         one = sr.solve_inverse(arm, motions.tips, **wanted)
         turned = {"direction": POSE.directions_to_world(motions.directions)}
@@ -335,7 +335,7 @@ class TestEquivariance:
         gamma = in_box(trunk, 100)
         ask = (
             lambda arm: sr.dexterity.dexterity(sr.compute_cloud(arm, 500)).to_array().values,
-            lambda arm: tip_map(arm).strains(gamma, [0.3, 0.8]).curvature,
+            lambda arm: as_tip_map(arm).strains(gamma, [0.3, 0.8]).curvature,
         )
         for question in ask:
             np.testing.assert_allclose(question(trunk), question(posed), rtol=1e-6)
@@ -349,7 +349,7 @@ class TestEquivariance:
 
     def test_a_map_of_free_bundles_is_placed_too(self, trunk):
         held = trunk.with_bounds(((-1, 0), (-0.5, -0.5), (-1, 0.3)))
-        one, other = (free_bundles(tip_map(arm)) for arm in (held, held.replace(base=POSE)))
+        one, other = (free_bundles(as_tip_map(arm)) for arm in (held, held.replace(base=POSE)))
         gamma = one.box.from_cube(np.random.default_rng(0).random((10, 2)))
         np.testing.assert_array_equal(other.tips(gamma), POSE.to_world(one.tips(gamma)))
         assert other.pose == POSE
@@ -366,8 +366,8 @@ class TestLoads:
         gravity = base.rotation.T @ (0.0, 0.0, -9.81)
         upright = lce.replace(loads=sr.Loads(gravity=gravity, payload=0.001))
         gamma = in_box(lce, 20)
-        tips, status = tip_map(posed).tips_and_status(gamma)
-        expected, there = tip_map(upright).tips_and_status(gamma)
+        tips, status = as_tip_map(posed).tips_and_status(gamma)
+        expected, there = as_tip_map(upright).tips_and_status(gamma)
         np.testing.assert_array_equal(status, there)
         np.testing.assert_array_equal(tips, base.to_world(expected))
 
@@ -395,14 +395,14 @@ class TestLoads:
         found = cloud_compliance(cloud).compliance
         expected = tip_compliance(posed, cloud.activation.values)
         np.testing.assert_allclose(found, expected, rtol=1e-12)
-        in_base = tip_compliance(tip_map(posed, frame="base"), gamma)
+        in_base = tip_compliance(as_tip_map(posed, frame="base"), gamma)
         np.testing.assert_allclose(turn @ in_base @ turn.T, matrices, atol=1e-12)
 
     def test_a_compliance_is_how_a_force_in_the_world_moves_the_tip(self, loaded):
         _, posed = loaded
         gamma, step = in_box(posed, 3), 1e-3
         ends = [
-            tip_map(
+            as_tip_map(
                 posed.replace(
                     loads=posed.loads.replace(tip_force=np.add(posed.loads.tip_force, f))
                 ),
@@ -457,14 +457,14 @@ class TestFrames:
         assert reached.volume == sr.reachable_set(trunk, accuracy=0.1).volume
 
     def test_a_tip_map_goes_to_the_base_and_stays_there(self, posed):
-        world, base = tip_map(posed), tip_map(posed, frame="base")
+        world, base = as_tip_map(posed), as_tip_map(posed, frame="base")
         assert (world.frame, base.frame) == ("world", "base")
-        assert tip_map(world, frame="base") == base
-        assert tip_map(base) is base
+        assert as_tip_map(world, frame="base") == base
+        assert as_tip_map(base) is base
         assert free_bundles(world).frame == "world"
 
     def test_there_are_no_other_frames(self, posed):
-        for ask in (tip_map, lambda arm, frame: sr.compute_cloud(arm, 10, frame=frame)):
+        for ask in (as_tip_map, lambda arm, frame: sr.compute_cloud(arm, 10, frame=frame)):
             with pytest.raises(InvalidInput, match=r"frame = .*tip.*must be one of world, base"):
                 ask(posed, frame="tip")
 

@@ -12,28 +12,28 @@ from softreach.arm import Chamber, LinearTaper, Loads, Material, Ring, Section, 
 from softreach.rod import tip_positions
 from softreach.rod.free import FreeRod
 from softreach.rod.inputs import activation_measures
-from softreach.rod.rods import free_bundles, in_steps, measured_bundles, tip_map
+from softreach.rod.rods import as_tip_map, free_bundles, in_steps, measured_bundles
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.laws import in_box
 
 
 def test_an_arm_without_loads_is_a_free_rod(trunk):
-    assert tip_map(trunk).rod == FreeRod(trunk, 1e-6)
+    assert as_tip_map(trunk).rod == FreeRod(trunk, 1e-6)
 
 
 def test_equal_arms_and_tolerances_share_one_tip_map(trunk):
-    rod = tip_map(trunk, 1e-7)
-    assert tip_map(designs.minimal_trunk(), np.float64(1e-7)) is rod
-    assert tip_map(rod) is rod
-    assert tip_map(trunk, 1e-8) is not rod
-    assert tip_map(trunk.with_bounds((-1, 0)), 1e-7) is not rod
+    rod = as_tip_map(trunk, 1e-7)
+    assert as_tip_map(designs.minimal_trunk(), np.float64(1e-7)) is rod
+    assert as_tip_map(rod) is rod
+    assert as_tip_map(trunk, 1e-8) is not rod
+    assert as_tip_map(trunk.with_bounds((-1, 0)), 1e-7) is not rod
 
 
 @pytest.mark.parametrize("loads", [None, Loads(payload=0.1)])
 def test_maps_in_other_steps_are_other_maps(trunk, loads):
     arm = rubber(trunk, loads)
-    rod, gamma = tip_map(arm), in_box(arm, 20)
+    rod, gamma = as_tip_map(arm), in_box(arm, 20)
     coarse = in_steps(arm, 3, rod)
     assert coarse != rod
     assert coarse == in_steps(arm, 3, rod)
@@ -43,7 +43,7 @@ def test_maps_in_other_steps_are_other_maps(trunk, loads):
 
 
 def test_what_is_remembered_is_computed_once(trunk, monkeypatch):
-    rod = tip_map(trunk, 3e-7)
+    rod = as_tip_map(trunk, 3e-7)
     before = rod.tips([[-1.0, 0.0, -0.5]])
 
     def never(*_):
@@ -55,7 +55,7 @@ def test_what_is_remembered_is_computed_once(trunk, monkeypatch):
 
 def test_many_arms_are_not_all_kept():
     for k in range(70):
-        tip_map(designs.minimal_trunk(length=800.0 + k))
+        as_tip_map(designs.minimal_trunk(length=800.0 + k))
     gc.collect()
     kept = [one for one in gc.get_objects() if type(one) is FreeRod and one.length >= 800.0]
     assert len(kept) <= 64
@@ -64,19 +64,19 @@ def test_many_arms_are_not_all_kept():
 @pytest.mark.parametrize("arm", [None, "trunk", 3.0, FreeRod])
 def test_what_is_no_arm_is_refused(arm):
     with pytest.raises(InvalidInput, match="must be a Manipulator or a TipMap"):
-        tip_map(arm)
+        as_tip_map(arm)
 
 
 @pytest.mark.parametrize("tol", [0, 1e-13, -1, np.nan, np.inf, None, "small", True])
 def test_a_tolerance_out_of_range_is_refused(trunk, tol):
     with pytest.raises(InvalidInput, match="tol = "):
-        tip_map(trunk, tol)
+        as_tip_map(trunk, tol)
 
 
 def test_an_arm_beyond_the_theory_is_refused_every_time(trunk):
     for _ in range(2):
         with pytest.raises(InvalidDesign, match="must keep ζ > 0"):
-            tip_map(trunk.with_bounds((-9.0, 0.0)))
+            as_tip_map(trunk.with_bounds((-9.0, 0.0)))
 
 
 # Activations of different units are compared in their own ranges
@@ -97,7 +97,7 @@ def arm_of(*actuators):
 
 def test_strains_count_as_they_are(trunk):
     np.testing.assert_array_equal(activation_measures(trunk), np.ones(trunk.bundles))
-    assert measured_bundles(tip_map(trunk)) is tip_map(trunk)
+    assert measured_bundles(as_tip_map(trunk)) is as_tip_map(trunk)
 
 
 def test_activations_of_one_unit_keep_their_proportions():
@@ -116,7 +116,7 @@ def test_a_held_bundle_has_a_measure_too(held):
 
 
 def test_the_map_is_the_same_in_other_measures():
-    rod = tip_map(arm_of(TENDONS, CHAMBER))
+    rod = as_tip_map(arm_of(TENDONS, CHAMBER))
     other, gamma = measured_bundles(rod), in_box(rod.arm, 20)
     shares = gamma / activation_measures(rod.arm)
     np.testing.assert_allclose(other.tips(shares), rod.tips(gamma), atol=1e-14)
@@ -127,10 +127,10 @@ def test_the_map_is_the_same_in_other_measures():
 
 def test_held_and_measured_bundles_of_a_loaded_arm_keep_its_status():
     arm = arm_of(TENDONS, CHAMBER).with_bounds(((0, 8), (0, 4), (3, 3), (0, 5e4)))
-    whole = tip_map(arm.replace(loads=Loads(gravity=(0, 0, 0), tip_force=(0.02, 0, 0))))
+    whole = as_tip_map(arm.replace(loads=Loads(gravity=(0, 0, 0), tip_force=(0.02, 0, 0))))
     restricted = free_bundles(measured_bundles(whole))
     assert restricted.supports_unstable
-    assert not tip_map(arm).supports_unstable
+    assert not as_tip_map(arm).supports_unstable
     gamma = in_box(arm, 5)
     shares = (gamma / activation_measures(arm))[:, whole.box.free]
     np.testing.assert_array_equal(restricted.status(shares), whole.status(gamma))

@@ -23,7 +23,7 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import ArmMap, tip_map
+from softreach.rod.rods import ArmMap, as_tip_map
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
@@ -440,6 +440,6 @@ def test_its_radius_is_that_of_the_arm_at_rest(make, share, trunk):
 
 
 def test_a_tip_map_is_its_own(make, trunk):
-    rod = tip_map(make(trunk, 1e-9))
-    assert tip_map(rod) is rod
-    assert tip_map(rod, 1e-3) is rod
+    rod = as_tip_map(make(trunk, 1e-9))
+    assert as_tip_map(rod) is rod
+    assert as_tip_map(rod, 1e-3) is rod

@@ -23,7 +23,7 @@ from softreach.arm.loads import Loads
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import free_bundles, measured_bundles, refined, tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles, refined, with_unstable
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import rubber
 from tests.laws import in_box
@@ -55,14 +55,14 @@ def heavy() -> LoadedRod:
 def test_each_equilibrium_of_stable_tips_is_found_once(heavy, ask, monkeypatch):
     direct, found = Postures.direct, []
     x = in_box(HEAVY, 20)
-    ask(tip_map(heavy), x)  # what all samples need is there now
+    ask(as_tip_map(heavy), x)  # what all samples need is there now
 
     def counted(postures, gamma, rows, equilibria):
         found.append(len(gamma[rows]))
         direct(postures, gamma, rows, equilibria)
 
     monkeypatch.setattr(Postures, "direct", counted)
-    ask(tip_map(heavy), x)
+    ask(as_tip_map(heavy), x)
     assert sum(found) == len(x)
 
 
@@ -70,7 +70,7 @@ def test_stable_tips_are_those_of_the_map_where_it_is_stable(heavy):
     x = in_box(HEAVY, 200)
     tips, status = heavy.tips_and_status(x)
     stable = status == TipStatus.STABLE
-    view = tip_map(heavy)
+    view = as_tip_map(heavy)
     np.testing.assert_array_equal(view.tips(x), np.where(stable[:, None], tips, np.nan))
     np.testing.assert_array_equal(view.status(x), status)
     np.testing.assert_array_equal(with_unstable(view).tips(x), tips)

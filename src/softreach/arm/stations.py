@@ -214,7 +214,7 @@ def placed(part: Made, stations: Mapping[str, float]) -> Made:
     """
     given = {field: getattr(part, field) for field in part.places}
     names = {
-        field: str(getattr(place, "name", place))
+        field: place.name if isinstance(place, Station) else place
         for field, place in given.items()
         if isinstance(place, str | Station)
     }

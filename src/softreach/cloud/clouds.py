@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import all_inputs, tip_map, with_unstable
+from softreach.rod.rods import all_inputs, as_tip_map, with_unstable
 from softreach.rod.tip_map import BLOCK, Frame, TipMap
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.atomic import place_to_read, replacing_folder
+from softreach.support.files.atomic import replacing_folder
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.stores import (
     ARRAYS,
@@ -91,18 +91,22 @@ def compute_cloud(
             says what to use instead.
     """
     report = None if progress is None else as_function("progress", progress)
-    rod = with_unstable(all_inputs(tip_map(arm, tol, frame=frame, point=point)))
-    bundles = rod.box.bundles
+    tip_map = with_unstable(all_inputs(as_tip_map(arm, tol, frame=frame, point=point)))
+    bundles = tip_map.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
-    status = np.empty(n if rod.supports_unstable else 0, np.int8)
+    status = np.empty(n if tip_map.supports_unstable else 0, np.int8)
     show_bar = report is None and n > _LONG
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
-        _fill(rod, activation, tip, status, cube_blocks(sampler, n, bundles, seed, BLOCK), shown)
+        _fill(
+            tip_map, activation, tip, status, cube_blocks(sampler, n, bundles, seed, BLOCK), shown
+        )
     drawn = {"seed": seed, "sampler": sampler}
-    cloud = schema.cloud_dataset(rod.arm, activation, tip, **drawn, tol=rod.tol, frame=rod.frame)
-    return schema.with_status(cloud, status) if rod.supports_unstable else cloud
+    cloud = schema.cloud_dataset(
+        tip_map.arm, activation, tip, **drawn, tol=tip_map.tol, frame=tip_map.frame
+    )
+    return schema.with_status(cloud, status) if tip_map.supports_unstable else cloud
 
 
 def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -141,7 +145,7 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr
 
-    location = place_to_read(as_path("path", path))
+    location = as_path("path", path)
     opened = opened_store(location, "cloud")
     if opened is None or "command" in opened.group.attrs:
         hint = f"it does not exist, or has no {ROOT}" if opened is None else "this is an atlas"
@@ -168,11 +172,11 @@ def design_of(cloud: xr.Dataset) -> Manipulator:
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     arm = design_of(cloud)
-    return tip_map(arm, float(cloud.attrs["tol"]), frame=schema.frame_of(cloud))
+    return as_tip_map(arm, float(cloud.attrs["tol"]), frame=schema.frame_of(cloud))
 
 
 def _fill(
-    rod: TipMap,
+    tip_map: TipMap,
     activation: Array,
     tip: Array,
     status: NDArray[np.int8],
@@ -180,7 +184,7 @@ def _fill(
     progress: Progress | None,
 ) -> None:
     def fill(gamma: Array, tips: Array, kept: NDArray[np.int8] | None) -> None:
-        rod.fill(gamma, tips, status=kept)
+        tip_map.fill(gamma, tips, status=kept)
         if progress:
             progress(len(gamma))
 
@@ -188,11 +192,11 @@ def _fill(
         first = 0
         for cube in cubes:
             block = slice(first, first := first + len(cube))
-            rod.box.from_cube(cube, out=activation[block])
+            tip_map.box.from_cube(cube, out=activation[block])
             kept = status[block] if len(status) else None
             yield partial(fill, activation[block], tip[block], kept)
 
-    rod.prepare()
+    tip_map.prepare()
     parallel.run(tasks())
 
 

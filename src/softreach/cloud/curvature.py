@@ -18,7 +18,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import Tables, ends_over, tables
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.rods import ArmMap, all_inputs, tip_map
+from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import Strains, TipMap, loads_too_heavy, no_equilibrium_message
 from softreach.schema import check_cloud, provenance
@@ -113,14 +113,14 @@ def stream_statistics(
     bins = as_integer("bins", bins, 1, _MOST)
     shares = as_shares("quantiles", quantiles)
     blocks = _blocks("activations", activations)
-    rod = tip_map(arm)
-    places = distal_stations(rod) if stations is None else stations
-    z = rod.check_stations(np.atleast_1d(as_floats("stations", places)), ascending=False)
+    tip_map = as_tip_map(arm)
+    places = distal_stations(tip_map) if stations is None else stations
+    z = tip_map.check_stations(np.atleast_1d(as_floats("stations", places)), ascending=False)
     tallies = {
         name: _Tally.between(ends, bins)
-        for name, ends in zip(QUANTITIES, strain_ranges(rod, z), strict=True)
+        for name, ends in zip(QUANTITIES, strain_ranges(tip_map, z), strict=True)
     }
-    for strains in _strains(rod, blocks, z):
+    for strains in _strains(tip_map, blocks, z):
         for k in range(len(z)):
             u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
             tallies["bending"].add(k, np.hypot(u1, u2))  # theory (7), (45)
@@ -128,7 +128,7 @@ def stream_statistics(
             tallies["extension"].add(k, strains.extension[:, k])
     if not tallies["bending"].count.any():
         raise InvalidInput("activations", "none", "at least one sample")
-    return _dataset(rod, z, tallies, shares)
+    return _dataset(tip_map, z, tallies, shares)
 
 
 def distal_stations(arm: Manipulator | TipMap) -> Array:
@@ -143,18 +143,18 @@ def _blocks(name: str, value: Any) -> Iterable[Array]:
     raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
 
 
-def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
+def _strains(tip_map: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
     for activation in activations:
-        block = rod.check_activations("activations", activation)
+        block = tip_map.check_activations("activations", activation)
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
-            curvature, extension = rod.strains(block[rows], z)
-            if rod.supports_unstable:  # samples without a stable equilibrium are NaN
+            curvature, extension = tip_map.strains(block[rows], z)
+            if tip_map.supports_unstable:  # samples without a stable equilibrium are NaN
                 settled = np.isfinite(extension).all(axis=1)
                 curvature, extension = curvature[settled], extension[settled]
             yield Strains(curvature, extension)
 
 
-def strain_ranges(rod: ArmMap, z: Array) -> tuple[Array, Array, Array]:
+def strain_ranges(tip_map: ArmMap, z: Array) -> tuple[Array, Array, Array]:
     """Ranges within the activation box of bending, torsion and extension, (station, 2) each.
 
     Exact but for bending, which is at most 1e-5 too large for fibers and muscles, and with tendons
@@ -162,17 +162,17 @@ def strain_ranges(rod: ArmMap, z: Array) -> tuple[Array, Array, Array]:
     are those of samples: others may strain the arm a little more.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         z: Z of the stations [m].
 
     Raises:
         InvalidInput: Under loads no sample has an equilibrium.
     """
-    driving, inner = rod.inputs.driving, rod.rod
+    driving, inner = tip_map.inputs.driving, tip_map.rod
     if driving is not None and driving.has_length_tendons:
-        whole = all_inputs(rod)
+        whole = all_inputs(tip_map)
         return _sampled(whole.strains(whole.box.from_cube(pilot(whole.box.bundles)), z))
-    if not rod.supports_unstable:
+    if not tip_map.supports_unstable:
         return _exact(tables(inner.arm, z), inner.box)
     gamma = pilot_activations(inner.arm, inner.box)
     strains = inner.strains(gamma, z)
@@ -274,7 +274,7 @@ def _quantiles(count: Index, edges: Array, extremes: Array, shares: Array) -> Ar
     return np.clip(np.interp(shares, below[corners], edges[corners]), *extremes)
 
 
-def _dataset(rod: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Array) -> xr.Dataset:
+def _dataset(tip_map: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Array) -> xr.Dataset:
     import xarray as xr
 
     variables = {}
@@ -294,5 +294,5 @@ def _dataset(rod: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Array
         "quantile": quantiles,
     }
     samples = int(tallies["bending"].count[0].sum())
-    attrs = {**provenance(rod.arm, rod.frame), "length": rod.length, "samples": samples}
+    attrs = {**provenance(tip_map.arm, tip_map.frame), "length": tip_map.length, "samples": samples}
     return xr.Dataset(variables, coordinates, attrs)

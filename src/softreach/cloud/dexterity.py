@@ -50,13 +50,13 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     import xarray as xr
 
     check_cloud(cloud)
-    rod, n = tip_map_of(cloud), cloud.sizes["sample"]
-    if not rod.box.bundles:
+    tip_map, n = tip_map_of(cloud), cloud.sizes["sample"]
+    if not tip_map.box.bundles:
         raise InvalidInput("bundles", 0, "1 or more: nothing moves the tip")
     measure, condition = np.empty(n), np.empty(n)
     sign = np.empty(n, np.int8)
     for rows in parallel.blocks(n, 8 * BLOCK):
-        _, slope = rod.tips_and_slopes(cloud.activation[rows].values)
+        _, slope = tip_map.tips_and_slopes(cloud.activation[rows].values)
         results = slope, measure[rows], condition[rows], sign[rows]
         parallel.run(
             partial(_measure, *(each[part] for each in results))
@@ -67,7 +67,7 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     result = xr.Dataset(coords=status, attrs=cloud.attrs)
     result["manipulability"] = ("sample", measure, {"units": unit, "long_name": "√det(J Jᵀ)"})
     result["condition"] = ("sample", condition, {"units": "1", "long_name": "condition of J"})
-    if rod.box.bundles == 3:
+    if tip_map.box.bundles == 3:
         result["orientation"] = ("sample", sign, {"units": "1", "long_name": "sign of det J"})
     return result
 

@@ -13,8 +13,8 @@
 5. Damped Newton with the exact Jacobian leads from each start to a root
    (`kernels.branches.newton`).
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
-   opposite, along the null direction of the Jacobian (`kernels.branches.folds`), and is searched as
-   well.
+   opposite, along the null direction of the Jacobian (`newton.second_preimages`), and is searched
+   as well.
 7. Roots between which the tip hardly leaves the target are one.
 8. A root beyond a bound is one on the bound if the tip misses no more there than the error of the
    map leaves open.
@@ -43,7 +43,7 @@ from softreach.inverse.roots import (
     roots_at,
     smallest_singular_values,
 )
-from softreach.kernels.branches import candidates, folds, newton
+from softreach.kernels.branches import candidates, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.rod.tip_map import TipMap
@@ -82,10 +82,10 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     """
     count = len(request.targets)
     if not count:
-        return no_roots(prepared.rod)
+        return no_roots(prepared.tip_map)
     prepared.prepare_branches(count)
     sets = _sets(spatial_order(request.targets), _set_size(prepared, count))
-    if prepared.rod.supports_unstable or len(sets) == 1:
+    if prepared.tip_map.supports_unstable or len(sets) == 1:
         parts = [_branches_of(prepared, request, chosen) for chosen in sets]
     else:
         parts = list(
@@ -103,7 +103,7 @@ def _sets(order: Index, size: int) -> list[Index]:
 
 def _set_size(prepared: PreparedMap, count: int) -> int:
     """Number of targets to solve together: enough of them for kernels, enough sets for threads."""
-    if prepared.rod.supports_unstable:
+    if prepared.tip_map.supports_unstable:
         return _LARGEST_LOADED  # work enough to be shared out among threads
     return min(_LARGEST, max(_SMALLEST, -(-count // (_SHARES * parallel.thread_count()))))
 
@@ -133,37 +133,37 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
 
 def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     """Steps 5 and 8: damped Newton from every start; the roots that are within the bounds."""
-    rod, goal = prepared.rod, request.targets[starts.target]
-    low, high = rod.box.low.copy(), rod.box.high.copy()
-    search = _search(goal, _improved(rod, goal, starts))
+    tip_map, goal = prepared.tip_map, request.targets[starts.target]
+    low, high = tip_map.box.low.copy(), tip_map.box.high.copy()
+    search = _search(goal, _improved(tip_map, goal, starts))
     for _ in range(_MOST_ITERATIONS):
         active = np.flatnonzero(search.state == RUNNING)
         if not len(active):
             break
-        tips, slopes = rod.tips_and_slopes(search.trial[active])
+        tips, slopes = tip_map.tips_and_slopes(search.trial[active])
         newton.newton_step(search, active, tips, slopes, low, high, request.residual)
-        if rod.supports_unstable:
+        if tip_map.supports_unstable:
             # A search whose step leads nowhere has ended, as where the tip moves without limit.
             lost = active[~np.isfinite(search.trial[active]).all(axis=1)]
             search.trial[lost], search.state[lost] = search.gamma[lost], STAGNATED
     converged = np.flatnonzero(search.state == CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     trial, goal = search.trial[converged], goal[converged]
-    gamma = rod.box.clip(trial)
+    gamma = tip_map.box.clip(trial)
     roots = Roots(
         starts.target[converged],
         gamma,
         search.slope[converged],
-        np.linalg.norm(placed(rod, gamma) - goal, axis=1),
+        np.linalg.norm(placed(tip_map, gamma) - goal, axis=1),
         starts.cell[converged],
     )
     within = roots.residual <= request.residual
     over = ~within & (gamma != trial).any(axis=1)
-    on_bounds = _moved_to_bounds(rod, request, rows(roots, over), goal[over])
+    on_bounds = _moved_to_bounds(tip_map, request, rows(roots, over), goal[over])
     return rows(roots, within).joined(on_bounds)
 
 
-def _moved_to_bounds(rod: TipMap, request: Request, roots: Roots, goal: Array) -> Roots:
+def _moved_to_bounds(tip_map: TipMap, request: Request, roots: Roots, goal: Array) -> Roots:
     """Step 8: those of roots beyond bounds that miss little enough on the bounds.
 
     What moves a tip by the allowance moves a root by that over the smallest singular value, and to
@@ -173,32 +173,32 @@ def _moved_to_bounds(rod: TipMap, request: Request, roots: Roots, goal: Array) -
     roots, goal = rows(roots, near), goal[near]
     if not len(goal):
         return roots
-    ends = descend(rod, goal, roots.gamma, request.residual)
-    slope = rod.tips_and_slopes(ends.gamma)[1]
+    ends = descend(tip_map, goal, roots.gamma, request.residual)
+    slope = tip_map.tips_and_slopes(ends.gamma)[1]
     roots = roots._replace(gamma=ends.gamma, slope=slope, residual=ends.distance)
     return rows(roots, roots.residual <= request.allowance)
 
 
-def _improved(rod: TipMap, goal: Array, starts: Starts) -> Array:
+def _improved(tip_map: TipMap, goal: Array, starts: Starts) -> Array:
     """The starts after steps with the inverse known there: tips cost a fraction of Jacobians.
 
     A step that does not bring the tip much nearer to its target is not taken.
     """
     gamma = starts.gamma.copy()
-    if rod.supports_unstable:
+    if tip_map.supports_unstable:
         return gamma
-    steepest = np.abs(starts.inverse).max(axis=(1, 2)) * rod.length
+    steepest = np.abs(starts.inverse).max(axis=(1, 2)) * tip_map.length
     row = np.flatnonzero((steepest > 0) & (steepest < _STEEP))
-    miss = goal[row] - rod.tips(gamma[row])
+    miss = goal[row] - tip_map.tips(gamma[row])
     for steps_left in reversed(range(_CHORD_STEPS)):
         step = np.einsum("nij,nj->ni", starts.inverse[row], miss)
-        short = (np.abs(step) <= _LONGEST_CHORD * rod.box.widths).all(axis=1)
+        short = (np.abs(step) <= _LONGEST_CHORD * tip_map.box.widths).all(axis=1)
         row, step, miss = row[short], step[short], miss[short]
         trial = gamma[row] + step
         if not steps_left:  # Newton's method looks at the last one
             gamma[row] = trial
             break
-        next_miss = goal[row] - rod.tips(trial)
+        next_miss = goal[row] - tip_map.tips(trial)
         nearer = (next_miss**2).sum(axis=1) <= _MUCH_NEARER**2 * (miss**2).sum(axis=1)
         row, miss = row[nearer], next_miss[nearer]
         gamma[row] = trial[nearer]
@@ -235,13 +235,13 @@ def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roo
 def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
     """Near the second preimage of every root that has a fold near, once for each overshoot."""
     roots = rows(roots, roots.cell >= 0)
-    box, parts = prepared.rod.box, [Starts.empty(0)]
+    box, parts = prepared.tip_map.box, [Starts.empty(0)]
     margin = _OUTSIDE * box.widths  # a start moved to the bounds may be short of the other root
     for overshoot in _OVERSHOOTS:
         start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
         known = roots.cell, roots.gamma, roots.slope, smallest_singular_values(roots.slope)
         bounds = box.low - margin, box.high + margin
-        folds.second_preimages(
+        newton.second_preimages(
             prepared.mesh, *known, _PARTNER_RANGE, overshoot, *bounds, start, near
         )
         roots, unknown = rows(roots, near), np.zeros((int(near.sum()), 3, 3))
@@ -256,7 +256,7 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     offsets = np.concatenate([[0], np.cumsum(counts[counts > 1])])
     compared = roots.gamma[several], roots.residual[several]
     smallest = smallest_singular_values(roots.slope[several])
-    single, rounding = np.ones(len(several), bool), _ROUNDING * prepared.rod.length
+    single, rounding = np.ones(len(several), bool), _ROUNDING * prepared.tip_map.length
     newton.merge_equal(offsets, *compared, smallest, rounding, single)
     kept = np.ones(len(roots.target), bool)
     kept[several] = single
@@ -267,8 +267,8 @@ def _singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> R
     """Step 9: what descent finds for targets where Newton's method found nothing."""
     starts = starts_from_cells(prepared, request, chosen)
     targets = request.targets[starts.target]
-    gamma = nearest_tips(prepared.rod, starts.gamma, targets, request.residual, CLOSELY).gamma
-    roots = roots_at(prepared.rod, request.targets, starts.target, gamma)
+    gamma = nearest_tips(prepared.tip_map, starts.gamma, targets, request.residual, CLOSELY).gamma
+    roots = roots_at(prepared.tip_map, request.targets, starts.target, gamma)
     return distinct(prepared, request, rows(roots, roots.residual <= request.residual))
 
 
@@ -305,7 +305,7 @@ def starts_from_cells(
     parts = [Starts.empty(0)]
     if not len(prepared.mesh.corner) or not len(chosen):
         return parts[0]
-    box, targets = prepared.rod.box, request.targets[chosen]
+    box, targets = prepared.tip_map.box, request.targets[chosen]
     low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
     for block, tree in _trees(prepared, targets):
         first, last, _ = block.indices(len(targets))

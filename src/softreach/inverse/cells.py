@@ -28,28 +28,28 @@ _MOST_ITEMS = 8_000_000
 _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 
 
-def activation_cells(rod: TipMap, cells: int) -> tuple[ActivationMesh, TornCells]:
+def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornCells]:
     """Cells of the activation box with tips and Jacobians at their corners; those without apart.
 
     Args:
-        rod: A tip map of three bundles, each free to move.
+        tip_map: A tip map of three bundles, each free to move.
         cells: Cells along each axis of the box.
     """
     place = np.stack(np.unravel_index(np.arange((cells + 1) ** 3), (cells + 1,) * 3), -1)
-    gamma = rod.box.from_cube(place / cells)
-    vertices = _Vertices(gamma, *rod.tips_and_slopes(gamma))
+    gamma = tip_map.box.from_cube(place / cells)
+    vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
     low = place[(place < cells).all(axis=1), None]
     corner = (low + _CORNERS) @ np.array([(cells + 1) ** 2, cells + 1, 1])
-    mesh = _mesh(rod, vertices, corner)
+    mesh = _mesh(tip_map, vertices, corner)
     torn = np.zeros(len(corner), bool)
-    if rod.supports_unstable:
+    if tip_map.supports_unstable:
         torn = np.isnan(vertices.tip[corner, 0]).any(axis=1)
-        torn |= mesh.interpolation_error > _TORN * rod.length
+        torn |= mesh.interpolation_error > _TORN * tip_map.length
     if torn.any():
-        mesh = _mesh(rod, vertices, corner[~torn])
+        mesh = _mesh(tip_map, vertices, corner[~torn])
     vertex = np.unique(corner[torn])
     found = rows(vertices, vertex[np.isfinite(vertices.tip[vertex, 0])])
-    return mesh, TornCells.at(found, rod.box.widths / cells)
+    return mesh, TornCells.at(found, tip_map.box.widths / cells)
 
 
 class _Vertices(NamedTuple):
@@ -142,10 +142,10 @@ class TornCells(NamedTuple):
         return np.nonzero(near)[0], vertex[near]
 
 
-def _mesh(rod: TipMap, vertices: _Vertices, corner: Index) -> ActivationMesh:
+def _mesh(tip_map: TipMap, vertices: _Vertices, corner: Index) -> ActivationMesh:
     error, remainder = np.empty(len(corner)), np.empty(len(corner))
     interpolation_errors(*vertices, corner, error, remainder)
-    error += 1e-9 * rod.length  # rounding must not put a target between two tetrahedra
+    error += 1e-9 * tip_map.length  # rounding must not put a target between two tetrahedra
     slope = vertices.slope
     change = np.sqrt(((slope[corner[:, 7]] - slope[corner[:, 0]]) ** 2).sum((1, 2)))
     for bit in (1, 2, 4):

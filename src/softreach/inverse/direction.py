@@ -12,7 +12,7 @@ from softreach.inverse.nearest import descend, first_of_each, nearest_at, starts
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots
-from softreach.kernels.box.box_newton import box_steps
+from softreach.kernels.box.bounded_descent import box_steps
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
@@ -39,34 +39,34 @@ def compromises(prepared: PreparedMap, request: Request, known: Roots | None = N
         request: Targets, and directions to trade against distance.
         known: Roots to begin from as well.
     """
-    rod, targets = prepared.rod, request.targets
+    tip_map, targets = prepared.tip_map, request.targets
     assert request.direction is not None
     target, start = starts(prepared, targets, known)
     objective = Objective(
-        rod=rod,
+        tip_map=tip_map,
         targets=targets[target],
         direction=request.direction[target],
         direction_weight=request.direction_weight,
     )
-    gamma, value = minimize(objective, start, rod.box)
-    return nearest_at(rod, targets, gamma[first_of_each(target, value, len(targets))])
+    gamma, value = minimize(objective, start, tip_map.box)
+    return nearest_at(tip_map, targets, gamma[first_of_each(target, value, len(targets))])
 
 
-def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
+def constrained_minima(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
     """Minimize ½|γ - near|² + ½ w²|d3 - direction|² subject to tip = target, from each start.
 
     Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], whose inner searches respect the
     bounds, then descent to the target.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         request: A target for each start, and what is preferred.
         start: Activations to begin with [-], shape (n, m).
 
     Returns:
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
     """
-    gamma, multiplier = start.copy(), _multipliers(rod, request, start)
+    gamma, multiplier = start.copy(), _multipliers(tip_map, request, start)
     residual = np.full(len(start), np.inf)
     for penalty in _PENALTIES:
         rows = np.flatnonzero(residual > 0.1 * request.residual)
@@ -75,7 +75,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
         part = request.of(rows)
         assert part.direction is not None
         lagrangian = Objective(
-            rod=rod,
+            tip_map=tip_map,
             targets=part.targets,
             penalty=penalty,
             multiplier=multiplier[rows],
@@ -83,17 +83,17 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
             direction=part.direction,
             direction_weight=part.direction_weight,
         )
-        gamma[rows] = minimize(lagrangian, gamma[rows], rod.box)[0]
-        error = (rod.tips_and_slopes(gamma[rows])[0] - part.targets) / rod.length
+        gamma[rows] = minimize(lagrangian, gamma[rows], tip_map.box)[0]
+        error = (tip_map.tips_and_slopes(gamma[rows])[0] - part.targets) / tip_map.length
         multiplier[rows] += penalty * error  # theory (40)
-        residual[rows] = np.linalg.norm(error, axis=1) * rod.length
-    ends = descend(rod, request.targets, gamma, request.residual)
+        residual[rows] = np.linalg.norm(error, axis=1) * tip_map.length
+    ends = descend(tip_map, request.targets, gamma, request.residual)
     return ends.gamma, ends.distance
 
 
-def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:
+def _multipliers(tip_map: TipMap, request: Request, gamma: Array) -> Array:
     """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
-    slopes = rod.tips_and_slopes(gamma)[1] / rod.length
+    slopes = tip_map.tips_and_slopes(gamma)[1] / tip_map.length
     slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
     inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
     return -np.einsum("nij,nj->ni", inverse, gamma - request.near)
@@ -142,7 +142,7 @@ class Objective:
     and the right λ it is the least change that reaches the target (an augmented Lagrangian).
     """
 
-    rod: TipMap
+    tip_map: TipMap
     targets: Array
     """One for each search [m], shape (n, 3)."""
     direction: Array
@@ -158,14 +158,14 @@ class Objective:
 
     def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
         """Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,)."""
-        motions = self.rod.tip_motions(gamma)
-        miss = (motions.tips - self.targets[which]) / self.rod.length
+        motions = self.tip_map.tip_motions(gamma)
+        miss = (motions.tips - self.targets[which]) / self.tip_map.length
         force = self.penalty * miss
         value = 0.5 * self.penalty * _squares(miss)
         if self.multiplier is not None:
             force += self.multiplier[which]
             value += np.einsum("ni,ni->n", self.multiplier[which], miss)
-        gradient = np.einsum("ni,nij->nj", force, motions.slopes / self.rod.length)
+        gradient = np.einsum("ni,nij->nj", force, motions.slopes / self.tip_map.length)
         if self.near is not None:
             change = gamma - self.near[which]
             value += 0.5 * _squares(change)

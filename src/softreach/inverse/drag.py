@@ -32,7 +32,7 @@ class Dragged(NamedTuple):
     """Place of the tip then [m], shape (3,)."""
     gap: float
     """Distance from there to the target [m]; 0 where the tip follows."""
-    rod: TipMap
+    tip_map: TipMap
     """The tip map of the arm in the posture in which this leaves it."""
 
 
@@ -47,7 +47,7 @@ class Drag:
         """Prepare an arm; with fewer than three free bundles the tip keeps to what they reach."""
         self.arm = arm
         self._prepared: PreparedMap = prepared_map(arm)
-        self._rod = self._prepared.rod
+        self._rod = self._prepared.tip_map
         self._tracker = Continuation(self._rod, _RESIDUAL * self._rod.length)
         self._side = 0.0
         self._last: tuple[tuple[float, ...], BranchPoint] | None = None  # where it was left
@@ -79,18 +79,18 @@ class Drag:
 
     def _nearest(self, point: BranchPoint, target: Array) -> BranchPoint:
         """The place around here that brings the tip nearest to the target."""
-        gamma, rod = point.gamma, point.rod
+        gamma, tip_map = point.gamma, point.tip_map
         starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, point.slope)]))
         targets = np.tile(target, (len(starts), 1))
-        ends = nearest_tips(rod, starts, targets, self._tracker.residual, CLOSELY).gamma
-        tips, slopes = rod.tips_and_slopes(ends)
+        ends = nearest_tips(tip_map, starts, targets, self._tracker.residual, CLOSELY).gamma
+        tips, slopes = tip_map.tips_and_slopes(ends)
         gaps = np.linalg.norm(tips - target, axis=1)
         gaps = np.where(np.isfinite(gaps), gaps, np.inf)
         best = gaps <= gaps.min() + self._tracker.residual
         other_side = [self._side * self._sign(slope) < 0 for slope in slopes]
         away = np.linalg.norm((ends - gamma) / self._rod.box.scales, axis=1)
         best_end = np.lexsort((away, other_side, ~best))[0]
-        return BranchPoint(ends[best_end], tips[best_end], slopes[best_end], rod).kept()
+        return BranchPoint(ends[best_end], tips[best_end], slopes[best_end], tip_map).kept()
 
     def _beside_fold(self, gamma: Array, slope: Array) -> list[Array]:
         """Starts on both sides of a fold: on it, no small change brings the tip nearer."""
@@ -110,9 +110,9 @@ class Drag:
         return float(np.sign(np.linalg.det(scaled))) if sizes[2] > 1e-6 * sizes[0] else 0.0
 
     def _dragged(self, point: BranchPoint, target: Array) -> Dragged:
-        rod = self._prepared.whole
-        activation = rod.box.with_fixed(point.gamma[None])[0] * self._prepared.measures
+        tip_map = self._prepared.whole
+        activation = tip_map.box.with_fixed(point.gamma[None])[0] * self._prepared.measures
         gap = float(np.linalg.norm(point.tip - target))
         within = tuple(float(value) for value in activation)
-        self._last, held = (within, point), all_inputs(point.rod)
+        self._last, held = (within, point), all_inputs(point.tip_map)
         return Dragged(within, point.tip, 0.0 if gap <= self._tracker.allowance else gap, held)

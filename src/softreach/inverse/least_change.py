@@ -75,8 +75,8 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     first = known.gamma[reached]
     if request.direction is not None:
         first = _turned(prepared, asked, first)
-    families = _Families(first, request.family, prepared.rod.box.scales)
-    for near in _random_activations(prepared.rod, request):
+    families = _Families(first, request.family, prepared.tip_map.box.scales)
+    for near in _random_activations(prepared.tip_map, request):
         rows = np.flatnonzero(families.counts < request.family)
         if not len(rows):
             break
@@ -86,14 +86,16 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     return np.repeat(reached, families.counts), families.members[families.is_member], known
 
 
-def _random_activations(rod: TipMap, request: Request) -> Iterator[Array]:
+def _random_activations(tip_map: TipMap, request: Request) -> Iterator[Array]:
     """Activations that others of a family stay near to.
 
     One sequence for all targets, so that a target's family does not depend on its neighbors.
     """
     rng = np.random.default_rng(request.seed)
     for _ in range(_ROUNDS):
-        yield from rng.uniform(rod.box.low, rod.box.high, (request.family - 1, rod.box.bundles))
+        yield from rng.uniform(
+            tip_map.box.low, tip_map.box.high, (request.family - 1, tip_map.box.bundles)
+        )
 
 
 class _Families:
@@ -134,7 +136,7 @@ class _Families:
 
 def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = None) -> Reached:
     count = len(request.targets)
-    gamma, residual = np.empty((count, prepared.rod.box.bundles)), np.empty(count)
+    gamma, residual = np.empty((count, prepared.tip_map.box.bundles)), np.empty(count)
     for first in range(0, count, _BLOCK):
         rows = slice(first, min(first + _BLOCK, count))
         part = None if known is None else known[rows]
@@ -147,26 +149,26 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
 
     Searches run on a coarse map until they are compared, those worth it then on the exact one.
     """
-    count, rod = len(request.targets), prepared.rod
+    count, tip_map = len(request.targets), prepared.tip_map
     every = _starts(prepared, request)
     # The best searches of each target after a few steps, those that are apart.
-    survey = sqp(prepared.coarse_rod, request, *every, most=_SURVEY)
+    survey = sqp(prepared.coarse_map, request, *every, most=_SURVEY)
     places = _by_owner(every[0], survey.merit, count)
     owner, start = prepared.seeds.starts(survey.gamma[places], _SURVIVORS, _MERGED)
     if known is not None:
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
-    coarse = sqp(prepared.coarse_rod, request, owner, start, settled=_SETTLED, most=_MOST_COARSE)
+    coarse = sqp(prepared.coarse_map, request, owner, start, settled=_SETTLED, most=_MOST_COARSE)
     leading = _leading(prepared, request, owner, coarse)
     start, begin = coarse.gamma[leading], coarse.proximity[leading]
     polish = partial(sqp, settled=_POLISHED, most=_MOST_POLISHING)
-    fine = polish(rod, request, owner[leading], start, proximity=begin)
+    fine = polish(tip_map, request, owner[leading], start, proximity=begin)
     # Where a search lost its target, that lies next to a fold or a boundary.
     lost = np.zeros(count, bool)
-    off = (fine.residual > _NEARLY_HIT * rod.length) | (fine.penalty > _STEEP)
+    off = (fine.residual > _NEARLY_HIT * tip_map.length) | (fine.penalty > _STEEP)
     lost[owner[leading[off]]] = True
-    lost |= np.bincount(owner, coarse.residual <= _HIT * rod.length, count) == 0
+    lost |= np.bincount(owner, coarse.residual <= _HIT * tip_map.length, count) == 0
     owner = owner[leading]
-    ends = _best(owner, _on_target(rod, request, owner, fine), request)
+    ends = _best(owner, _on_target(tip_map, request, owner, fine), request)
     left = np.flatnonzero(ends.residual > request.residual)
     lost[left] = True
     ends.gamma[left], ends.residual[left] = reach(prepared, request.of(left), ends.gamma[left])
@@ -176,7 +178,7 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
 def _leading(prepared: PreparedMap, request: Request, owner: Index, ends: Minima) -> Index:
     """Searches on their targets whose ends are apart and may be the least of their target."""
     change = np.linalg.norm(ends.gamma - request.near[owner], axis=1)
-    miss = ends.residual / prepared.rod.length
+    miss = ends.residual / prepared.tip_map.length
     worth = np.where(miss > _HIT, 1e100 * (1.0 + miss), change)
     places = _by_owner(owner, worth, len(request.targets))
     chosen = np.zeros(places.shape, bool)
@@ -197,11 +199,11 @@ def _by_owner(owner: Index, value: Array, count: int) -> Index:
     return order[np.where(places < (first + counts)[:, None], places, first[:, None])]
 
 
-def _on_target(rod: TipMap, request: Request, owner: Index, ends: Minima) -> Reached:
+def _on_target(tip_map: TipMap, request: Request, owner: Index, ends: Minima) -> Reached:
     """Ends of searches, brought to their targets where these are nearly reached."""
     gamma, residual = ends.gamma.copy(), ends.residual.copy()
     off = np.flatnonzero(residual > request.residual)
-    more = descend(rod, request.targets[owner[off]], gamma[off], request.residual, most=20)
+    more = descend(tip_map, request.targets[owner[off]], gamma[off], request.residual, most=20)
     gamma[off], residual[off] = more.gamma, more.distance
     return Reached(gamma, residual)
 
@@ -210,19 +212,19 @@ def _searched_again(
     prepared: PreparedMap, request: Request, ends: Reached, lost: Index, owner: Index, start: Array
 ) -> Reached:
     """Search again on the exact map from every start, also with the target before less change."""
-    rod, chosen = prepared.rod, np.isin(owner, lost)
+    tip_map, chosen = prepared.tip_map, np.isin(owner, lost)
     owner = np.concatenate([owner[chosen], lost])
     start = np.concatenate([start[chosen], ends.gamma[lost]])
     search = partial(sqp, settled=_POLISHED, most=_MOST_AGAIN)
-    plain = search(rod, request, owner, start)
-    at = descend(rod, request.targets[owner], start, request.residual)
+    plain = search(tip_map, request, owner, start)
+    at = descend(tip_map, request.targets[owner], start, request.residual)
     hit = np.flatnonzero(at.distance <= request.residual)
-    kept = search(rod, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY)
+    kept = search(tip_map, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY)
     found = [
         ends,
-        _on_target(rod, request, owner, plain),
+        _on_target(tip_map, request, owner, plain),
         Reached(at.gamma[hit], at.distance[hit]),
-        _on_target(rod, request, owner[hit], kept),
+        _on_target(tip_map, request, owner[hit], kept),
     ]
     owners = [np.arange(len(request.targets)), owner, owner[hit], owner[hit]]
     return _best(np.concatenate(owners), joined(found), request)
@@ -238,7 +240,7 @@ def _best(owner: Index, ends: Reached, request: Request) -> Reached:
 def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     """The activation to stay near to, and seeds near the target that change little."""
     owners = [np.arange(len(request.targets))]
-    starts = [prepared.rod.box.clip(request.near)]
+    starts = [prepared.tip_map.box.clip(request.near)]
     # Moved ones lie in the right basin where the seeds are dense, the others where they are few.
     for seeds in (prepared.seeds, prepared.face_seeds):
         owner, start = seeds.near(request.targets, request.near, _CANDIDATES, _STARTS, _APART)
@@ -252,19 +254,19 @@ def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:
     count = len(known)
     owner, start = _starts(prepared, request)
     owner, start = np.concatenate([np.arange(count), owner]), np.concatenate([known, start])
-    gamma, residual = constrained_minima(prepared.rod, request.of(owner), start)
-    cost = _cost(prepared.rod, request.of(owner), gamma)
+    gamma, residual = constrained_minima(prepared.tip_map, request.of(owner), start)
+    cost = _cost(prepared.tip_map, request.of(owner), gamma)
     cost = np.where(residual <= request.residual, cost, np.inf)
-    cost = np.concatenate([cost, _cost(prepared.rod, request, known)])
+    cost = np.concatenate([cost, _cost(prepared.tip_map, request, known)])
     gamma, owner = np.concatenate([gamma, known]), np.concatenate([owner, np.arange(count)])
     return gamma[first_of_each(owner, cost, count)]
 
 
-def _cost(rod: TipMap, request: Request, gamma: Array) -> Array:
+def _cost(tip_map: TipMap, request: Request, gamma: Array) -> Array:
     """|γ - near|² + w² |d3 - direction|², shape (n,)."""
     cost = np.linalg.norm(gamma - request.near, axis=1) ** 2
     if request.direction is not None and len(gamma):
-        error = rod.tip_directions(gamma) - request.direction
+        error = tip_map.tip_directions(gamma) - request.direction
         cost += (request.direction_weight * np.linalg.norm(error, axis=1)) ** 2
     return cost
 
@@ -285,7 +287,7 @@ class Minima(NamedTuple):
 
 
 def sqp(
-    rod: TipMap,
+    tip_map: TipMap,
     request: Request,
     owner: Index,
     start: Array,
@@ -303,7 +305,7 @@ def sqp(
     as it should; else σ grows.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         request: Targets, and what to stay near to.
         owner: Number of the target of each start, shape (n,).
         start: Activations to begin with, inside the bounds [-], shape (n, m).
@@ -321,17 +323,17 @@ def sqp(
     minima = Minima(start.copy(), np.empty(n), np.empty(n), begin, np.empty(n))
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-n // parallel.thread_count()))
-    rod.prepare()
-    search = partial(_searched, rod, request, penalty=penalty, limits=(settled, most))
+    tip_map.prepare()
+    search = partial(_searched, tip_map, request, penalty=penalty, limits=(settled, most))
     parallel.run(
         partial(search, owner[block], Minima(*(part[block] for part in minima)))
         for block in parallel.blocks(n, share)
     )
-    return minima._replace(residual=minima.residual * rod.length)
+    return minima._replace(residual=minima.residual * tip_map.length)
 
 
 def _searched(
-    rod: TipMap,
+    tip_map: TipMap,
     request: Request,
     owner: Index,
     ends: Minima,
@@ -339,7 +341,7 @@ def _searched(
     limits: tuple[float, int],
 ) -> None:
     """Run the searches that begin at `ends`, on the calling thread."""
-    box, total = rod.box, len(owner)
+    box, total = tip_map.box, len(owner)
     bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
     running = _room(min(total, _TOGETHER), box.bundles)
     tips, ahead = np.empty_like(running.miss), np.empty_like(running.slope)
@@ -352,12 +354,12 @@ def _searched(
         running.penalty[new], running.multiplier[new] = penalty, 0.0
         running.reach[new] = LONGEST_STEP
         n, begun = n + more, begun + more
-        rod.fill(running.trial[:n], tips[:n], ahead[:n])
-        if rod.supports_unstable:
+        tip_map.fill(running.trial[:n], tips[:n], ahead[:n])
+        if tip_map.supports_unstable:
             lost = np.isnan(tips[:n, 0])
             tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
         asked = request.targets, request.near
-        n = judge(running, n, tips, ahead, owner, *asked, bounds, rod.length, limits, ends)
+        n = judge(running, n, tips, ahead, owner, *asked, bounds, tip_map.length, limits, ends)
         steps = (part[:n] for part in (running.center, running.slope, running.wanted))
         limited = (part[:n] for part in (running.softness, running.low, running.high))
         project(*steps, *limited, running.trial[:n], running.multiplier[:n])

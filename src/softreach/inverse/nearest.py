@@ -26,41 +26,43 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
         request: Targets.
         known: Roots to begin from as well.
     """
-    rod, targets = prepared.rod, request.targets
+    tip_map, targets = prepared.tip_map, request.targets
     target, start = starts(prepared, targets, known)
-    ends = nearest_tips(rod, start, targets[target], request.residual, CLOSELY)
-    return nearest_at(rod, targets, ends.gamma[first_of_each(target, ends.distance, len(targets))])
+    ends = nearest_tips(tip_map, start, targets[target], request.residual, CLOSELY)
+    return nearest_at(
+        tip_map, targets, ends.gamma[first_of_each(target, ends.distance, len(targets))]
+    )
 
 
 def starts(prepared: PreparedMap, targets: Array, known: Roots | None) -> tuple[Index, Array]:
     """Seeds near each target, and known roots: numbers of targets, and activations."""
     if not len(targets):
-        return np.empty(0, np.int64), np.empty((0, prepared.rod.box.bundles))
+        return np.empty(0, np.int64), np.empty((0, prepared.tip_map.box.bundles))
     target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
     if known is None:
         return target, start
     return np.concatenate([target, known.target]), np.concatenate([start, known.gamma])
 
 
-def nearest_from(rod: TipMap, request: Request, gamma: Array) -> Nearest:
+def nearest_from(tip_map: TipMap, request: Request, gamma: Array) -> Nearest:
     """The local minimum of distance from one activation for each target."""
-    ends = nearest_tips(rod, gamma, request.targets, request.residual, CLOSELY)
-    return nearest_at(rod, request.targets, ends.gamma)
+    ends = nearest_tips(tip_map, gamma, request.targets, request.residual, CLOSELY)
+    return nearest_at(tip_map, request.targets, ends.gamma)
 
 
 def descend(
-    rod: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_STEPS
+    tip_map: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_STEPS
 ) -> Nearest:
     """The local minimum of distance from each start, to well within the residual.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         targets: One for each start [m], shape (n, 3).
         start: Inside the bounds [-], shape (n, m).
         residual: |tip - target| at which a target is reached [m].
         most: Steps.
     """
-    return nearest_tips(rod, start, targets, _BEYOND * residual, CLOSELY._replace(most=most))
+    return nearest_tips(tip_map, start, targets, _BEYOND * residual, CLOSELY._replace(most=most))
 
 
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
@@ -76,8 +78,8 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
         request: Targets, and the residual at which one is reached.
         start: Activations to begin from, shape (t, m).
     """
-    box, targets = prepared.rod.box, request.targets
-    first = descend(prepared.rod, targets, box.clip(start), request.residual)
+    box, targets = prepared.tip_map.box, request.targets
+    first = descend(prepared.tip_map, targets, box.clip(start), request.residual)
     gamma, residual = first.gamma, first.distance
     rng = np.random.default_rng(_SEED)
     for effort in _EFFORTS:
@@ -104,9 +106,9 @@ class Reached(NamedTuple):
     """|tip - target| [m], shape (t,)."""
 
 
-def nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
+def nearest_at(tip_map: TipMap, targets: Array, gamma: Array) -> Nearest:
     """Tips of the activations, to rounding, and how far they are from the targets."""
-    tip = placed(rod, gamma)
+    tip = placed(tip_map, gamma)
     return Nearest(gamma, tip, np.linalg.norm(tip - targets, axis=1))
 
 
@@ -142,7 +144,7 @@ def _searched(
         if effort.neighbors == 1:  # nearly all are reached from here
             break
     owner, start = np.concatenate(owners), np.concatenate(starts)
-    return owner, descend(prepared.rod, request.targets[owner], start, request.residual)
+    return owner, descend(prepared.tip_map, request.targets[owner], start, request.residual)
 
 
 def first_of_each(owner: Index, value: Array, count: int) -> Index:

@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.nearest import descend
 from softreach.inverse.request import allowance, as_activations, as_residual, as_targets
 from softreach.inverse.solve import solve_inverse
-from softreach.rod.rods import free_bundles, measured_bundles, tip_map
+from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arrays import Array, Mask
@@ -73,22 +73,24 @@ def track_path(
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
     points = as_targets("path", path)
-    rod = measured_bundles(tip_map(arm, tol, point=point))
-    if rod.box.dimension < 3:
-        raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
+    tip_map = measured_bundles(as_tip_map(arm, tol, point=point))
+    if tip_map.box.dimension < 3:
+        raise InvalidInput(
+            "free bundles", tip_map.box.dimension, "3 or more to follow a path in space"
+        )
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
     residual = as_residual(residual_over_length)
-    tracker = Continuation(free_bundles(rod), residual * rod.length)
+    tracker = Continuation(free_bundles(tip_map), residual * tip_map.length)
     if start is not None:
-        gamma = as_activations("start", start, rod.box, 1)[0]
-        gamma = gamma / rod.measures[rod.box.free]
+        gamma = as_activations("start", start, tip_map.box, 1)[0]
+        gamma = gamma / tip_map.measures[tip_map.box.free]
         first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
     else:
-        first = _best_start(rod, tracker, points[0], residual)
+        first = _best_start(tip_map, tracker, points[0], residual)
     followed, end = ([], None) if first is None else _followed(tracker, first, points)
-    tolerances = {"tol": rod.tol, "residual_over_length": residual}
-    return _dataset(rod, points, followed, end).assign_attrs(tolerances)
+    tolerances = {"tol": tip_map.tol, "residual_over_length": residual}
+    return _dataset(tip_map, points, followed, end).assign_attrs(tolerances)
 
 
 class PathStatus(IntEnum):
@@ -112,23 +114,23 @@ _MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathS
 class Continuation:
     """Following branches of solutions of one tip map, all of whose bundles are free."""
 
-    def __init__(self, rod: TipMap, residual: float) -> None:
+    def __init__(self, tip_map: TipMap, residual: float) -> None:
         """Set up for tips within `residual` [m] of their points, or as near as tips can tell."""
-        self.rod, self.box, self.residual = rod, rod.box, residual
-        self.allowance = allowance(rod, residual)
+        self.tip_map, self.box, self.residual = tip_map, tip_map.box, residual
+        self.allowance = allowance(tip_map, residual)
         self._torn = False  # whether the last correction met a place where the arm snaps
 
-    def at(self, gamma: Array, rod: TipMap | None = None) -> BranchPoint:
+    def at(self, gamma: Array, tip_map: TipMap | None = None) -> BranchPoint:
         """A tip map linearized at an activation (m,), by default that of postures from rest."""
-        rod = rod or self.rod
-        tips, slopes = rod.tips_and_slopes(gamma[None])
-        return BranchPoint(gamma, tips[0], slopes[0], rod)
+        tip_map = tip_map or self.tip_map
+        tips, slopes = tip_map.tips_and_slopes(gamma[None])
+        return BranchPoint(gamma, tips[0], slopes[0], tip_map)
 
     def corrected_start(self, gamma: Array, target: Array) -> BranchPoint | None:
         """The activation corrected to a first target, if it can be within the bounds."""
-        start = self._corrected(self.rod, gamma, target, self.box.is_free)
+        start = self._corrected(self.tip_map, gamma, target, self.box.is_free)
         if start is None or (self.box.excess(start.gamma) > _AT_BOUND).any():
-            return self._within_bounds(self.rod, gamma, target[None])
+            return self._within_bounds(self.tip_map, gamma, target[None])
         return self._clipped(start)
 
     def follow(self, point: BranchPoint, begin: Array, end: Array) -> BranchEnd:
@@ -137,8 +139,8 @@ class Continuation:
         distance = float(np.linalg.norm(end - begin))
         if distance == 0.0:
             return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
-        shortest = _SHORTEST * self.rod.length / distance
-        shortest_torn = _SHORTEST_TORN * self.rod.length / distance
+        shortest = _SHORTEST * self.tip_map.length / distance
+        shortest_torn = _SHORTEST_TORN * self.tip_map.length / distance
         while done < 1.0:
             part = min(part, 1.0 - done)
             last = part >= 1.0 - done
@@ -173,7 +175,7 @@ class Continuation:
             if not blocked.any():
                 if size > _LONGEST:
                     return _Substep(shorten=0.9 * _LONGEST / size)
-                corrected = self._corrected(point.rod, ahead, target, moving)
+                corrected = self._corrected(point.tip_map, ahead, target, moving)
                 if corrected is None:
                     return _Substep(shorten=0.5, torn=self._torn)
                 if self._left_branch(point, ahead, corrected):
@@ -194,27 +196,27 @@ class Continuation:
         """The point of the branch that is at a place as far as tips can tell; None if none is."""
         # All of the way there has to be as near to the reachable set: half of it is looked at.
         targets = np.array([0.5 * (point.tip + target), target])
-        beside = self._within_bounds(point.rod, point.gamma, targets)
+        beside = self._within_bounds(point.tip_map, point.gamma, targets)
         if beside is None or self._left_branch(point, beside.gamma, beside):
             return None
         far = np.abs(beside.gamma - point.gamma) > _LONGEST * self.box.scales
         return None if far.any() else beside
 
-    def _within_bounds(self, rod: TipMap, gamma: Array, targets: Array) -> BranchPoint | None:
+    def _within_bounds(self, tip_map: TipMap, gamma: Array, targets: Array) -> BranchPoint | None:
         """Nearest to the last of some places (k, 3), if all are as near as tips can tell."""
         start = np.tile(gamma, (len(targets), 1))
-        ends = descend(rod, targets, start, self.residual)
+        ends = descend(tip_map, targets, start, self.residual)
         if not (ends.distance <= self.allowance).all():
             return None
-        return self.at(ends.gamma[-1], rod)
+        return self.at(ends.gamma[-1], tip_map)
 
     def _corrected(
-        self, rod: TipMap, gamma: Array, target: Array, moving: Mask
+        self, tip_map: TipMap, gamma: Array, target: Array, moving: Mask
     ) -> BranchPoint | None:
         """Newton's method with the least-norm step of the moving bundles; None if it fails."""
         least, self._torn = np.inf, False
         for _ in range(_MOST_CORRECTIONS):
-            point = self.at(gamma, rod)
+            point = self.at(gamma, tip_map)
             if not np.isfinite(point.slope).all():
                 self._torn = True
                 return None
@@ -242,7 +244,7 @@ class Continuation:
 
     def _clipped(self, point: BranchPoint) -> BranchPoint:
         gamma = self.box.clip(point.gamma)
-        return point if np.array_equal(gamma, point.gamma) else self.at(gamma, point.rod)
+        return point if np.array_equal(gamma, point.gamma) else self.at(gamma, point.tip_map)
 
     def _at_bound(self, gamma: Array) -> Mask:
         return self.box.excess(gamma) >= -2 * _AT_BOUND
@@ -265,12 +267,12 @@ class BranchPoint(NamedTuple):
     """Tip [m], shape (3,)."""
     slope: Array
     """∂r/∂γ [m], shape (3, m)."""
-    rod: TipMap
+    tip_map: TipMap
     """The tip map, whose posture it is."""
 
     def kept(self) -> BranchPoint:
         """The same, to go on from this posture."""
-        return self._replace(rod=self.rod.continued_from(self.gamma[None]))
+        return self._replace(tip_map=self.tip_map.continued_from(self.gamma[None]))
 
 
 class BranchEnd(NamedTuple):
@@ -305,13 +307,13 @@ def _least_norm(slope: Array, moving: Mask) -> Array:
 
 
 def _best_start(
-    rod: TipMap, tracker: Continuation, target: Array, residual: float
+    tip_map: TipMap, tracker: Continuation, target: Array, residual: float
 ) -> BranchPoint | None:
-    solution = solve_inverse(rod, target[None], residual_over_length=residual)[0]
+    solution = solve_inverse(tip_map, target[None], residual_over_length=residual)[0]
     if not len(solution):
         return None
-    best = solution.activations[solution.conditions.argmin()] / rod.measures
-    return tracker.at(best[rod.box.free])
+    best = solution.activations[solution.conditions.argmin()] / tip_map.measures
+    return tracker.at(best[tip_map.box.free])
 
 
 def _followed(
@@ -329,15 +331,19 @@ def _followed(
 
 
 def _dataset(
-    rod: TipMap, points: Array, followed: list[BranchPoint], end: BranchEnd | None
+    tip_map: TipMap, points: Array, followed: list[BranchPoint], end: BranchEnd | None
 ) -> xr.Dataset:
     import xarray as xr
 
-    box, n, units = rod.box, len(followed), activation_attributes(rod.arm, rod.box.names)
+    box, n, units = (
+        tip_map.box,
+        len(followed),
+        activation_attributes(tip_map.arm, tip_map.box.names),
+    )
     outcome = PathStatus.NO_START if end is None else end.status
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
-    activation, measures = np.full((len(points), box.bundles), np.nan), rod.measures
+    activation, measures = np.full((len(points), box.bundles), np.nan), tip_map.measures
     length, length_error = _end_length(points, n, end)
     error = np.full(len(points), np.nan)
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
@@ -360,9 +366,9 @@ def _dataset(
             "end_length": ((), length, {"units": "m"}),
             "end_length_error": ((), length_error, {"units": "m"}),
         },
-        {"axis": list(AXES), **bundle_coordinates(rod.arm, rod.box.names)},
+        {"axis": list(AXES), **bundle_coordinates(tip_map.arm, tip_map.box.names)},
         {
-            **provenance(rod.arm, rod.frame),
+            **provenance(tip_map.arm, tip_map.frame),
             "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),
             "end_bundle": bundle,
             "end_bound": bound,

@@ -18,7 +18,7 @@ from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
-from softreach.rod.rods import coarsened, free_bundles, measured_bundles, tip_map
+from softreach.rod.rods import as_tip_map, coarsened, free_bundles, measured_bundles
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
@@ -51,17 +51,17 @@ class PreparedMap:
         return self.whole.measures
 
     @lazy
-    def rod(self) -> TipMap:
+    def tip_map(self) -> TipMap:
         """The tip map of the free bundles; held ones are no variables of any search."""
         return free_bundles(self.whole)
 
     @lazy
-    def coarse_rod(self) -> TipMap:
+    def coarse_map(self) -> TipMap:
         """The same in fewer steps, to move seeds and see which searches are worth the exact map.
 
         Of an arm under loads it is the exact map.
         """
-        return self.rod if self.rod.supports_unstable else coarsened(self.rod, _COARSE)
+        return self.tip_map if self.tip_map.supports_unstable else coarsened(self.tip_map, _COARSE)
 
     @lazy
     def proves(self) -> bool:
@@ -75,13 +75,13 @@ class PreparedMap:
 
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
-        return activation_cells(self.rod, self.cells)
+        return activation_cells(self.tip_map, self.cells)
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
         self._searched[0] += count
         divided = len(self.mesh.corner) and self._searched[0] > _FEW
-        for name in ("rod", "_cut", "tree")[: 3 if divided else 2]:
+        for name in ("tip_map", "_cut", "tree")[: 3 if divided else 2]:
             getattr(self, name)
 
     @property
@@ -112,17 +112,17 @@ class PreparedMap:
     @lazy
     def seeds(self) -> Seeds:
         """Starts of searches for a minimum."""
-        return seeds(self.rod, self.coarse_rod)
+        return seeds(self.tip_map, self.coarse_map)
 
     @lazy
     def coarse_cells(self) -> CoarseCells:
         """Cells with which proofs that a target is out of reach begin."""
-        return CoarseCells(self.rod)
+        return CoarseCells(self.tip_map)
 
     @lazy
     def face_seeds(self) -> Seeds:
         """Starts of searches for places on the boundary of the reachable set."""
-        return face_seeds(self.rod, self.coarse_rod)
+        return face_seeds(self.tip_map, self.coarse_map)
 
 
 def prepared_map(
@@ -152,12 +152,12 @@ def prepared_map(
             hint = "prepare the arm with this frame"
             raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
-    return _of_map(measured_bundles(tip_map(arm, tol, frame=frame, point=point)), cells)
+    return _of_map(measured_bundles(as_tip_map(arm, tol, frame=frame, point=point)), cells)
 
 
 @lru_cache(maxsize=4)
-def _of_map(rod: TipMap, cells: int) -> PreparedMap:
-    return PreparedMap(rod, cells)
+def _of_map(tip_map: TipMap, cells: int) -> PreparedMap:
+    return PreparedMap(tip_map, cells)
 
 
 def forget_prepared() -> None:

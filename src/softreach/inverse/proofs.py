@@ -11,8 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from softreach.kernels.box.box_projection import project
-from softreach.kernels.box.cell_cover import near_cells
+from softreach.kernels.box.box_projection import near_cells, project
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
@@ -29,7 +28,7 @@ _SOFTNESS = 1e-6  # of the linear problem that says in which direction the targe
 
 
 def gap_bounds(
-    rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array, allowance: float
+    tip_map: TipMap, coarse: CoarseCells, targets: Array, gap: Array, allowance: float
 ) -> Array:
     """A lower bound of the distance of each target from everything that the box reaches.
 
@@ -38,7 +37,7 @@ def gap_bounds(
     smaller than that by more than the error of the linearization.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         coarse: Its cells.
         targets: Shape (t, 3) [m].
         gap: Distance of the best place known from each [m], shape (t,).
@@ -48,14 +47,14 @@ def gap_bounds(
     Returns:
         Bounds [m], shape (t,); 0 where nothing is proved.
     """
-    if rod.box.dimension == 0:
+    if tip_map.box.dimension == 0:
         return gap.copy()  # one place is reached
-    from_base = np.linalg.norm(targets - np.array(rod.pose.position), axis=1)
-    bounds = np.maximum(from_base - rod.farthest(), 0.0)
+    from_base = np.linalg.norm(targets - np.array(tip_map.pose.position), axis=1)
+    bounds = np.maximum(from_base - tip_map.farthest(), 0.0)
     enough = allowance + _ENOUGH * (gap - allowance)
 
     def prove(rows: slice) -> None:
-        proved = _exclusion_of_block(rod, coarse, targets[rows], enough[rows])
+        proved = _exclusion_of_block(tip_map, coarse, targets[rows], enough[rows])
         bounds[rows] = np.maximum(bounds[rows], proved)
 
     parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _TARGET_BLOCK))
@@ -65,14 +64,14 @@ def gap_bounds(
 class CoarseCells:
     """The box in even cells with what all targets ask of them."""
 
-    def __init__(self, rod: TipMap) -> None:
-        box, m = rod.box, rod.box.dimension
+    def __init__(self, tip_map: TipMap) -> None:
+        box, m = tip_map.box, tip_map.box.dimension
         side = max(1, int(_COARSE ** (1 / max(m, 1)) + 1e-9))
         places = np.indices((side,) * m).reshape(m, side**m).T
         cube = (places + 0.5) / side
         self.center, self.half = box.from_cube(cube), 0.5 * box.widths / side
-        self.tips, slopes = rod.tips_and_slopes(self.center)
-        self.errors = _errors(rod, self.center, self.half)
+        self.tips, slopes = tip_map.tips_and_slopes(self.center)
+        self.errors = _errors(tip_map, self.center, self.half)
         self.slopes = slopes * self.half
         self.radii = np.linalg.norm(self.slopes, axis=1).sum(axis=1)
 
@@ -83,12 +82,14 @@ class CoarseCells:
         return room[:count]
 
 
-def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough: Array) -> Array:
+def _exclusion_of_block(
+    tip_map: TipMap, coarse: CoarseCells, targets: Array, enough: Array
+) -> Array:
     """Halve the cells of some targets until they are far enough away or too many."""
     near = [coarse.near(*case) for case in zip(targets, enough, strict=True)]
     counts = np.array([len(rows) for rows in near])
-    most = _MOST_EXCLUSION_CELLS if rod.box.dimension <= _MOST_BUNDLES else 0
-    most = _MOST_OF_THREE if rod.box.dimension <= 3 else most
+    most = _MOST_EXCLUSION_CELLS if tip_map.box.dimension <= _MOST_BUNDLES else 0
+    most = _MOST_OF_THREE if tip_map.box.dimension <= 3 else most
     few = counts <= most
     owner, half = np.repeat(np.arange(len(enough)), counts * few), coarse.half
     kept = [cells[: len(cells) * ok] for cells, ok in zip(near, few, strict=True)]
@@ -97,7 +98,7 @@ def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough
     spent = np.zeros(len(enough), np.int64)
     while len(owner):
         blocks = [slice(first, first + _BLOCK) for first in range(0, len(owner), _BLOCK)]
-        each = [_distances(rod, half, center[b], targets[owner[b]]) for b in blocks]
+        each = [_distances(tip_map, half, center[b], targets[owner[b]]) for b in blocks]
         bounds = np.concatenate(each)
         spent += np.bincount(owner, minlength=len(enough))
         left = bounds < enough[owner]
@@ -105,15 +106,15 @@ def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough
         hopeless = left & (spent + halves > most)[owner]
         np.minimum.at(least, owner[hopeless], bounds[hopeless])
         left &= ~hopeless
-        half, center = _halved(rod, half, center[left])
+        half, center = _halved(tip_map, half, center[left])
         owner = np.repeat(owner[left], 2)
     return np.maximum(least, 0.0)
 
 
-def _halved(rod: TipMap, half: Array, center: Array) -> tuple[Array, Array]:
+def _halved(tip_map: TipMap, half: Array, center: Array) -> tuple[Array, Array]:
     """Half widths, and centers of both halves of each cell along the axis of least error."""
     thinner = np.where(np.eye(len(half), dtype=bool), 0.5 * half, half)
-    axis = int(np.argmin([rod.linearization_error(widths) for widths in thinner]))
+    axis = int(np.argmin([tip_map.linearization_error(widths) for widths in thinner]))
     half = thinner[axis]
     center = np.repeat(center, 2, axis=0)
     center[0::2, axis] -= half[axis]
@@ -121,11 +122,11 @@ def _halved(rod: TipMap, half: Array, center: Array) -> tuple[Array, Array]:
     return half, center
 
 
-def _distances(rod: TipMap, half: Array, center: Array, targets: Array) -> Array:
+def _distances(tip_map: TipMap, half: Array, center: Array, targets: Array) -> Array:
     """Least distance of each target from its cell's image, negative if it may be in it."""
     n, m = center.shape
     tips, slopes = np.empty((n, 3)), np.empty((n, 3, m))
-    rod.fill(center, tips, slopes)
+    tip_map.fill(center, tips, slopes)
     away, slopes = targets - tips, slopes * half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
     inside, force = np.empty((n, m)), np.zeros((n, 3))
@@ -135,8 +136,8 @@ def _distances(rod: TipMap, half: Array, center: Array, targets: Array) -> Array
     normal = -force / np.where(size > 0, size, 1.0)[:, None]
     linear = np.einsum("ni,ni->n", normal, away)
     linear -= np.abs(np.einsum("ni,nij->nj", normal, slopes)).sum(axis=1)
-    return linear - _errors(rod, center, half)
+    return linear - _errors(tip_map, center, half)
 
 
-def _errors(rod: TipMap, center: Array, half: Array) -> Array:
-    return rod.linearization_errors(center, half) + _ROUNDING * rod.length
+def _errors(tip_map: TipMap, center: Array, half: Array) -> Array:
+    return tip_map.linearization_errors(center, half) + _ROUNDING * tip_map.length

@@ -90,14 +90,14 @@ def as_residual(residual_over_length: float) -> float:
     return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))
 
 
-def allowance(rod: TipMap, residual: float) -> float:
+def allowance(tip_map: TipMap, residual: float) -> float:
     """|tip - target| [m] within which a target is reached: the error of tips, or a wider residual.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         residual: To which solutions are searched [m].
     """
-    return max(residual, rod.tol * rod.length)
+    return max(residual, tip_map.tol * tip_map.length)
 
 
 def positions_in(text: str, source: str, length: float | None = None) -> list[list[float]]:

@@ -48,35 +48,35 @@ class Roots(NamedTuple):
         return np.flatnonzero(np.bincount(known, minlength=targets) == 0)
 
 
-def no_roots(rod: TipMap) -> Roots:
+def no_roots(tip_map: TipMap) -> Roots:
     """An empty set of roots."""
-    none, m = np.empty(0, np.int64), rod.box.bundles
+    none, m = np.empty(0, np.int64), tip_map.box.bundles
     return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none)
 
 
-def roots_at(rod: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
+def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
     """Activations (n, m) as roots for targets `target` (n,), whatever their residual.
 
     Args:
-        rod: A tip map of stable equilibria.
+        tip_map: A tip map of stable equilibria.
         targets: Shape (t, 3) [m].
         target: Shape (n,).
         gamma: Shape (n, m).
     """
-    tips, slopes = rod.tips_and_slopes(gamma)
+    tips, slopes = tip_map.tips_and_slopes(gamma)
     residual = np.linalg.norm(tips - targets[target], axis=1)
     return Roots(target, gamma, slopes, residual, np.full(len(target), -1))
 
 
-def placed(rod: TipMap, gamma: Array) -> Array:
+def placed(tip_map: TipMap, gamma: Array) -> Array:
     """Tips to rounding [m], shape (n, 3).
 
     `TipMap.tips` of loaded arms ends the search for an equilibrium within a part of `tol` that is
     larger than the residual of a root.
     """
-    if not rod.supports_unstable:
-        return rod.tips(gamma)
-    return rod.tips_and_slopes(gamma)[0]
+    if not tip_map.supports_unstable:
+        return tip_map.tips(gamma)
+    return tip_map.tips_and_slopes(gamma)[0]
 
 
 def smallest_singular_values(slope: Array) -> Array:
@@ -98,7 +98,7 @@ def conditions(slope: Array) -> Array:
 
 def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """Roots for some of the targets, those that no other search found, sorted by target."""
-    roots = no_roots(prepared.rod)
+    roots = no_roots(prepared.tip_map)
     for neighbors, most, apart in _EFFORTS:
         left = np.setdiff1d(chosen, roots.target)
         for first in range(0, len(left), _BLOCK):
@@ -106,13 +106,15 @@ def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index
             near = prepared.seeds.nearest(request.targets[part], neighbors)
             owner, start = prepared.seeds.starts(near, most, apart)
             goal, owner = request.targets[part[owner]], part[owner]
-            gamma = affine_invariant_newton(prepared.rod, goal, start, request.residual)
-            found = roots_at(prepared.rod, request.targets, owner, gamma)
+            gamma = affine_invariant_newton(prepared.tip_map, goal, start, request.residual)
+            found = roots_at(prepared.tip_map, request.targets, owner, gamma)
             roots = roots.joined(rows(found, found.residual <= request.residual))
     return roots
 
 
-def affine_invariant_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
+def affine_invariant_newton(
+    tip_map: TipMap, targets: Array, start: Array, residual: float
+) -> Array:
     """Ends of searches by affine-invariant Newton, inside the bounds; a root or not.
 
     Near a full circle two singular values of J vanish together. The residual then says little about
@@ -125,14 +127,14 @@ def affine_invariant_newton(rod: TipMap, targets: Array, start: Array, residual:
     Newton's method along that direction alone.
 
     Args:
-        rod: The tip map of three free bundles.
+        tip_map: The tip map of three free bundles.
         targets: One for each start [m], shape (n, 3).
         start: Shape (n, 3).
         residual: |tip - target| at which a search may end [m].
     """
-    box, scales = rod.box, rod.box.scales
+    box, scales = tip_map.box, tip_map.box.scales
     low, high = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
-    valley = _Valley(rod, low, high)
+    valley = _Valley(tip_map, low, high)
     gamma, miss, slope = valley.floor(targets, start, _FIRST_RETURNS)
     damping, active = np.ones(len(start)), np.flatnonzero(np.isfinite(miss[:, 0]))
     for _ in range(_MOST_ITERATIONS):
@@ -165,22 +167,22 @@ def _closed_form(slope: Array) -> tuple[Array, Array]:
 class _Valley(NamedTuple):
     """Activations whose tips are right along the direction in which the tip moves most."""
 
-    rod: TipMap
+    tip_map: TipMap
     low: Array
     high: Array
 
     def floor(self, targets: Array, gamma: Array, steps: int) -> tuple[Array, Array, Array]:
         """Activations after some steps along that direction, target - tip and ∂r/∂γ [m] there."""
-        tip, slope = self.rod.tips_and_slopes(gamma)
+        tip, slope = self.tip_map.tips_and_slopes(gamma)
         for _ in range(steps):
             gamma = self._stepped(targets, gamma, tip, slope)
-            tip, slope = self.rod.tips_and_slopes(gamma)
+            tip, slope = self.tip_map.tips_and_slopes(gamma)
         return gamma, targets - tip, slope
 
     def _stepped(self, targets: Array, gamma: Array, tip: Array, slope: Array) -> Array:
         """Activations a step nearer to the floor; those without a tip stay."""
-        scales = self.rod.box.scales
-        lost = np.isnan(tip[:, 0]) if self.rod.supports_unstable else np.zeros(len(tip), bool)
+        scales = self.tip_map.box.scales
+        lost = np.isnan(tip[:, 0]) if self.tip_map.supports_unstable else np.zeros(len(tip), bool)
         known = np.where(lost[:, None, None], np.eye(3), slope * scales)
         left, sizes, right = np.linalg.svd(known)
         step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]

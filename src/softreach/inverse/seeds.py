@@ -152,36 +152,36 @@ def _bins_of(places: Array, shape: tuple[int, int, int]) -> Index:
     return bins @ np.array([ny * nz, nz, 1])
 
 
-def seeds(rod: TipMap, coarse: TipMap) -> Seeds:
+def seeds(tip_map: TipMap, coarse: TipMap) -> Seeds:
     """Seeds on a grid over the box, or a low-discrepancy set where a grid is too coarse."""
-    box, m = rod.box, rod.box.dimension
+    box, m = tip_map.box, tip_map.box.dimension
     if m == 0:
         gamma = np.empty((1, 0))
     elif m <= _DIMENSIONS:
         gamma = box.from_cube(np.array(sample_cube("grid", int(_MOST ** (1 / m)) ** m, m)))
     else:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
-    samples = _with_tips(rod, gamma, coarse)
+    samples = _with_tips(tip_map, gamma, coarse)
     if not len(samples.gamma):
         raise no_stable_equilibrium(len(gamma))
     return samples
 
 
-def face_seeds(rod: TipMap, coarse: TipMap) -> Seeds:
+def face_seeds(tip_map: TipMap, coarse: TipMap) -> Seeds:
     """Seeds at corners of the box, on edges, and on faces with two free bundles."""
-    box, m = rod.box, rod.box.dimension
+    box, m = tip_map.box, tip_map.box.dimension
     rng, count = np.random.default_rng(_SEED), _MOST_ON_FACES
     corner = rng.integers(0, 2, (count, m)).astype(float)
     dimension = rng.integers(0, min(m, _FACE_DIMENSION) + 1, count)
     free = rng.random((count, m)).argsort(axis=1).argsort(axis=1) < dimension[:, None]
     gamma = box.from_cube(np.where(free, rng.random((count, m)), corner))
-    return _with_tips(rod, gamma, coarse)
+    return _with_tips(tip_map, gamma, coarse)
 
 
-def _with_tips(rod: TipMap, gamma: Array, coarse: TipMap) -> Seeds:
+def _with_tips(tip_map: TipMap, gamma: Array, coarse: TipMap) -> Seeds:
     """Seeds at those activations that have a stable equilibrium."""
-    tip = rod.tips(gamma)
-    if rod.supports_unstable:
+    tip = tip_map.tips(gamma)
+    if tip_map.supports_unstable:
         known = np.isfinite(tip[:, 0])
         gamma, tip = gamma[known], tip[known]
     return Seeds(gamma, tip, coarse)

@@ -29,7 +29,7 @@ from softreach.inverse.roots import (
 )
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_number
@@ -156,15 +156,15 @@ def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     """Nearest points, or compromises between distance and direction."""
     roots = every_branch(prepared, request) if prepared.dimension == 3 else None
     closest = (nearest if request.direction is None else compromises)(prepared, request, roots)
-    return _solutions(prepared, request, no_roots(prepared.rod), closest)
+    return _solutions(prepared, request, no_roots(prepared.tip_map), closest)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     """Least changes where the target is reached, nearest places where it is not."""
     target, gamma, best = least_changes(prepared, request)
-    roots = roots_at(prepared.rod, request.targets, target, gamma)
+    roots = roots_at(prepared.tip_map, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
-    closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
+    closest = nearest_from(prepared.tip_map, request.of(missing), best.gamma[missing])
     return _solutions(prepared, request, roots, closest)
 
 
@@ -175,7 +175,7 @@ def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
     yielding = request.direction is not None and prepared.dimension <= 3
     if len(out) and not yielding and (prepared.proves or not prepared.dimension):
         gaps = request.targets[out], gap[out], request.allowance
-        bounds[out] = gap_bounds(prepared.rod, prepared.coarse_cells, *gaps)
+        bounds[out] = gap_bounds(prepared.tip_map, prepared.coarse_cells, *gaps)
     # Within the error of the tips, what is true of them need not be true of the arm.
     return np.where(bounds > request.allowance, bounds, 0.0)
 
@@ -188,23 +188,27 @@ def _solutions(
     bounds: Array | None = None,
 ) -> Solutions:
     """Join roots, sorted by target, and the nearest points to targets without; some are roots."""
-    rod, count = prepared.rod, len(request.targets)
+    tip_map, count = prepared.tip_map, len(request.targets)
     missing = roots.missing(count)
     if bounds is None:
         bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
     hit = closest.distance <= request.allowance
-    roots = roots.joined(roots_at(rod, request.targets, missing[hit], closest.gamma[hit]))
+    roots = roots.joined(roots_at(tip_map, request.targets, missing[hit], closest.gamma[hit]))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual
     roots = rows(roots, np.lexsort((beside, roots.target))) if beside.any() else roots
     statuses = np.full(count, Status.REACHED, np.int8)
     statuses[missing[~hit]] = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
-    gamma, gaps, proved_gaps = np.empty((count, rod.box.bundles)), np.empty(count), np.zeros(count)
+    gamma, gaps, proved_gaps = (
+        np.empty((count, tip_map.box.bundles)),
+        np.empty(count),
+        np.zeros(count),
+    )
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
     points = request.targets.copy()
     off = reached[gaps[reached] > request.residual]
-    points[off] = placed(rod, gamma[off])
+    points[off] = placed(tip_map, gamma[off])
     points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
     activations = prepared.whole.box.with_fixed(roots.gamma)
@@ -217,7 +221,7 @@ def _solutions(
         activations=activations,
         residuals=roots.residual,
         conditions=conditions(roots.slope),
-        margins=rod.box.margin(roots.gamma),
+        margins=tip_map.box.margin(roots.gamma),
         leans=_leans(prepared.whole, activations),
         statuses=statuses,
         nearest=points,
@@ -227,9 +231,9 @@ def _solutions(
     )
 
 
-def _leans(rod: TipMap, activations: Array) -> Mask:
+def _leans(tip_map: TipMap, activations: Array) -> Mask:
     """Mask of activations at which an arm under loads leans to one of two sides."""
-    known = tip_map(rod)
+    known = as_tip_map(tip_map)
     if isinstance(known.rod, LoadedRod):
         return known.rod.leans(known.inputs.activations(activations))
     return np.zeros(len(activations), bool)

@@ -8,12 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.optimization.design_point import DesignPoint
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import Part, Point, stacked, stacked_slopes
-from softreach.requirements.parts import POSE_LIMITS
-from softreach.rod.rods import tip_map
+from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
@@ -42,7 +40,7 @@ def can_polish(problem: Problem) -> bool:
     """True of problems with numbers that can change a little, and goals with derivatives."""
     needs = problem.requirements
     regions = any(target.region is not None for target in needs.targets)
-    of_poses = needs.keeps or any(name in needs.limits.given for name in POSE_LIMITS)
+    of_poses = needs.keeps or needs.limits.of_poses
     return (
         not (regions and of_poses)  # what is covered depends on poses at countless places
         and len(problem.parameters.real) > 0
@@ -169,7 +167,7 @@ class _Program:
         poses = np.empty((0, 0))
         if len(problem.requirements.places):
             case = problem.case(self._start.values, self._accuracy)
-            box = tip_map(case.arm).box
+            box = as_tip_map(case.arm).box
             gamma = np.nan_to_num(case.check.poses.reshape(-1, box.bundles))
             poses = np.clip(box.to_cube(box.clip(gamma))[:, box.free], 0.0, 1.0)
         self._shape = poses.shape

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.units import LengthUnit
@@ -27,7 +27,7 @@ def advice(arm: Manipulator, place: Array, gamma: Array, unit: LengthUnit) -> st
         gamma: Inputs of the nearest pose, shape (inputs,).
         unit: Unit of lengths.
     """
-    rod = tip_map(arm)
+    rod = as_tip_map(arm)
     tip, slope = (each[0] for each in rod.tips_and_slopes(gamma[None]))
     if not np.isfinite(tip).all():
         return ""

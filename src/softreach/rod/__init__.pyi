@@ -8,8 +8,8 @@ from .loaded.all_equilibria import equilibria as equilibria
 from .loaded.rod import LoadedRod as LoadedRod
 from .loaded.shooting import Equilibria as Equilibria
 from .rods import ArmMap as ArmMap
+from .rods import as_tip_map as as_tip_map
 from .rods import free_bundles as free_bundles
-from .rods import tip_map as tip_map
 from .summary import DesignSummary as DesignSummary
 from .summary import describe as describe
 from .tip_map import Frames as Frames

@@ -19,7 +19,7 @@ from softreach.arm.bending import (
     smallest_bending,
 )
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import tip_map, with_unstable
+from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
@@ -62,17 +62,17 @@ def bending_over_bounds(arm: Manipulator) -> BendingRange:
         least, largest = smallest_bending(arm).value, largest_bending(arm).value
         gentlest = float((bending_at(arm, stations)[0] * radius).min()) if least else 0.0
         return BendingRange(least, largest, gentlest, sharpest_bending(arm), exact=True)
-    rod = with_unstable(tip_map(arm, warn=False))
+    tip_map = with_unstable(as_tip_map(arm, warn=False))
 
     def bending(gamma: Array) -> Array:
-        curvature = rod.strains(gamma, stations).curvature
+        curvature = tip_map.strains(gamma, stations).curvature
         return np.hypot(curvature[..., 0], curvature[..., 1])
 
     def ends(gamma: Array) -> Array:
         kappa = bending(gamma)
         return np.stack([-kappa.min(axis=1), kappa.max(axis=1), (kappa * radius).max(axis=1)], 1)
 
-    gamma, value = worst_inputs(rod, ends, _OF_BENDING)
+    gamma, value = worst_inputs(tip_map, ends, _OF_BENDING)
     least, largest, sharpest = np.where(np.isfinite(value), np.abs(value), 0.0).tolist()
     gentlest, _, relative = np.nan_to_num(bending(gamma) * radius)
     place = Extreme(sharpest, float(stations[relative.argmax()]))
@@ -80,21 +80,21 @@ def bending_over_bounds(arm: Manipulator) -> BendingRange:
 
 
 def worst_inputs(
-    rod: TipMap, measure: Callable[[Array], Array], samples: int = 2048
+    tip_map: TipMap, measure: Callable[[Array], Array], samples: int = 2048
 ) -> tuple[Array, Array]:
     """The inputs within the bounds at which each of some measures is largest, by search.
 
     Samples, corners and faces of the box, then the neighborhood of the worst: it proves nothing.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         measure: Inputs (n, inputs) -> values (n, k); NaN where there is no arm.
         samples: Number of samples, a power of two, and half as many on faces.
 
     Returns:
         Inputs, shape (k, inputs), and values there, shape (k,); -inf where no arm was found.
     """
-    box = rod.box
+    box = tip_map.box
 
     def of(gamma: Array) -> Array:
         return np.nan_to_num(measure(gamma), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
@@ -103,7 +103,7 @@ def worst_inputs(
     inside = box.from_cube(sample_cube("sobol", samples, box.bundles))
     faces = box.from_cube(rng.random((samples // 2, box.bundles)).round(0))
     mixed = np.where(rng.random(faces.shape) < 0.5, faces, inside[: len(faces)])
-    every = np.concatenate([inside, some_corners(rod), mixed])
+    every = np.concatenate([inside, some_corners(tip_map), mixed])
     values = of(every)
     around, columns = max(samples // _AROUND, 8), np.arange(values.shape[1])
     starts = 4 if samples > _OF_BENDING else 2
@@ -125,9 +125,9 @@ def worst_inputs(
     return gamma[columns, best], value[columns, best]
 
 
-def some_corners(rod: TipMap) -> Array:
+def some_corners(tip_map: TipMap) -> Array:
     """Corners of the activation box, and each input at its bounds alone, shape (n, inputs)."""
-    box = rod.box
+    box = tip_map.box
     alone = np.tile(box.clip(np.zeros(box.bundles)), (2 * box.bundles, 1))
     each = np.arange(box.bundles)
     alone[each, each], alone[box.bundles + each, each] = box.low, box.high

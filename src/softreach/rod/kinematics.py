@@ -16,7 +16,7 @@ from softreach.arm.driving import body_of
 from softreach.arm.lines import lengths_of_strains
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import quadrature
-from softreach.rod.rods import ArmMap, tip_map, with_unstable
+from softreach.rod.rods import ArmMap, as_tip_map, with_unstable
 from softreach.rod.tip_map import Frame, Frames, Shapes, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
@@ -68,8 +68,8 @@ def tip_positions(
             (ζ <= 0) or none that the steps follow; or a `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    rod = with_unstable(tip_map(arm, tol, frame=frame))
-    return rod.tips(rod.check_activations("activations", activations))
+    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
+    return tip_map.tips(tip_map.check_activations("activations", activations))
 
 
 def tip_jacobian(
@@ -96,8 +96,8 @@ def tip_jacobian(
     Raises:
         InvalidInput: As for `tip_positions`.
     """
-    rod = with_unstable(tip_map(arm, tol, frame=frame))
-    return rod.tip_twists(rod.check_activations("activations", activations))[1]
+    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
+    return tip_map.tip_twists(tip_map.check_activations("activations", activations))[1]
 
 
 def marker_positions(
@@ -122,9 +122,9 @@ def marker_positions(
     Raises:
         InvalidInput: As for `tip_positions`.
     """
-    rod = with_unstable(tip_map(arm, tol, frame=frame))
-    gamma = rod.check_activations("activations", activations)
-    return _markers(rod, gamma)
+    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
+    gamma = tip_map.check_activations("activations", activations)
+    return _markers(tip_map, gamma)
 
 
 def marker_sections(arm: Manipulator) -> Array:
@@ -148,9 +148,11 @@ def marked(arm: Manipulator, z: Array, frames: Frames) -> Array:
     return frames.position[:, section] + turned
 
 
-def _markers(rod: TipMap, gamma: Array) -> Array:
-    z = marker_sections(rod.arm)
-    return marked(rod.arm, z, rod.frames(gamma, z)) if len(z) else np.empty((len(gamma), 0, 3))
+def _markers(tip_map: TipMap, gamma: Array) -> Array:
+    z = marker_sections(tip_map.arm)
+    return (
+        marked(tip_map.arm, z, tip_map.frames(gamma, z)) if len(z) else np.empty((len(gamma), 0, 3))
+    )
 
 
 def configuration(
@@ -181,14 +183,14 @@ def configuration(
         InvalidInput: Activations or stations of another shape or out of range, or activations
             under which there is no arm (ζ <= 0).
     """
-    rod = with_unstable(tip_map(arm, tol, frame=frame))
+    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
     values = as_floats("activation", activation)
-    gamma = rod.check_activations("activation", np.atleast_2d(values))
-    z, status = stations_along(rod, stations), np.empty(len(gamma), np.int8)
-    shapes = rod.shapes(gamma, z, z, status)
-    others = {"marker_position": _markers(rod, gamma), **_lines(rod, gamma)}
-    dataset = shape_dataset(rod, gamma, z, shapes, **others)
-    if rod.supports_unstable:
+    gamma = tip_map.check_activations("activation", np.atleast_2d(values))
+    z, status = stations_along(tip_map, stations), np.empty(len(gamma), np.int8)
+    shapes = tip_map.shapes(gamma, z, z, status)
+    others = {"marker_position": _markers(tip_map, gamma), **_lines(tip_map, gamma)}
+    dataset = shape_dataset(tip_map, gamma, z, shapes, **others)
+    if tip_map.supports_unstable:
         dataset = schema.with_status(dataset, status)
     return dataset.isel(sample=0) if values.ndim == 1 else dataset
 
@@ -222,49 +224,49 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
 
 
 def shape_dataset(
-    rod: TipMap, gamma: Array, z: Array, shapes: Shapes, **others: Array
+    tip_map: TipMap, gamma: Array, z: Array, shapes: Shapes, **others: Array
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
     return schema.configuration_dataset(
-        rod.arm,
-        gamma * rod.measures,
+        tip_map.arm,
+        gamma * tip_map.measures,
         z,
-        names=rod.box.names,
-        frame=rod.frame,
+        names=tip_map.box.names,
+        frame=tip_map.frame,
         **shapes._asdict(),
-        radius=rod.radius(z),
+        radius=tip_map.radius(z),
         **{name: values for name, values in others.items() if values.shape[1]},
     )
 
 
-def _lines(rod: ArmMap, gamma: Array) -> dict[str, Array]:
+def _lines(tip_map: ArmMap, gamma: Array) -> dict[str, Array]:
     """Lengths of the lines of bundles, and what drives and displacements activate there."""
-    arm, length = rod.arm, np.empty((len(gamma), rod.arm.bundles))
+    arm, length = tip_map.arm, np.empty((len(gamma), tip_map.arm.bundles))
     if not arm.bundles:
         return {}
     nodes = quadrature(body_of(arm))[0]
     for block in parallel.blocks(len(gamma), _LINES_TOGETHER):
-        curvature, extension = rod.strains(gamma[block], nodes)
+        curvature, extension = tip_map.strains(gamma[block], nodes)
         length[block] = lengths_of_strains(arm, curvature * extension[..., None], extension)
     if arm.is_direct:
         return {"line_length": length}
-    activation = rod.inputs.activations(gamma)[:, : arm.bundles]
+    activation = tip_map.inputs.activations(gamma)[:, : arm.bundles]
     return {"line_length": length, "bundle_activation": activation}
 
 
-def stations_along(rod: TipMap, stations: int | ArrayLike) -> Array:
+def stations_along(tip_map: TipMap, stations: int | ArrayLike) -> Array:
     """Z [m] of stations given by their number or by themselves, ascending.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         stations: Number of stations, evenly spaced from base to tip, or their Z [m].
 
     Raises:
         InvalidInput: No such number or stations.
     """
     if isinstance(stations, list | tuple) or getattr(stations, "ndim", 0) > 0:
-        return rod.check_stations(stations)
+        return tip_map.check_stations(stations)
     number = plain(stations)
     if isinstance(number, bool) or not isinstance(number, int) or number < 2:
         raise InvalidInput("stations", as_given(stations), "2 or more, or the stations' Z in m")
-    return np.linspace(0.0, rod.length, number)
+    return np.linspace(0.0, tip_map.length, number)

@@ -354,23 +354,14 @@ def _per_arm(
     each = length[..., None]
     grown, stretched = change.rest_length @ whole, change.stretch @ whole
     bent = change.curvature @ gamma + change.compliance[..., 1:, :] * moment[..., None]
-    turning = np.concatenate(
-        [
-            (each * table.rest_length_factor)[:, :, None] * bend[..., None]
-            + rest_length[..., None, None] * table.curvature,
-            grown[:, :, None] * bend[..., None] + rest_length[..., None, None] * bent,
-        ],
-        axis=-1,
-    )
-    pushing = np.concatenate(
-        [
-            each * (table.extension + table.rest_length_factor * squeeze[..., None]),
-            stretched
-            + grown * squeeze[..., None]
-            + rest_length[..., None] * change.compliance[..., 0, :] * thrust[..., None],
-        ],
-        axis=-1,
-    )
+    of_activations = (each * table.rest_length_factor)[:, :, None] * bend[..., None]
+    of_activations += rest_length[..., None, None] * table.curvature
+    of_changes = grown[:, :, None] * bend[..., None] + rest_length[..., None, None] * bent
+    turning = np.concatenate([of_activations, of_changes], axis=-1)
+    of_activations = each * (table.extension + table.rest_length_factor * squeeze[..., None])
+    of_changes = stretched + grown * squeeze[..., None]
+    of_changes += rest_length[..., None] * change.compliance[..., 0, :] * thrust[..., None]
+    pushing = np.concatenate([of_activations, of_changes], axis=-1)
     yielding = np.zeros((*table.force.shape, turning.shape[-1]))
     yielding[..., len(gamma) :] = change.force
     return (

@@ -37,6 +37,7 @@ from softreach.support.lazy import lazy
 __all__ = [
     "ArmMap",
     "all_inputs",
+    "as_tip_map",
     "coarsened",
     "effective",
     "free_bundles",
@@ -44,7 +45,6 @@ __all__ = [
     "measured_bundles",
     "of_tip",
     "refined",
-    "tip_map",
     "with_unstable",
 ]
 
@@ -250,7 +250,7 @@ class ArmMap(TipMap):
         return self.rod.linearization_errors(self.inputs.activations(centers), widths)
 
 
-def tip_map(
+def as_tip_map(
     arm: Manipulator | TipMap,
     tol: float = 1e-6,
     *,
@@ -285,85 +285,85 @@ def tip_map(
     return found
 
 
-def _to_tolerance(rod: TipMap, tol: float) -> TipMap:
-    known = tip_map(rod)
+def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
+    known = as_tip_map(tip_map)
     if not isinstance(known.rod, ArmRod):
-        return rod
+        return tip_map
     inputs = known.inputs.to_tolerance(tol)
     return replace(known, rod=_known_rod(known.rod.arm, tol), inputs=inputs)
 
 
-def refined(rod: TipMap, tol: float) -> TipMap:
+def refined(tip_map: TipMap, tol: float) -> TipMap:
     """The tip map of the same arm to a smaller tolerance; itself if its own is no larger.
 
     Args:
-        rod: The tip map; one that is of no arm stays as it is.
+        tip_map: The tip map; one that is of no arm stays as it is.
         tol: Largest tip error, in L.
     """
-    return rod if rod.tol <= check_tol(tol) else _to_tolerance(rod, tol)
+    return tip_map if tip_map.tol <= check_tol(tol) else _to_tolerance(tip_map, tol)
 
 
-def coarsened(rod: TipMap, tol: float) -> TipMap:
+def coarsened(tip_map: TipMap, tol: float) -> TipMap:
     """The tip map of the same arm to a larger tolerance; itself if its own is no smaller.
 
     Args:
-        rod: The tip map; one that is of no arm stays as it is.
+        tip_map: The tip map; one that is of no arm stays as it is.
         tol: Largest tip error, in L.
     """
-    return rod if rod.tol >= check_tol(tol) else _to_tolerance(rod, tol)
+    return tip_map if tip_map.tol >= check_tol(tol) else _to_tolerance(tip_map, tol)
 
 
-def effective(rod: TipMap) -> TipMap:
+def effective(tip_map: TipMap) -> TipMap:
     """The tip map of the same arm in inputs beyond the dead zones of its drives.
 
     It has the same image and no kinks at dead zones; itself where there are none.
     """
-    known = tip_map(rod)
+    known = as_tip_map(tip_map)
     if not any(drive.dead_zone for drive in known.arm.drives):
-        return rod
+        return tip_map
     return replace(known, inputs=known.inputs.effective())
 
 
-def free_bundles(rod: TipMap) -> TipMap:
+def free_bundles(tip_map: TipMap) -> TipMap:
     """The restriction of a tip map to its free bundles; the map itself if all are free."""
-    as_instance("rod", rod, TipMap, "a TipMap")
-    if rod.box.dimension == rod.box.bundles:
-        return rod
-    known = tip_map(rod)
-    return replace(known, inputs=known.inputs.only(rod.box.free.tolist()))
+    as_instance("tip_map", tip_map, TipMap, "a TipMap")
+    if tip_map.box.dimension == tip_map.box.bundles:
+        return tip_map
+    known = as_tip_map(tip_map)
+    return replace(known, inputs=known.inputs.only(tip_map.box.free.tolist()))
 
 
-def measured_bundles(rod: TipMap) -> TipMap:
+def measured_bundles(tip_map: TipMap) -> TipMap:
     """A tip map whose activations are in `activation_measures`; the map itself if they are."""
-    known = tip_map(rod)
+    known = as_tip_map(tip_map)
     inputs = known.inputs.measured(known.arm)
-    return rod if inputs == known.inputs else replace(known, inputs=inputs)
+    return tip_map if inputs == known.inputs else replace(known, inputs=inputs)
 
 
-def all_inputs(rod: TipMap) -> ArmMap:
+def all_inputs(tip_map: TipMap) -> ArmMap:
     """The tip map of all inputs of an arm, each in its own unit."""
-    known = tip_map(rod)
+    known = as_tip_map(tip_map)
     if known.inputs.is_plain:
         return known
     return replace(known, inputs=Inputs.of(known.inputs.own_box, known.inputs.driving))
 
 
-def with_unstable(rod: TipMap) -> ArmMap:
+def with_unstable(tip_map: TipMap) -> ArmMap:
     """The tip map that has tips of unstable equilibria, too."""
-    known = tip_map(rod)
+    known = as_tip_map(tip_map)
     is_there = known.unstable or not known.supports_unstable
     return known if is_there else replace(known, unstable=True)
 
 
-def of_tip(rod: TipMap) -> ArmMap:
+def of_tip(tip_map: TipMap) -> ArmMap:
     """The tip map, for what is known of tips alone.
 
     Raises:
         InvalidInput: A marker stands for its tip.
     """
-    if rod.point is not None:
-        raise InvalidInput("point", rod.point.name, "left out: this is known of the tip alone")
-    return tip_map(rod)
+    if tip_map.point is not None:
+        raise InvalidInput("point", tip_map.point.name, "left out: this is known of the tip alone")
+    return as_tip_map(tip_map)
 
 
 def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
@@ -377,7 +377,7 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
         steps: Along the arm, if nothing breaks it.
         like: A tip map whose tolerance, frame and effective inputs it has.
     """
-    driving = tip_map(like).inputs.driving
+    driving = as_tip_map(like).inputs.driving
     found = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
     return effective(found) if driving is not None and driving.is_effective else found
 

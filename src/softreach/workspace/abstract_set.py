@@ -127,11 +127,11 @@ class ReachableSet(ABC):
         if self.hysteresis_share > 0.0:
             share = f"{100 * self.hysteresis_share:.2g} % of activations"
             details.append(f"hysteresis: two postures are held at {share}")
-        box, rod = self.tip_map.box, self.tip_map
+        box, tip_map = self.tip_map.box, self.tip_map
         power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
         grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
         free = counted(box.dimension, "free bundle")
-        details.append(f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L")
+        details.append(f"L = {tip_map.length:g} m, {free}; {grid}tip error up to {tip_map.tol:g} L")
         return "\n  ".join([f"{type(self).__name__}: {size}", *details])
 
     def _lines(self) -> list[str]:

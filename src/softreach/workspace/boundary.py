@@ -140,7 +140,7 @@ def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySam
 
 
 def _of_cells(cells: ReachedCells) -> BoundarySamples:
-    rod, wrap = cells.rod, cells.wrap
+    tip_map, wrap = cells.tip_map, cells.wrap
     if not cells.is_thick:
         group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
         return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
@@ -151,7 +151,7 @@ def _of_cells(cells: ReachedCells) -> BoundarySamples:
     area = np.zeros((len(every), 3))
     area[every, axis] = lattice.cell**2 * crossings.sense
     return BoundarySamples(
-        rod.box.to_cube(crossings.beyond)[:, rod.box.free].clip(0.0, 1.0),
+        tip_map.box.to_cube(crossings.beyond)[:, tip_map.box.free].clip(0.0, 1.0),
         crossings.points(every, crossings.place),
         area,
         _group(axis, i, j),

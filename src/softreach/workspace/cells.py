@@ -44,9 +44,9 @@ class ReachedCells:
     hull: ConvexHull | None = None
 
     @property
-    def rod(self) -> TipMap:
+    def tip_map(self) -> TipMap:
         """The tip map."""
-        return self.flood.rod
+        return self.flood.tip_map
 
     @property
     def lattice(self) -> Lattice:
@@ -78,7 +78,11 @@ class ReachedCells:
             lines, missed = self.swept
             area = len(lines.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
             seen = line_volume(lines)
-            error = seen.error + missed + area * (ENOUGH * edge + self.rod.tol * self.rod.length)
+            error = (
+                seen.error
+                + missed
+                + area * (ENOUGH * edge + self.tip_map.tol * self.tip_map.length)
+            )
             if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
                 volume = Estimate(seen.value, error)
         return volume
@@ -113,7 +117,7 @@ class ReachedCells:
         enough = _ON * self.lattice.cell
 
         def search(left: Index, start: Array) -> None:
-            nearest = nearest_tips(self.rod, start, points[left], enough)
+            nearest = nearest_tips(self.tip_map, start, points[left], enough)
             out[left] = np.minimum(out[left], nearest.distance)
 
         for known, start in self._starts_inside(points):

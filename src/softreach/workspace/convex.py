@@ -73,17 +73,17 @@ class ConvexHull(NamedTuple):
 
 
 def climbed_hull(
-    rod: TipMap, cube: Array, accuracy: float, kind: type[HullCorners] = HullCorners
+    tip_map: TipMap, cube: Array, accuracy: float, kind: type[HullCorners] = HullCorners
 ) -> ConvexHull:
     """The convex hull of the image of a box.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         cube: Places of the box to begin with, in the unit cube, shape (n, dimension).
         accuracy: Relative error of the volume that ends the climbing.
         kind: Of corners, with edges for faces in a plane.
     """
-    corners = kind.of(rod.tips(rod.box.from_free_cube(cube)), cube)
+    corners = kind.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube)
     before = corners
     if not len(corners.faces):
         return ConvexHull(Estimate(0.0, 0.0), corners, corners)
@@ -94,7 +94,7 @@ def climbed_hull(
         area = np.linalg.norm(vectors, axis=1)
         normals = vectors / np.maximum(area, np.finfo(float).tiny)[:, None]
         start = corners.cube[corners.faces[:, 0]]
-        found, tips, top = _climbed(rod, start, normals, _ENOUGH * accuracy * size, size)
+        found, tips, top = _climbed(tip_map, start, normals, _ENOUGH * accuracy * size, size)
         every = np.concatenate([corners.tips, tips])
         for rows in range(0, len(top), _TOGETHER):
             block = slice(rows, rows + _TOGETHER)
@@ -110,7 +110,7 @@ def climbed_hull(
 
 
 def _climbed(
-    rod: TipMap, cube: Array, normals: Array, enough: float, size: float
+    tip_map: TipMap, cube: Array, normals: Array, enough: float, size: float
 ) -> tuple[Array, Array, Array]:
     """Climb along a normal each, by projected gradients [BarzilaiBorwein1988].
 
@@ -118,12 +118,12 @@ def _climbed(
         Places (n, dimension), their tips (n, 3), and how far tips go along the normals at most
         (n,), by the slope that is left.
     """
-    box, free, n = rod.box, rod.box.free, len(cube)
+    box, free, n = tip_map.box, tip_map.box.free, len(cube)
     best, tips, top, value = cube.copy(), np.full((n, 3), np.nan), np.empty(n), np.full(n, -np.inf)
     rows, at, step = np.arange(n), cube, np.zeros(n)
     last, last_slope = at, np.zeros_like(at)
     for number in range(_CLIMBS):
-        moved, slopes = rod.tips_and_slopes(box.from_free_cube(at))
+        moved, slopes = tip_map.tips_and_slopes(box.from_free_cube(at))
         slope = np.einsum("ni,nij->nj", normals[rows], slopes[:, :, free]) * box.widths[free]
         height = np.einsum("ni,ni->n", moved, normals[rows])
         left = np.maximum(slope * (1.0 - at), -slope * at).sum(axis=1)

@@ -27,7 +27,7 @@ class Crossings:
     plane through the nearest tip, `beyond`, says at which place between them the boundary is cut.
     """
 
-    rod: TipMap
+    tip_map: TipMap
     lattice: Lattice
     cell: Index
     """The center that is reached, as a flat index, shape (n,)."""
@@ -59,7 +59,7 @@ class Crossings:
         cell, axis, sense = (np.concatenate(column) for column in zip(*parts, strict=True))
         n, outside = len(cell), cell + sense * flood.steps[axis]
         crossings = cls(
-            rod=flood.rod,
+            tip_map=flood.tip_map,
             lattice=flood.lattice,
             cell=cell,
             axis=axis,
@@ -107,7 +107,7 @@ class Crossings:
     def _search(self, which: Index, t: Array, start: Array) -> tuple[Mask, Nearest]:
         """Search for places on edges, and keep those that are reached; which these are."""
         enough = ENOUGH * self.lattice.cell
-        nearest = nearest_tips(self.rod, start, self.points(which, t), enough)
+        nearest = nearest_tips(self.tip_map, start, self.points(which, t), enough)
         reached = nearest.distance <= enough
         self.low[which[reached]] = t[reached]
         self.gamma[which[reached]] = nearest.gamma[reached]
@@ -116,7 +116,7 @@ class Crossings:
     def _cut(self, which: Index, tips: Array | None = None) -> None:
         """Cut the edges by the planes through the tips nearest to `high`, square to the way."""
         if tips is None:
-            tips = self.rod.tips(self.beyond[which])
+            tips = self.tip_map.tips(self.beyond[which])
         away = (self.points(which, self.high[which]) - tips) / self.lattice.cell
         distance = np.linalg.norm(away, axis=1).clip(1e-12)
         along = away[np.arange(len(which)), self.axis[which]] * self.sense[which] / distance
@@ -149,7 +149,7 @@ def swept_crossings(flood: Flood) -> tuple[Crossings, float]:
             return crossings, 0.0
         places = crossings.points(np.arange(count), crossings.place)
         others = np.asarray(KDTree(places).query(places, k=sweep + 1)[1])[:, sweep]
-        apart = np.abs(crossings.gamma[others] - crossings.gamma) / flood.rod.box.scales
+        apart = np.abs(crossings.gamma[others] - crossings.gamma) / flood.tip_map.box.scales
         which = np.flatnonzero((apart > _APART).any(axis=1))
         moved = crossings.advance(which, crossings.gamma[others[which]], _BEYOND)
         gain = float(moved.clip(0.0).sum()) * volume

@@ -24,7 +24,7 @@ _KINKED_SHARE = 2.0  # of what is removed, as a kink beside a line of the grid h
 _CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
 
 
-def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0) -> Flux:
+def signed_volume(tip_map: TipMap, nodes: int | None = None, *, enough: float = 0.0) -> Flux:
     """The signed volume of the image of three free bundles.
 
     By Gauss and Legendre's rule on the faces, where the map is smooth: its error falls faster than
@@ -32,7 +32,7 @@ def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0)
     maps with kinks it is the volume in mapped triangles, which needs no slopes.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
             tips are then less exact.
         enough: Relative change of the volume that ends the adding of nodes; those of free arms are
@@ -41,16 +41,16 @@ def signed_volume(rod: TipMap, nodes: int | None = None, *, enough: float = 0.0)
     Returns:
         Value and error are NaN if a node has no stable equilibrium.
     """
-    if rod.supports_unstable:
-        rod = refined(rod, _LOADED_TOL)
+    if tip_map.supports_unstable:
+        tip_map = refined(tip_map, _LOADED_TOL)
     elif not enough:
-        rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
-    if not rod.is_smooth:
-        return _of_triangles(rod, enough)
+        tip_map = refined(tip_map, flux_tol(tip_map) if nodes is None else _ROUGH_TOL)
+    if not tip_map.is_smooth:
+        return _of_triangles(tip_map, enough)
     counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
-    flux, change = _flux(rod, counts[0]), np.inf
+    flux, change = _flux(tip_map, counts[0]), np.inf
     for count in counts[1:]:
-        rough, flux = flux, _flux(rod, count)
+        rough, flux = flux, _flux(tip_map, count)
         change = abs(flux.value - rough.value)
         if nodes is None and not change > max(flux.error, enough * abs(flux.value)):  # NaN too
             break
@@ -70,16 +70,16 @@ class Flux(NamedTuple):
     """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
 
 
-def _of_triangles(rod: TipMap, enough: float) -> Flux:
+def _of_triangles(tip_map: TipMap, enough: float) -> Flux:
     """By the mapped triangles of two grids on the faces, whose error O(1/n²) is removed.
 
     A triangle's volume is linear in each corner, so that both grids together are nodes of one flux.
     """
-    enough = max(enough, _ROUGH_ENOUGH * rod.supports_unstable)
-    coarse = fine = _triangle_nodes(rod, _KINKED[0])
+    enough = max(enough, _ROUGH_ENOUGH * tip_map.supports_unstable)
+    coarse = fine = _triangle_nodes(tip_map, _KINKED[0])
     removed = np.inf
     for cells in _KINKED[1:]:
-        coarse, fine = fine, _triangle_nodes(rod, cells)
+        coarse, fine = fine, _triangle_nodes(tip_map, cells)
         removed = (fine.value - coarse.value) / 3.0
         if not abs(removed) > enough * abs(fine.value):  # NaN too
             break
@@ -91,36 +91,36 @@ def _of_triangles(rod: TipMap, enough: float) -> Flux:
     )
 
 
-def _triangle_nodes(rod: TipMap, cells: int) -> Flux:
+def _triangle_nodes(tip_map: TipMap, cells: int) -> Flux:
     """Vertices of a grid on the faces, with kinks along its lines, and the areas of each."""
-    grid, ticks = grid_faces(cells), grid_ticks(rod, cells)
+    grid, ticks = grid_faces(cells), grid_ticks(tip_map, cells)
     cube = np.stack(
         [t[np.rint(cells * x).astype(int)] for t, x in zip(ticks, grid.T, strict=True)], axis=1
     )
-    tips = rod.tips(rod.box.from_free_cube(cube))
-    return _flux_of(rod, cube, tips, corner_areas(tips, face_triangles(grid, cells)))
+    tips = tip_map.tips(tip_map.box.from_free_cube(cube))
+    return _flux_of(tip_map, cube, tips, corner_areas(tips, face_triangles(grid, cells)))
 
 
-def flux_tol(rod: TipMap) -> float:
+def flux_tol(tip_map: TipMap) -> float:
     """Largest tip error on the faces, in L."""
-    return min(rod.tol, _ROUGH_TOL if rod.supports_unstable else _TOL)
+    return min(tip_map.tol, _ROUGH_TOL if tip_map.supports_unstable else _TOL)
 
 
-def face_image(rod: TipMap, cells: int = _CELLS) -> Surface:
+def face_image(tip_map: TipMap, cells: int = _CELLS) -> Surface:
     """The closed image of the surface of the box of three free bundles, oriented outwards.
 
     Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
     has edges: sharp rims stay sharp, and parts of any thinness stay whole.
 
     Args:
-        rod: A tip map that is one to one inside the box.
+        tip_map: A tip map that is one to one inside the box.
         cells: Of the grid along each edge of the box.
 
     Returns:
         With vertices of NaN where an activation on the faces has no stable equilibrium.
     """
     cube = grid_faces(cells)
-    tips = rod.tips(rod.box.from_free_cube(cube))
+    tips = tip_map.tips(tip_map.box.from_free_cube(cube))
     surface = Surface(vertices=tips, faces=face_triangles(cube, cells))
     if surface.volume < 0:  # the map turns the box over
         surface = Surface(vertices=tips, faces=surface.faces[:, ::-1].copy())
@@ -180,32 +180,32 @@ def grid_faces(cells: int) -> Array:
     return np.argwhere(outside) / cells
 
 
-def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:
+def box_slopes(tip_map: TipMap, cube: Array) -> tuple[Array, Array]:
     """Tips [m] and their derivatives by places in the unit cube of the free bundles.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         cube: Places in [0, 1], shape (n, dimension).
 
     Returns:
         Shapes (n, 3) and (n, 3, dimension); NaN where there is no stable equilibrium.
     """
-    tips, slopes = rod.tips_and_slopes(rod.box.from_free_cube(cube))
-    free = rod.box.free
-    return tips, slopes[:, :, free] * rod.box.widths[free]
+    tips, slopes = tip_map.tips_and_slopes(tip_map.box.from_free_cube(cube))
+    free = tip_map.box.free
+    return tips, slopes[:, :, free] * tip_map.box.widths[free]
 
 
-def _flux(rod: TipMap, nodes: int) -> Flux:
+def _flux(tip_map: TipMap, nodes: int) -> Flux:
     faces = gauss_faces(nodes)
-    tips, slopes = box_slopes(rod, faces.cube)
-    return _flux_of(rod, faces.cube, tips, faces.area_vectors(slopes))
+    tips, slopes = box_slopes(tip_map, faces.cube)
+    return _flux_of(tip_map, faces.cube, tips, faces.area_vectors(slopes))
 
 
-def _flux_of(rod: TipMap, cube: Array, tips: Array, area: Array) -> Flux:
+def _flux_of(tip_map: TipMap, cube: Array, tips: Array, area: Array) -> Flux:
     """Flux of nodes with area vectors; the error is that of the tips alone."""
     # From the middle, where products cancel least. Not BLAS, whose rounding depends on threads.
     value = float(((tips - tips.mean(axis=0)) * area).sum()) / 3.0
-    moved = rod.tol * rod.length * float(np.linalg.norm(area, axis=1).sum())
+    moved = tip_map.tol * tip_map.length * float(np.linalg.norm(area, axis=1).sum())
     return Flux(value, moved, cube, area)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
-from softreach.rod.rods import effective, refined, tip_map
+from softreach.rod.rods import as_tip_map, effective, refined
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arguments import as_names, as_number
@@ -90,7 +90,7 @@ def volume_gradient(
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("parameters", twice[0], "given once")
     find_parameters(arm, names)  # refused before the set is computed
-    if (free := tip_map(arm).box.dimension) < 3:
+    if (free := as_tip_map(arm).box.dimension) < 3:
         raise InvalidInput("arm", f"{free} free bundles", "three of them or more")
     return gradient_of(reachable_set(arm, accuracy=accuracy), names, accuracy, progress)
 
@@ -192,10 +192,10 @@ def _swept(
     solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float, progress: Progress
 ) -> tuple[_Swept, _Swept]:
     """Derivatives of volume and convex volume by what boundary and corners of the hull sweep."""
-    rod = solid.tip_map
-    if solid.route == "flux" or rod.supports_unstable:
-        rod = refined(rod, flux_tol(rod))
-    tips = TipDerivatives(rod, parameters, _TOL, progress)
+    tip_map = solid.tip_map
+    if solid.route == "flux" or tip_map.supports_unstable:
+        tip_map = refined(tip_map, flux_tol(tip_map))
+    tips = TipDerivatives(tip_map, parameters, _TOL, progress)
     volume = _searched(solid, tips) if solid.route == "search" else _flowing(solid, tips, accuracy)
     return volume, _dragged(solid, tips)
 
@@ -276,7 +276,7 @@ def _by_differences(
         if arm is solid.arm:
             return solid
         if solid.route != "search":
-            return rasterized_set(effective(tip_map(arm)), solid.cells, cell, accuracy)
+            return rasterized_set(effective(as_tip_map(arm)), solid.cells, cell, accuracy)
         neighbor = reachable_set(arm, accuracy=accuracy, cell=cell)
         assert isinstance(neighbor, ReachableSolid)
         return neighbor
@@ -302,11 +302,11 @@ def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
 
 def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
     """Corners of the hull of a solid, and of that of half as fine a grid, or before a climb."""
-    rod = solid.tip_map
+    tip_map = solid.tip_map
     if solid.route == "flux":
         cells = 2 * round(solid.cells / 3)
         cube = grid_faces(cells)
-        tips = rod.tips(rod.box.from_free_cube(cube))
+        tips = tip_map.tips(tip_map.box.from_free_cube(cube))
         even = (np.rint(cells * cube) % 2 == 0).all(axis=1)
         return HullCorners.of(tips, cube), HullCorners.of(tips[even], cube[even])
     if isinstance(solid.image, Image):
@@ -314,19 +314,19 @@ def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
         corners = _corners_of(solid.image)
         if solid.cells >= _HULL_CELLS:
             return corners, _corners_of(solid.coarse_image)
-        return _finer(corners, rod, solid.cells), corners
+        return _finer(corners, tip_map, solid.cells), corners
     hull = solid.image.hull
     assert hull is not None
     return hull.corners, hull.before
 
 
-def _finer(corners: HullCorners, rod: TipMap, cells: int) -> HullCorners:
+def _finer(corners: HullCorners, tip_map: TipMap, cells: int) -> HullCorners:
     """Corners of the hull of a grid twice as fine, of which only what is beside them is mapped."""
     shape = (2 * cells + 1,) * 3
     places = np.rint(2 * cells * corners.cube).astype(np.int64)[:, None] + _AROUND
     keys = np.unique(np.ravel_multi_index(np.moveaxis(places, 2, 0), shape, mode="clip"))
     cube = np.stack(np.unravel_index(keys, shape), axis=1) / (2 * cells)
-    return HullCorners.of(rod.tips(rod.box.from_free_cube(cube)), cube)
+    return HullCorners.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube)
 
 
 def _corners_of(image: Image) -> HullCorners:

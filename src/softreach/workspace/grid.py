@@ -17,16 +17,16 @@ _NEARLY_ALL = 0.9
 _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
 
-def grid_ticks(rod: TipMap, cells: int) -> list[Array]:
+def grid_ticks(tip_map: TipMap, cells: int) -> list[Array]:
     """Ticks of a grid along each free bundle in the unit cube, kinks of the map among them.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         cells: Along each axis, a multiple of four; so are those between kinks.
     """
-    box, ticks = rod.box, list[Array]()
+    box, ticks = tip_map.box, list[Array]()
     for k in box.free:
-        places = np.unique((rod.kinks[k] - box.low[k]) / box.widths[k])
+        places = np.unique((tip_map.kinks[k] - box.low[k]) / box.widths[k])
         knots = np.array([0.0, *places[(places > 1e-6) & (places < 1.0 - 1e-6)], 1.0])
         counts = 4 * np.maximum(np.rint(np.diff(knots) * cells / 4).astype(int), 1)
         counts[counts.argmax()] += cells - counts.sum()
@@ -35,12 +35,12 @@ def grid_ticks(rod: TipMap, cells: int) -> list[Array]:
 
 
 def grid_tips(
-    rod: TipMap, cells: int, progress: Progress = silent, ticks: list[Array] | None = None
+    tip_map: TipMap, cells: int, progress: Progress = silent, ticks: list[Array] | None = None
 ) -> Array:
     """Tips [m] of the grid of cells^m boxes over the free bundles, in C order.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         cells: Along each axis.
         progress: Called with 0 now and then, so that it can raise.
         ticks: Along each axis, if they are not even.
@@ -52,25 +52,25 @@ def grid_tips(
     Raises:
         InvalidInput: There is none anywhere.
     """
-    even = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
+    even = [np.linspace(0.0, 1.0, cells + 1)] * tip_map.box.dimension
     places = _product(ticks or even)
     tips = np.empty((len(places), 3))
     for rows in blocks(len(places), _BLOCK):
-        tips[rows] = rod.tips(rod.box.from_free_cube(places[rows]))
+        tips[rows] = tip_map.tips(tip_map.box.from_free_cube(places[rows]))
         progress(0)
-    if rod.supports_unstable and np.isnan(tips[:, 0]).all():
+    if tip_map.supports_unstable and np.isnan(tips[:, 0]).all():
         raise no_stable_equilibrium(len(tips))
     return tips
 
 
-def grid_stretches(rod: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
+def grid_stretches(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
     """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
 
     From differences of the tips, and by J itself where these might have the wrong sign, and
     everywhere if the map has kinks.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         tips: Of the vertices [m].
         cells: Number of cells along each axis.
         is_lifted: Cells that are not mapped by their vertices, shape (cells, cells, cells).
@@ -80,13 +80,13 @@ def grid_stretches(rod: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Arr
     """
     used = corners_of(~is_lifted).ravel()
     determinants = np.where(used, stretches(tips, np.array([cells] * 3)), 0.0)
-    determinants *= cells**3 / (8.0 * rod.box.volume)
-    share = _NEARLY_ALL if rod.supports_unstable else 1.0  # |det J| grows toward instability
+    determinants *= cells**3 / (8.0 * tip_map.box.volume)
+    share = _NEARLY_ALL if tip_map.supports_unstable else 1.0  # |det J| grows toward instability
     largest = float(np.quantile(np.abs(determinants[used]), share)) if used.any() else 0.0
     unsure = np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
-    small = np.flatnonzero((unsure | (not rod.is_smooth)) & used)
+    small = np.flatnonzero((unsure | (not tip_map.is_smooth)) & used)
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
-    determinants[small] = _stretch(rod, rod.box.from_free_cube(places))
+    determinants[small] = _stretch(tip_map, tip_map.box.from_free_cube(places))
     determinants[~np.isfinite(determinants)] = 0.0
     return determinants
 
@@ -104,32 +104,32 @@ def corners_of(cells: Mask) -> Mask:
     return cells
 
 
-def image_measure(rod: TipMap, nodes: int) -> float:
+def image_measure(tip_map: TipMap, nodes: int) -> float:
     """Length or area of the image of one or two free bundles, ∫ √det(JᵀJ) dγ.
 
     By Gauss and Legendre's rule, as the map is smooth: its error falls faster than any power of the
     number of nodes. Places reached more than once count as often.
 
     Args:
-        rod: The tip map, with one or two free bundles.
+        tip_map: The tip map, with one or two free bundles.
         nodes: Nodes along each axis of the box.
 
     Returns:
         Length [m] or area [m²]; NaN if a node has no stable equilibrium.
     """
     x, w = np.polynomial.legendre.leggauss(nodes)
-    m = rod.box.dimension
-    gamma = rod.box.from_free_cube(_product([(1.0 + x) / 2.0] * m))
-    weights = np.prod(_product([w / 2.0] * m), axis=1) * rod.box.volume
+    m = tip_map.box.dimension
+    gamma = tip_map.box.from_free_cube(_product([(1.0 + x) / 2.0] * m))
+    weights = np.prod(_product([w / 2.0] * m), axis=1) * tip_map.box.volume
     # Not a BLAS product, whose rounding would depend on its threads.
-    return float((weights * _stretch(refined(rod, _TOL), gamma)).sum())
+    return float((weights * _stretch(refined(tip_map, _TOL), gamma)).sum())
 
 
-def _stretch(rod: TipMap, gamma: Array) -> Array:
+def _stretch(tip_map: TipMap, gamma: Array) -> Array:
     """The change of measure of the map at each activation: det J where J is square."""
-    slopes = rod.tips_and_slopes(gamma)[1][:, :, rod.box.free]
+    slopes = tip_map.tips_and_slopes(gamma)[1][:, :, tip_map.box.free]
     with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
-        if rod.box.dimension == 3:
+        if tip_map.box.dimension == 3:
             return np.linalg.det(slopes)
         return np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
 

@@ -41,17 +41,17 @@ class LiftedGrid:
     @classmethod
     def of(
         cls,
-        rod: TipMap,
+        tip_map: TipMap,
         n: int,
         progress: Progress = silent,
         ticks: list[Array] | None = None,
     ) -> LiftedGrid:
         """The grid of n cells along each free bundle; see `grid_tips`."""
-        m = rod.box.dimension
-        nodes = rod.box.from_free_cube(cube_grid(n, m))
-        held = rod.held(nodes, (n + 1,) * m) if rod.supports_unstable else None
+        m = tip_map.box.dimension
+        nodes = tip_map.box.from_free_cube(cube_grid(n, m))
+        held = tip_map.held(nodes, (n + 1,) * m) if tip_map.supports_unstable else None
         if held is None:
-            return cls.of_one_sheet(grid_tips(rod, n, progress, ticks), n, m)
+            return cls.of_one_sheet(grid_tips(tip_map, n, progress, ticks), n, m)
         progress(0)
         if not len(held.node):
             raise no_stable_equilibrium(len(nodes))
@@ -73,11 +73,11 @@ class LiftedGrid:
         n, m = len(self.is_lifted), self.is_lifted.ndim
         return np.concatenate([_corners(n, m)[~self.is_lifted.ravel()], self.lifted])
 
-    def coarser(self, rod: TipMap, times: int = 2) -> LiftedGrid:
+    def coarser(self, tip_map: TipMap, times: int = 2) -> LiftedGrid:
         """The grid of fewer cells along each axis, for tips of a map."""
         n, m = len(self.is_lifted), self.is_lifted.ndim
         if self.is_torn:
-            return LiftedGrid.of(rod, n // times)
+            return LiftedGrid.of(tip_map, n // times)
         tips = self.tips.reshape(*(n + 1,) * m, 3)[(slice(None, None, times),) * m]
         return LiftedGrid.of_one_sheet(np.ascontiguousarray(tips).reshape(-1, 3), n // times, m)
 

@@ -29,7 +29,7 @@ class Estimate(NamedTuple):
 
 
 def solid_volume(
-    rod: TipMap, fine: Image, coarse: Image, accuracy: float = SURE_ACCURACY
+    tip_map: TipMap, fine: Image, coarse: Image, accuracy: float = SURE_ACCURACY
 ) -> Estimate:
     """Volume of the image of a box [m³] from grids of n and n/2 cells along each of three axes.
 
@@ -41,7 +41,7 @@ def solid_volume(
     that they remove is the error stated: folds that a coarse grid makes up vanish faster than that.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         fine: Image of the grid of n cells.
         coarse: Image of that of n/2.
         accuracy: Relative error that is asked for: above 0.003, the integral may err by a hundredth
@@ -51,7 +51,7 @@ def solid_volume(
         NaN if a node of the integral has no stable equilibrium.
     """
     rough = accuracy > SURE_ACCURACY
-    signed = signed_volume(rod, None if rough else _NODES, enough=FLUX_PART * accuracy * rough)
+    signed = signed_volume(tip_map, None if rough else _NODES, enough=FLUX_PART * accuracy * rough)
     sense = 1 if signed.value >= 0 else -1
     at_fine, at_coarse = _correction(fine, sense), _correction(coarse, sense)
     removed = (at_fine.value - at_coarse.value) / 3.0

@@ -87,19 +87,21 @@ class _FlatCorners(HullCorners):
         return enclosed_area(self.tips, self.faces)
 
 
-def plane_of_tips(rod: TipMap) -> Plane | None:
+def plane_of_tips(tip_map: TipMap) -> Plane | None:
     """The plane in which all tips lie to their tolerance; None if there is none."""
-    (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.dimension, 0, _SAMPLES)
-    tips = rod.tips(rod.box.from_free_cube(np.concatenate([cube, np.rint(cube)])))
+    (cube,) = cube_blocks("sobol", _SAMPLES, tip_map.box.dimension, 0, _SAMPLES)
+    tips = tip_map.tips(tip_map.box.from_free_cube(np.concatenate([cube, np.rint(cube)])))
     tips = tips[np.isfinite(tips[:, 0])]
-    return plane_of(tips, _FLAT * rod.tol * rod.length) if len(tips) > 2 else None
+    return plane_of(tips, _FLAT * tip_map.tol * tip_map.length) if len(tips) > 2 else None
 
 
-def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -> ReachableRegion:
+def planar_set(
+    tip_map: TipMap, plane: Plane, accuracy: float, progress: Progress
+) -> ReachableRegion:
     """The region that a tip map reaches in a plane, as `searched_set` finds volumes in space.
 
     Args:
-        rod: The tip map, of two free bundles or more.
+        tip_map: The tip map, of two free bundles or more.
         plane: The plane in which its tips lie.
         accuracy: Relative error asked of the area.
         progress: Called with the number of centers searched since its last call.
@@ -111,7 +113,7 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
         points=tuple(map(tuple, plane.rotation.tolist())),  # pyright: ignore[reportArgumentType]
         position=tuple((-plane.rotation @ plane.origin).tolist()),  # pyright: ignore[reportArgumentType]
     )
-    flat = ArmMap.of(rod, turned)  # in the axes of the plane
+    flat = ArmMap.of(tip_map, turned)  # in the axes of the plane
     cloud = gamma, tips = cloud_on_faces(flat, 0)
     sides = np.ptp(tips[:, :2], axis=0)
     mean = float(np.sqrt(np.prod(sides)))
@@ -125,21 +127,21 @@ def planar_set(rod: TipMap, plane: Plane, accuracy: float, progress: Progress) -
     coarse = outline(_FINER * edge)
     while True:
         found = outline(edge)
-        slack = found.length * (ENOUGH * edge + rod.tol * rod.length)
+        slack = found.length * (ENOUGH * edge + tip_map.tol * tip_map.length)
         area = Estimate(found.area, abs(found.area - coarse.area) + slack)
         if area.error <= accuracy * area.value or edge / _FINER < sides.max() / _MOST:
             break
         edge, coarse = edge / _FINER, found
-    area = _smooth(rod, flat, area)
-    cube = rod.box.to_cube(np.concatenate([gamma[:CLIMBERS], found.gamma]))[:, rod.box.free]
+    area = _smooth(tip_map, flat, area)
+    cube = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], found.gamma]))[:, tip_map.box.free]
     convex = climbed_hull(flat, cube, accuracy, _FlatCorners).volume
     return ReachableRegion(
-        tip_map=rod,
+        tip_map=tip_map,
         area=area.value,
         area_error=area.error,
         convex_area=convex.value,
         convex_area_error=convex.error,
-        lost_share=lost_share(rod),
+        lost_share=lost_share(tip_map),
         outline=threads(plane.places(found.tips), found.edges),
         mapped_grid=_mesh(found, plane),
     )
@@ -180,13 +182,13 @@ class _Outline(NamedTuple):
         return float(np.linalg.norm(np.diff(self.tips[self.edges], axis=1), axis=2).sum())
 
 
-def _smooth(rod: TipMap, flat: TipMap, area: Estimate) -> Estimate:
+def _smooth(tip_map: TipMap, flat: TipMap, area: Estimate) -> Estimate:
     """The area of two bundles that do not fold by Gauss nodes, as far as the outline agrees."""
-    if rod.box.dimension != 2 or rod.supports_unstable or not rod.is_smooth:
+    if tip_map.box.dimension != 2 or tip_map.supports_unstable or not tip_map.is_smooth:
         return area
     grid = cube_grid(_SIGNS)[:, :2]
     sign = np.linalg.det(box_slopes(flat, grid)[1][:, :2])
-    smooth = by_nodes(rod)
+    smooth = by_nodes(tip_map)
     folds = sign.min() * sign.max() <= 0.0 or abs(smooth.value - area.value) > area.error
     return area if folds else smooth
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.rods import effective, tip_map
+from softreach.rod.rods import as_tip_map, effective
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.arrays import Array
@@ -100,26 +100,26 @@ def reachable_set(
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)
     memory = None if memory is None else as_number("memory", memory, _SIZES)
-    rod = effective(tip_map(arm, tol, frame=frame, point=point))
-    m = rod.box.dimension
-    if m > 1 and (plane := plane_of_tips(rod)) is not None:
-        return planar_set(rod, plane, accuracy, progress)
+    tip_map = effective(as_tip_map(arm, tol, frame=frame, point=point))
+    m = tip_map.box.dimension
+    if m > 1 and (plane := plane_of_tips(tip_map)) is not None:
+        return planar_set(tip_map, plane, accuracy, progress)
     if m < 3:
-        return thin_set(rod)
+        return thin_set(tip_map)
     if m == 3:
-        result = _of_three(rod, accuracy, cell, progress)
+        result = _of_three(tip_map, accuracy, cell, progress)
         finer = f"a grid above {result.cells} and a smaller cell"
     else:
-        cells = searched_set(rod, accuracy, cell, memory, progress)
+        cells = searched_set(tip_map, accuracy, cell, memory, progress)
         hull = cells.hull
         assert hull is not None
         result = ReachableSolid(
-            tip_map=rod,
+            tip_map=tip_map,
             volume=cells.volume.value,
             volume_error=cells.volume.error,
             convex_volume=hull.volume.value,
             convex_volume_error=hull.volume.error,
-            lost_share=lost_share(rod),
+            lost_share=lost_share(tip_map),
             route="search",
             image=cells,
         )
@@ -133,7 +133,7 @@ def reachable_set(
 
 
 def rasterized_set(
-    rod: TipMap,
+    tip_map: TipMap,
     cells: int,
     cell: float | None,
     accuracy: float,
@@ -142,7 +142,7 @@ def rasterized_set(
     """Reach of three free bundles by one raster, whether the map is one to one or not.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         cells: Of the activation grid along each axis, even.
         cell: Edge of a cell in space [m]; by the accuracy if None.
         accuracy: Relative error of the volume that the cell is chosen for.
@@ -151,8 +151,8 @@ def rasterized_set(
     Raises:
         InvalidInput: No activation has a stable equilibrium, or memory does not hold the cells.
     """
-    grid = _Grid.of(rod, cells, progress)
-    return _by_raster(rod, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
+    grid = _Grid.of(tip_map, cells, progress)
+    return _by_raster(tip_map, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
 
 
 def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
@@ -170,30 +170,30 @@ def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
 
 
 def _of_three(
-    rod: TipMap, accuracy: float, cell: float | None, progress: Progress
+    tip_map: TipMap, accuracy: float, cell: float | None, progress: Progress
 ) -> ReachableSolid:
     most = np.cbrt(_MOST_VERTICES) - 1.0
     cells = max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
     before: _Grid | None = None
     while True:
-        grid = _Grid.of(rod, cells, progress)
+        grid = _Grid.of(tip_map, cells, progress)
         fine = grid.image(grid.lattice(cell, accuracy), progress)
-        if rod.is_smooth and not rod.supports_unstable and grid.is_one_to_one(fine):
-            return _by_faces(rod, grid, fine)
-        solid = _by_raster(rod, grid, fine, accuracy, before)
+        if tip_map.is_smooth and not tip_map.supports_unstable and grid.is_one_to_one(fine):
+            return _by_faces(tip_map, grid, fine)
+        solid = _by_raster(tip_map, grid, fine, accuracy, before)
         if not is_worthwhile(solid, accuracy):
             return solid
         cells, before = 2 * cells, grid
 
 
-def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
+def _by_faces(tip_map: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
     """The solid of an image that is one to one, by what flows through the faces of the box."""
-    cells, flux = grid.cells, signed_volume(rod)
+    cells, flux = grid.cells, signed_volume(tip_map)
     faces = np.rint(grid_faces(cells) * cells).astype(int)
     tips = grid.lifted.tips[np.ravel_multi_index(tuple(faces.T), (cells + 1,) * 3)]
     convex = measure.extrapolated_hull(tips, tips[(faces % 2 == 0).all(axis=1)])
     return ReachableSolid(
-        tip_map=rod,
+        tip_map=tip_map,
         cells=cells,
         volume=abs(flux.value),
         volume_error=flux.error,
@@ -208,31 +208,31 @@ def _by_faces(rod: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
 
 
 def _by_raster(
-    rod: TipMap, grid: _Grid, fine: Image, accuracy: float, before: _Grid | None = None
+    tip_map: TipMap, grid: _Grid, fine: Image, accuracy: float, before: _Grid | None = None
 ) -> ReachableSolid:
     """The solid of any image; without the integral over the box where it has several sheets.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         grid: The grid.
         fine: Its image.
         accuracy: Relative error allowed.
         before: The grid of half as many cells, if it is known.
     """
     if before is None or not grid.lifted.is_torn:
-        before = grid.coarser(rod)
+        before = grid.coarser(tip_map)
     coarse = before.image(fine.lattice)
     volume, convex = measure.Estimate(np.nan, np.nan), measure.convex_volume(fine, coarse)
     if not grid.lifted.is_torn:
-        volume = measure.solid_volume(rod, fine, coarse, accuracy)
+        volume = measure.solid_volume(tip_map, fine, coarse, accuracy)
     several, change = measure.multiply_covered(fine, coarse)
     if np.isnan(volume.value):
-        third = _Grid.of(rod, grid.cells // 3).image(fine.lattice)
+        third = _Grid.of(tip_map, grid.cells // 3).image(fine.lattice)
         volume = measure.torn_volume(fine, coarse, third)
     else:  # a fold out of place errs by as much in both
         volume = volume._replace(error=volume.error + change)
     return ReachableSolid(
-        tip_map=rod,
+        tip_map=tip_map,
         cells=grid.cells,
         volume=volume.value,
         volume_error=volume.error,
@@ -258,11 +258,11 @@ class _Grid(NamedTuple):
     """det J, shape ((n + 1)³,)."""
 
     @classmethod
-    def of(cls, rod: TipMap, cells: int, progress: Progress = silent) -> _Grid:
+    def of(cls, tip_map: TipMap, cells: int, progress: Progress = silent) -> _Grid:
         """The grid of cells³ boxes over the activation box."""
-        lifted = LiftedGrid.of(rod, cells, progress)
+        lifted = LiftedGrid.of(tip_map, cells, progress)
         tips = lifted.tips[: (cells + 1) ** 3]
-        return cls(lifted, grid_stretches(rod, tips, cells, lifted.is_lifted))
+        return cls(lifted, grid_stretches(tip_map, tips, cells, lifted.is_lifted))
 
     @property
     def cells(self) -> int:
@@ -305,10 +305,10 @@ class _Grid(NamedTuple):
         lifted = {"is_lifted": grid.is_lifted, "lifted": grid.lifted}
         return image_of(grid.tips, stretches, (n, n, n), lattice, progress, **lifted)
 
-    def coarser(self, rod: TipMap) -> _Grid:
+    def coarser(self, tip_map: TipMap) -> _Grid:
         """The grid of half as many cells."""
         n = self.cells
         if self.lifted.is_torn:
-            return _Grid.of(rod, n // 2)
+            return _Grid.of(tip_map, n // 2)
         every_second = self.stretches.reshape((n + 1,) * 3)[::2, ::2, ::2]
-        return _Grid(self.lifted.coarser(rod), every_second.ravel())
+        return _Grid(self.lifted.coarser(tip_map), every_second.ravel())

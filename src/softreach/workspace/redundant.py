@@ -39,19 +39,19 @@ CLIMBERS = 1024
 """Of these, for the convex hull beside tips on the boundary: more make countless facets."""
 
 
-def smallest_memory(rod: TipMap) -> float:
+def smallest_memory(tip_map: TipMap) -> float:
     """Memory that a search cannot do without [bytes]."""
-    fixed, each = _bytes(rod)
+    fixed, each = _bytes(tip_map)
     return fixed + 2e4 * each
 
 
 def searched_set(
-    rod: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
+    tip_map: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
 ) -> ReachedCells:
     """The image of a box of four free bundles or more.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         accuracy: Relative error asked of the volume: cells become smaller until it is met, or
             `memory` is used.
         cell: Edge of a cell [m], instead of the rule's.
@@ -62,13 +62,13 @@ def searched_set(
         InvalidInput: No activation has a stable equilibrium, too little memory, or cells too small
             for it.
     """
-    least = smallest_memory(rod)
+    least = smallest_memory(tip_map)
     memory = max(free_memory() / 4.0, least) if memory is None else memory
     if not least <= memory < np.inf:
         raise InvalidInput("memory", memory, f"at least {least:.3g} bytes")
-    cloud = gamma, tips = cloud_on_faces(rod, 0)
+    cloud = gamma, tips = cloud_on_faces(tip_map, 0)
     sides = np.ptp(tips, axis=0)
-    smallest = _smallest_cell(rod, sides, memory)
+    smallest = _smallest_cell(tip_map, sides, memory)
     if cell is not None and not smallest <= cell < np.inf:  # NaN too
         raise InvalidInput("cell", cell, f"at least {smallest:.3g} m for {memory:.2g} bytes")
     mean = float(np.cbrt(np.prod(sides)))
@@ -76,11 +76,13 @@ def searched_set(
     edge = float(max(target, smallest, sides.max() / 1024.0)) if cell is None else cell
 
     def of_cells(edge: float) -> Flood:
-        return flooded(Flood(rod, shifted_lattice(tips, edge), progress), *cloud)
+        return flooded(Flood(tip_map, shifted_lattice(tips, edge), progress), *cloud)
 
     coarse = wrapped(of_cells(_FINER * edge))
-    begin = rod.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))[:, rod.box.free]
-    hull = climbed_hull(rod, begin.clip(0.0, 1.0), accuracy)
+    begin = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))[
+        :, tip_map.box.free
+    ]
+    hull = climbed_hull(tip_map, begin.clip(0.0, 1.0), accuracy)
     while True:
         flood = of_cells(edge)
         found = ReachedCells(flood, cloud, wrapped(flood), coarse, hull)
@@ -106,16 +108,16 @@ def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: 
     return needed >= of_sheets
 
 
-def cells_of(rod: TipMap, cell: float) -> ReachedCells:
+def cells_of(tip_map: TipMap, cell: float) -> ReachedCells:
     """What is reached of the image of a box of any number of free bundles, without its hull.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         cell: Edge of a cell [m]; larger where that takes more than 96 cells along the longest side.
     """
-    cloud = cloud_on_faces(rod, 0)
+    cloud = cloud_on_faces(tip_map, 0)
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
-    flood = flooded(Flood(rod, shifted_lattice(cloud[1], edge)), *cloud)
+    flood = flooded(Flood(tip_map, shifted_lattice(cloud[1], edge)), *cloud)
     wrap = wrapped(flood)
     return ReachedCells(flood, cloud, wrap, wrap)
 
@@ -126,22 +128,22 @@ def shifted_lattice(tips: Array, cell: float) -> Lattice:
     return lattice._replace(origin=lattice.origin + cell * _SHIFT)
 
 
-def lost_share(rod: TipMap) -> float:
+def lost_share(tip_map: TipMap) -> float:
     """Share of the activation box without a stable equilibrium [-], from a sample."""
-    if not rod.supports_unstable:
+    if not tip_map.supports_unstable:
         return 0.0
-    (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.dimension, 0, _SAMPLES)
-    tips = rod.tips(rod.box.from_free_cube(cube))
+    (cube,) = cube_blocks("sobol", _SAMPLES, tip_map.box.dimension, 0, _SAMPLES)
+    tips = tip_map.tips(tip_map.box.from_free_cube(cube))
     return float(np.isnan(tips[:, 0]).mean())
 
 
-def _bytes(rod: TipMap) -> tuple[float, float]:
+def _bytes(tip_map: TipMap) -> tuple[float, float]:
     """Of clouds, and of a center: its gap and activation, masks, and its part of the edges."""
-    return 16.0 * 8.0 * _CLOUD * (rod.box.bundles + 3), 16.0 * rod.box.bundles + 120.0
+    return 16.0 * 8.0 * _CLOUD * (tip_map.box.bundles + 3), 16.0 * tip_map.box.bundles + 120.0
 
 
-def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
-    fixed, each = _bytes(rod)
+def _smallest_cell(tip_map: TipMap, sides: Array, memory: float) -> float:
+    fixed, each = _bytes(tip_map)
     most = min((memory - fixed) / each, _MOST_CELLS)
     low, high = 0.0, 1.0 + float(sides.max())
     for _ in range(60):
@@ -160,7 +162,7 @@ def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
         while not flood.fits():
             flood = _wider(flood)
         before = np.count_nonzero(flood.gap == 0.0)
-        flood.add(*cloud_on_faces(flood.rod, number))
+        flood.add(*cloud_on_faces(flood.tip_map, number))
         if flood.fits() and np.count_nonzero(flood.gap == 0.0) == before:
             break
     spread(flood)
@@ -179,22 +181,22 @@ def _wider(flood: Flood) -> Flood:
     nx, ny, nz = np.array(lattice.shape) + 2 * room
     origin = lattice.origin - room * lattice.cell
     larger = Lattice(origin, lattice.cell, (int(nx), int(ny), int(nz)))
-    wide = Flood(flood.rod, larger, flood.progress, is_flat=flood.is_flat)
-    wide.add(flood.gamma[known], flood.rod.tips(flood.gamma[known]))
+    wide = Flood(flood.tip_map, larger, flood.progress, is_flat=flood.is_flat)
+    wide.add(flood.gamma[known], flood.tip_map.tips(flood.gamma[known]))
     return wide
 
 
-def cloud_on_faces(rod: TipMap, seed: int) -> tuple[Array, Array]:
+def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     """Activations on faces of all dimensions of the box, and their tips."""
-    box, rng = rod.box, np.random.default_rng(seed)
+    box, rng = tip_map.box, np.random.default_rng(seed)
     m = box.dimension
     cube = rng.random((_CLOUD, m))
     free = np.maximum(rng.integers(0, m + 1, _CLOUD), 2)
     bound = rng.random((_CLOUD, m)).argsort(axis=1) >= free[:, None]
     cube[bound] = rng.integers(0, 2, int(bound.sum()))
     gamma = np.ascontiguousarray(box.from_free_cube(cube))
-    tips = rod.tips(gamma)
-    if not rod.supports_unstable:
+    tips = tip_map.tips(gamma)
+    if not tip_map.supports_unstable:
         return gamma, tips
     stable = np.isfinite(tips[:, 0])
     if not stable.any():

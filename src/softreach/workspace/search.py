@@ -58,14 +58,24 @@ class Flood:
     """
 
     def __init__(
-        self, rod: TipMap, lattice: Lattice, progress: Progress = silent, *, is_flat: bool = False
+        self,
+        tip_map: TipMap,
+        lattice: Lattice,
+        progress: Progress = silent,
+        *,
+        is_flat: bool = False,
     ) -> None:
-        self.rod, self.lattice, self.progress, self.is_flat = rod, lattice, progress, is_flat
+        self.tip_map, self.lattice, self.progress, self.is_flat = (
+            tip_map,
+            lattice,
+            progress,
+            is_flat,
+        )
         size = int(np.prod(lattice.shape))
         self.gap = np.full(size, np.inf)
         """Distance from a center to the nearest tip found, in cells; 0 where reached; -1 at the
         sides of the lattice, where nothing is searched."""
-        self.gamma = np.zeros((size, rod.box.bundles))
+        self.gamma = np.zeros((size, tip_map.box.bundles))
         """Its activation, meaningless where `gap` is infinite."""
         _, ny, nz = lattice.shape
         sides = np.ones(lattice.shape, bool)
@@ -126,7 +136,7 @@ class Flood:
         for first in range(0, len(cells), _CHUNK):
             some = cells[first : first + _CHUNK]
             nearest = nearest_tips(
-                self.rod, starts[first : first + _CHUNK], self.centers(some), ENOUGH * cell
+                self.tip_map, starts[first : first + _CHUNK], self.centers(some), ENOUGH * cell
             )
             gap = nearest.distance / cell
             gap[gap <= ENOUGH] = 0.0
@@ -137,14 +147,14 @@ class Flood:
 
 
 def nearest_tips(
-    rod: TipMap, start: Array, targets: Array, enough: float, stop: Stop = ROUGHLY
+    tip_map: TipMap, start: Array, targets: Array, enough: float, stop: Stop = ROUGHLY
 ) -> Nearest:
     """The activations whose tips come closest to targets, as far as a descent from `start` finds.
 
     Only stable equilibria are taken.
 
     Args:
-        rod: The tip map.
+        tip_map: The tip map.
         start: Activations to begin with, within the bounds, shape (n, bundles).
         targets: Places [m], shape (n, 3).
         enough: Distance at which a target counts as reached [m].
@@ -155,11 +165,11 @@ def nearest_tips(
 
     def task(block: slice) -> None:
         parts = (nearest.gamma[block], nearest.tips[block], nearest.distance[block])
-        _descend(rod, targets[block], enough, stop, Nearest(*parts))
+        _descend(tip_map, targets[block], enough, stop, Nearest(*parts))
 
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
-    rod.prepare()
+    tip_map.prepare()
     parallel.run(partial(task, block) for block in parallel.blocks(len(targets), share))
     return nearest
 
@@ -176,9 +186,9 @@ class Nearest(NamedTuple):
     equilibrium."""
 
 
-def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Nearest) -> None:
+def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest: Nearest) -> None:
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
-    total, box = len(targets), rod.box
+    total, box = len(targets), tip_map.box
     bounds = box.low, box.high, box.scales
     size, m = min(total, _TOGETHER), box.bundles
     shapes = (), (), (3, m), (3,), (), (m,), (m,), (m,)
@@ -187,14 +197,14 @@ def _descend(rod: TipMap, targets: Array, enough: float, stop: Stop, nearest: Ne
     center = np.zeros((size, m))
     tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
     step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
-    torn, begun, n = rod.supports_unstable, 0, 0
+    torn, begun, n = tip_map.supports_unstable, 0, 0
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
         new, rows = slice(n, n + more), slice(begun, begun + more)
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
         running.trial[new], running.damping[new] = nearest.gamma[rows], FIRST_DAMPING
         n, begun = n + more, begun + more
-        rod.fill(running.trial[:n], tips[:n], ahead[:n])
+        tip_map.fill(running.trial[:n], tips[:n], ahead[:n])
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
         n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)

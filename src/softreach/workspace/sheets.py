@@ -19,7 +19,7 @@ from scipy.ndimage import maximum_filter
 
 from softreach.geometry.surface import Surface, compact_surface, level_set
 from softreach.picture.shading import vertex_normals
-from softreach.rod.rods import tip_map
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Faces, Mask
 from softreach.workspace.flux import box_slopes, face_triangles, grid_faces
@@ -52,22 +52,22 @@ class Sheets(Surface):
         return cls(vertices=surface.vertices, faces=surface.faces, lines=none, activation=None)
 
 
-def outer_sheets(rod: TipMap, image: Image) -> Sheets:
+def outer_sheets(tip_map: TipMap, image: Image) -> Sheets:
     """The faces and folds that bound an image.
 
     Args:
-        rod: The tip map, of three free bundles, one smooth branch.
+        tip_map: The tip map, of three free bundles, one smooth branch.
         image: Of the grid of cubes over its activation box.
 
     Raises:
         MissingExtra: scikit-image is not installed.
     """
-    beside = _Beside(rod, image)
-    (on_faces, face_parts), (on_fold, fold_parts) = _parted_faces(rod), _fold(rod)
+    beside = _Beside(tip_map, image)
+    (on_faces, face_parts), (on_fold, fold_parts) = _parted_faces(tip_map), _fold(tip_map)
     cube = np.concatenate([on_faces, on_fold])
     faces = np.concatenate([face_parts, fold_parts + np.int32(len(on_faces))])
     is_fold = np.arange(len(cube)) >= len(on_faces)
-    normals = vertex_normals(_tips(rod, cube), faces)
+    normals = vertex_normals(_tips(tip_map, cube), faces)
 
     def cut(pairs: NDArray[np.int32]) -> Array:
         share, step = np.full(len(pairs), 0.5), 0.25
@@ -78,23 +78,23 @@ def outer_sheets(rod: TipMap, image: Image) -> Sheets:
         return share
 
     faces, pairs, shares = clipped(faces, beside.are_outer(cube, normals, is_fold), cut)
-    return _sheets(rod, np.concatenate([cube, _between(cube[pairs], shares)]), faces)
+    return _sheets(tip_map, np.concatenate([cube, _between(cube[pairs], shares)]), faces)
 
 
-def box_sheets(rod: TipMap) -> Sheets:
+def box_sheets(tip_map: TipMap) -> Sheets:
     """The faces of the box, which bound the image of a map that is one to one."""
     cube = grid_faces(_FACE_CELLS)
-    sheets = _sheets(rod, cube, face_triangles(cube, _FACE_CELLS))
+    sheets = _sheets(tip_map, cube, face_triangles(cube, _FACE_CELLS))
     turned = sheets.volume < 0
     return replace(sheets, faces=sheets.faces[:, ::-1].copy()) if turned else sheets
 
 
-def _sheets(rod: TipMap, cube: Array, faces: Faces) -> Sheets:
+def _sheets(tip_map: TipMap, cube: Array, faces: Faces) -> Sheets:
     cube, faces = compact_surface(cube, faces)
-    activation, lines = rod.box.from_free_cube(cube), _lines(cube, faces)
-    if (driving := tip_map(rod).inputs.driving) is not None:
+    activation, lines = tip_map.box.from_free_cube(cube), _lines(cube, faces)
+    if (driving := as_tip_map(tip_map).inputs.driving) is not None:
         activation = driving.with_dead_zones(activation)
-    return Sheets(vertices=_tips(rod, cube), faces=faces, lines=lines, activation=activation)
+    return Sheets(vertices=_tips(tip_map, cube), faces=faces, lines=lines, activation=activation)
 
 
 def clipped(
@@ -141,19 +141,19 @@ def _between(values: Array, share: Array) -> Array:
     return values[:, 0] + share[:, None] * (values[:, 1] - values[:, 0])
 
 
-def _tips(rod: TipMap, cube: Array) -> Array:
-    return rod.tips(rod.box.from_free_cube(cube))
+def _tips(tip_map: TipMap, cube: Array) -> Array:
+    return tip_map.tips(tip_map.box.from_free_cube(cube))
 
 
-def _dets(rod: TipMap, cube: Array) -> Array:
-    return np.linalg.det(box_slopes(rod, cube)[1])
+def _dets(tip_map: TipMap, cube: Array) -> Array:
+    return np.linalg.det(box_slopes(tip_map, cube)[1])
 
 
-def _parted_faces(rod: TipMap) -> tuple[Array, Faces]:
+def _parted_faces(tip_map: TipMap) -> tuple[Array, Faces]:
     """The faces of the box with outward triangles, each wholly of one sign of det J."""
     cube = grid_faces(_FACE_CELLS)
-    faces, dets = face_triangles(cube, _FACE_CELLS), _dets(rod, cube)
-    cut = partial(_zeros, rod, cube, dets)
+    faces, dets = face_triangles(cube, _FACE_CELLS), _dets(tip_map, cube)
+    cut = partial(_zeros, tip_map, cube, dets)
     positive, pairs, shares = clipped(faces, dets > 0, cut)
     negative, more, other = clipped(faces, dets <= 0, cut)
     # each part has its own copies: across the fold the surface does not go on
@@ -165,13 +165,13 @@ def _parted_faces(rod: TipMap) -> tuple[Array, Faces]:
     )
 
 
-def _zeros(rod: TipMap, cube: Array, dets: Array, pairs: NDArray[np.int32]) -> Array:
+def _zeros(tip_map: TipMap, cube: Array, dets: Array, pairs: NDArray[np.int32]) -> Array:
     """Shares of the way between vertices where det J = 0, by regula falsi (Illinois)."""
     low, high = np.zeros(len(pairs)), np.ones(len(pairs))
     at_low, at_high = dets[pairs].T
     share = _zero(at_low, at_high)
     for _ in range(_SECANTS):
-        value = _dets(rod, _between(cube[pairs], share))
+        value = _dets(tip_map, _between(cube[pairs], share))
         beyond = np.sign(value) == np.sign(at_high)
         low, high = np.where(beyond, low, share), np.where(beyond, share, high)
         at_low = np.where(beyond, at_low / 2, value)
@@ -186,10 +186,10 @@ def _zero(at_low: Array, at_high: Array) -> Array:
     return np.divide(at_low, change, out=np.full_like(change, 0.5), where=change != 0.0)
 
 
-def _fold(rod: TipMap) -> tuple[Array, Faces]:
+def _fold(tip_map: TipMap) -> tuple[Array, Faces]:
     """The places where det J = 0, with triangles whose images look away from what is folded."""
     n = _FOLD_CELLS
-    dets = _dets(rod, cube_grid(n))
+    dets = _dets(tip_map, cube_grid(n))
     if dets.min() >= 0 or dets.max() <= 0:
         return np.empty((0, 3)), np.empty((0, 3), np.int32)
     field = dets.reshape((n + 1,) * 3)
@@ -201,9 +201,9 @@ def _fold(rod: TipMap) -> tuple[Array, Faces]:
     grid = cube_grid(n)
     moved = numbers[:, 0] != numbers[:, 1]
     cube = places / n
-    cube[moved] = _between(grid[numbers[moved]], _zeros(rod, grid, dets, numbers[moved]))
-    normals = _away(rod, cube)
-    tips = _tips(rod, cube)
+    cube[moved] = _between(grid[numbers[moved]], _zeros(tip_map, grid, dets, numbers[moved]))
+    normals = _away(tip_map, cube)
+    tips = _tips(tip_map, cube)
     corners = tips[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     turned = np.einsum("fi,fki->f", area, normals[faces]) < 0
@@ -211,20 +211,20 @@ def _fold(rod: TipMap) -> tuple[Array, Faces]:
     return cube, faces.astype(np.int32)
 
 
-def _away(rod: TipMap, cube: Array) -> Array:
+def _away(tip_map: TipMap, cube: Array) -> Array:
     """Normals of the images of folds, away from what is folded, shape (n, 3)."""
-    left, _, right = np.linalg.svd(box_slopes(rod, cube)[1])
+    left, _, right = np.linalg.svd(box_slopes(tip_map, cube)[1])
     kernel, normal = right[:, 2], left[:, :, 2]
     step = 0.01 * kernel
     # also of places a little beyond the box
-    second = _tips(rod, cube + step) + _tips(rod, cube - step) - 2.0 * _tips(rod, cube)
+    second = _tips(tip_map, cube + step) + _tips(tip_map, cube - step) - 2.0 * _tips(tip_map, cube)
     side = np.einsum("ni,ni->n", second, normal)
     return np.where(side[:, None] > 0, -normal, normal)
 
 
 class _Beside:
-    def __init__(self, rod: TipMap, image: Image) -> None:
-        self._rod, self._image = rod, image
+    def __init__(self, tip_map: TipMap, image: Image) -> None:
+        self._rod, self._image = tip_map, image
         self._n = round(len(image.vertices) ** (1 / 3)) - 1
         self._grid = image.places.reshape(*(self._n + 1,) * 3, 3)
         bend = sum(

@@ -258,11 +258,11 @@ class ReachableSolid(ReachableSet):
 
     @lazy
     def _sheets(self) -> Sheets:
-        rod = self.tip_map
+        tip_map = self.tip_map
         if self.route == "flux":
-            return box_sheets(rod)
-        if isinstance(self.image, Image) and rod.is_smooth and not rod.supports_unstable:
-            return outer_sheets(rod, self.image)
+            return box_sheets(tip_map)
+        if isinstance(self.image, Image) and tip_map.is_smooth and not tip_map.supports_unstable:
+            return outer_sheets(tip_map, self.image)
         return Sheets.of(self.surface())
 
     @lazy
@@ -286,8 +286,9 @@ class ReachableSolid(ReachableSet):
         numbers = super()._numbers()
         if self.shell is not None:
             area, thickness = self.shell
-            numbers |= with_error("shell_area", *area, "m2", "area of the thin set")
-            numbers |= with_error("shell_thickness", *thickness, "m", "thickness of the thin set")
+            sheet = with_error("shell_area", *area, "m2", "area of the thin set")
+            sheet |= with_error("shell_thickness", *thickness, "m", "thickness of the thin set")
+            numbers = sheet | numbers
         if self.multiplicity:
             about = {"units": "m3", "long_name": "error of the volume reached more than once"}
             numbers["multiplicity_error"] = ((), self.multiplicity_error, about)

@@ -101,17 +101,19 @@ class ReachablePoint(ReachableSet):
         }
 
 
-def thin_set(rod: TipMap) -> ReachableSet:
+def thin_set(tip_map: TipMap) -> ReachableSet:
     """The reachable set of a tip map with fewer than three free bundles."""
-    m = rod.box.dimension
+    m = tip_map.box.dimension
     if m == 0:
-        return ReachablePoint(tip_map=rod, cells=1, tip=grid_tips(rod, 1)[0])
+        return ReachablePoint(tip_map=tip_map, cells=1, tip=grid_tips(tip_map, 1)[0])
     n = _CELLS[m]
-    ticks = None if rod.supports_unstable else grid_ticks(rod, n)  # on whose lines kinks are
-    grid = LiftedGrid.of(rod, n, ticks=ticks)
-    size, convex = _measure(rod, grid), _convex_volume(rod, grid)
+    ticks = (
+        None if tip_map.supports_unstable else grid_ticks(tip_map, n)
+    )  # on whose lines kinks are
+    grid = LiftedGrid.of(tip_map, n, ticks=ticks)
+    size, convex = _measure(tip_map, grid), _convex_volume(tip_map, grid)
     common: dict[str, Any] = {
-        "tip_map": rod,
+        "tip_map": tip_map,
         "cells": n,
         "convex_volume": convex.value,
         "convex_volume_error": convex.error,
@@ -138,22 +140,22 @@ def threads(points: Array, edges: Index) -> Surface:
     return Surface(vertices=points, faces=edges[:, [0, 1, 1]])
 
 
-def by_nodes(rod: TipMap) -> Estimate:
+def by_nodes(tip_map: TipMap) -> Estimate:
     """Length [m] or area [m²] of the image, and by how much fewer Gauss nodes change it."""
-    fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
+    fine, rough = (image_measure(tip_map, nodes) for nodes in _NODES)
     return Estimate(fine, abs(fine - rough))
 
 
-def _measure(rod: TipMap, grid: LiftedGrid) -> Estimate:
+def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
     """Length or area of the image, by Gauss nodes where it is one smooth sheet.
 
     Else it is that of cells, as chords or triangles. What these err by, O(1/n²), is removed. Where
     the map has kinks, or sheets end, it is O(1/n): the largest change by a finer grid is stated.
     """
-    if rod.is_smooth and not grid.is_torn and np.isfinite(smooth := by_nodes(rod)).all():
+    if tip_map.is_smooth and not grid.is_torn and np.isfinite(smooth := by_nodes(tip_map)).all():
         return smooth
     fine, times = _size(grid), (2, 3) if grid.is_torn else (2,)
-    changes = [fine - _size(grid.coarser(rod, k)) for k in times]
+    changes = [fine - _size(grid.coarser(tip_map, k)) for k in times]
     removed = max((c / (k - 1) for k, c in zip(times, changes, strict=True)), key=abs) / 3.0
     return Estimate(fine + removed, max(map(abs, changes)))
 
@@ -172,12 +174,12 @@ def _found(tips: Array) -> Array:
     return tips[np.isfinite(tips[:, 0])]
 
 
-def _convex_volume(rod: TipMap, grid: LiftedGrid) -> Estimate:
+def _convex_volume(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
     """Volume of the convex hull of mapped vertices [m³].
 
     It is too small by O(1/n²): a grid with a quarter of the cells along each axis differs by 15
     times the error. A tenth of the difference is stated.
     """
-    grids = grid, grid.coarser(rod, 4)
+    grids = grid, grid.coarser(tip_map, 4)
     fine, coarse = (convex_hull(_found(each.tips)).volume for each in grids)
     return Estimate(fine, abs(fine - coarse) / 10.0)

@@ -38,7 +38,7 @@ class TipDerivatives:
 
     def __init__(
         self,
-        rod: TipMap,
+        tip_map: TipMap,
         parameters: Sequence[Parameter],
         tol: float = 0.0,
         progress: Progress = silent,
@@ -46,8 +46,8 @@ class TipDerivatives:
         """Make the neighbors.
 
         Args:
-            rod: The tip map of the design: its tolerance is that of the derivatives as well, per
-                change of a parameter by itself.
+            tip_map: The tip map of the design; its tolerance is also that of the derivatives,
+                per change of a parameter by itself.
             parameters: The parameters.
             tol: A larger tolerance of a free arm, for which fewer steps are made: theory (27).
             progress: Called with 0 before each parameter, from any thread; it may raise to stop.
@@ -58,16 +58,16 @@ class TipDerivatives:
             InvalidDesign: The design has no neighbors with other values of a parameter.
         """
         self._progress = progress
-        relative = _LOADED_STEP if rod.supports_unstable else _STEP
-        self._shifts = [shifts_along(rod.arm, each, 1, relative) for each in parameters]
-        steps = rod.steps
-        if tol > rod.tol and not rod.supports_unstable:
-            steps = math.ceil(steps * (rod.tol / tol) ** (1.0 / 6.0))
-        self._rods = [_neighbors(rod, each, steps) for each in self._shifts]
+        relative = _LOADED_STEP if tip_map.supports_unstable else _STEP
+        self._shifts = [shifts_along(tip_map.arm, each, 1, relative) for each in parameters]
+        steps = tip_map.steps
+        if tol > tip_map.tol and not tip_map.supports_unstable:
+            steps = math.ceil(steps * (tip_map.tol / tol) ** (1.0 / 6.0))
+        self._rods = [_neighbors(tip_map, each, steps) for each in self._shifts]
         # A parameter may change by as much as itself before it is another design.
         scales = np.array([each.step for each in self._shifts]) / relative
-        noise = (rod.tol if rod.supports_unstable else _ROUNDING) / relative
-        self.error = (_SAFETY * max(rod.tol, tol) + noise) * rod.length / scales
+        noise = (tip_map.tol if tip_map.supports_unstable else _ROUNDING) / relative
+        self.error = (_SAFETY * max(tip_map.tol, tol) + noise) * tip_map.length / scales
         """Error of a derivative by each parameter [m per unit], shape (parameters,)."""
 
     def at(self, cube: Array) -> Array:
@@ -83,18 +83,18 @@ class TipDerivatives:
 
         def task(k: int) -> None:
             self._progress(0)
-            for weight, rod in self._rods[k]:
-                out[:, :, k] += weight * rod.tips(rod.box.from_free_cube(cube))
+            for weight, tip_map in self._rods[k]:
+                out[:, :, k] += weight * tip_map.tips(tip_map.box.from_free_cube(cube))
 
         parallel.run(partial(task, k) for k in range(len(self._shifts)))
         return out
 
 
-def _neighbors(rod: TipMap, shifts: Shifts, fewest: int) -> list[tuple[float, TipMap]]:
+def _neighbors(tip_map: TipMap, shifts: Shifts, fewest: int) -> list[tuple[float, TipMap]]:
     """Weights and tip maps of neighbors in one number of steps, that of breakpoints included."""
     used, rods = np.flatnonzero(shifts.weights), list[TipMap]()
     for steps in range(fewest, fewest + _TRIES):
-        rods = [in_steps(shifts.arms[k], steps, rod) for k in used]
+        rods = [in_steps(shifts.arms[k], steps, tip_map) for k in used]
         if len({each.steps for each in rods}) == 1:
             break
     return list(zip(shifts.weights[used].tolist(), rods, strict=True))

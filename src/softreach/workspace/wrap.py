@@ -35,7 +35,7 @@ _DAMPING = 1e-8  # of the mean square of the slopes
 class Wrap(Surface):
     """The surface, closed and outwards, a ten-thousandth of a cell outside of its tips."""
 
-    rod: TipMap
+    tip_map: TipMap
     gamma: Array
     """Activations that lead to the vertices, shape (v, bundles)."""
     cell: float
@@ -53,23 +53,26 @@ class Wrap(Surface):
         """
         half = 0.5 * self.area
         thickness = self.tight_volume / half if half > 0.0 else np.inf
-        if self.rod.supports_unstable or thickness > _SHEET * np.sqrt(half):
-            off = ENOUGH * self.cell + self.rod.tol * self.rod.length
+        if self.tip_map.supports_unstable or thickness > _SHEET * np.sqrt(half):
+            off = ENOUGH * self.cell + self.tip_map.tol * self.tip_map.length
             return Estimate(self.tight_volume, self.area * off)
-        rod, areas = refined(self.rod, _SHEET_TOL), np.linalg.norm(self.corner_areas, axis=1)
-        tips, slopes = rod.tips_and_slopes(self.gamma)
-        normals = np.linalg.svd(slopes * rod.box.scales)[0][:, :, 2]
+        tip_map, areas = (
+            refined(self.tip_map, _SHEET_TOL),
+            np.linalg.norm(self.corner_areas, axis=1),
+        )
+        tips, slopes = tip_map.tips_and_slopes(self.gamma)
+        normals = np.linalg.svd(slopes * tip_map.box.scales)[0][:, :, 2]
         found = np.zeros(len(tips))
         for _ in range(_PASSES):
             ways = (2.0 * thickness * normals, -2.0 * thickness * normals)
-            found = sum(_pushed(rod, self.gamma, tips, way) for way in ways)
+            found = sum(_pushed(tip_map, self.gamma, tips, way) for way in ways)
             thickness = float(np.quantile(found, _WIDEST))
-        return Estimate(0.5 * float(areas @ found), self.area * _SHEET_TOL * rod.length)
+        return Estimate(0.5 * float(areas @ found), self.area * _SHEET_TOL * tip_map.length)
 
     @lazy
     def cube(self) -> Array:
         """Places of the vertices in the unit cube of the free bundles, shape (v, dimension)."""
-        box = self.rod.box
+        box = self.tip_map.box
         return box.to_cube(self.gamma)[:, box.free].clip(0.0, 1.0)
 
     @lazy
@@ -78,17 +81,17 @@ class Wrap(Surface):
         return corner_areas(self.vertices, self.faces)
 
 
-def _pushed(rod: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
+def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
     """How far tips go along a way that is too far, with little to the side [m], shape (n,)."""
     size = np.linalg.norm(way, axis=1)
     unit, target = way / size[:, None], tips + way
     scale = np.eye(3) + (_STRETCH - 1.0) * unit[:, :, None] * unit[:, None, :]
     for _ in range(_PUSHES):
-        at, slopes = rod.tips_and_slopes(gamma)
+        at, slopes = tip_map.tips_and_slopes(gamma)
         miss, stretched = scale @ (at - target)[:, :, None], scale @ slopes
-        square = ((stretched * rod.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
-        gamma, _ = damped_steps(rod.box, gamma, miss[:, :, 0], stretched, _DAMPING * square)
-    return ((rod.tips(gamma) - tips) * unit).sum(axis=1)
+        square = ((stretched * tip_map.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
+        gamma, _ = damped_steps(tip_map.box, gamma, miss[:, :, 0], stretched, _DAMPING * square)
+    return ((tip_map.tips(gamma) - tips) * unit).sum(axis=1)
 
 
 def spread(flood: Flood) -> None:
@@ -99,7 +102,7 @@ def spread(flood: Flood) -> None:
     rim = reached[(flood.gap[reached[:, None] + offsets] > 0.0).any(axis=1)]
     front = np.concatenate([np.flatnonzero(near), rim])
     while len(front):
-        tips = flood.rod.tips(flood.gamma[front])
+        tips = flood.tip_map.tips(flood.gamma[front])
         sources = np.repeat(np.arange(len(front)), len(offsets))
         cells = (front[:, None] + offsets).ravel()
         sources, cells = sources[flood.gap[cells] > 0.0], cells[flood.gap[cells] > 0.0]
@@ -125,7 +128,7 @@ def drawn_tight(flood: Flood, at: Array) -> Nearest:
     best = Nearest(np.zeros((n, flood.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
     for end in (np.floor(at), np.ceil(at)):
         cells = end.astype(np.int64) @ flood.steps
-        found = nearest_tips(flood.rod, flood.gamma[cells], places, ENOUGH * lattice.cell)
+        found = nearest_tips(flood.tip_map, flood.gamma[cells], places, ENOUGH * lattice.cell)
         closer = found.distance < best.distance
         for kept, new in zip(best, found, strict=True):
             kept[closer] = new[closer]
@@ -145,7 +148,7 @@ def wrapped(flood: Flood) -> Wrap:
     return Wrap(
         vertices=tips + _ASIDE * cell * away,
         faces=faces,
-        rod=flood.rod,
+        tip_map=flood.tip_map,
         cell=cell,
         gamma=gamma,
         tight_volume=Surface(vertices=tips, faces=faces).volume,

@@ -68,8 +68,9 @@ def _add(factor, a, out):
 
 
 @inline
-def _rates_of_places(rest_length, stretch, thrust, d3, force, work):
+def _rates_of_places(node, d3, force, work):
     """Write ρ' = (η/K0 d3 (d3 × n)ᵀ - ζ d3 ×) θ into `work`, shape (3, 3)."""
+    rest_length, stretch, thrust = node
     _skew(d3, work)
     across = (
         d3[1] * force[2] - d3[2] * force[1],
@@ -82,10 +83,9 @@ def _rates_of_places(rest_length, stretch, thrust, d3, force, work):
 
 
 @inline
-def _sources(
-    rest_length, stretch, thrust, d, force, turning, pushing, yielding, hat, climb, source
-):
+def _sources(node, d, force, turning, pushing, yielding, hat, climb, source):
     """Write what the tables alone change: of ρ' into `climb`, of θ' and μ' into `source`."""
+    rest_length, stretch, thrust = node
     columns = pushing.shape[0]
     climb[:] = 0.0
     source[:] = 0.0
@@ -222,6 +222,13 @@ def _moment_at_base(state, lever, weight, tipping, excess, unknown):
     _solve(excess[:, :3], unknown)
 
 
+@inline
+def _solved(values, unknown, out):
+    """Write what columns come to, whose first three are those of the unknowns."""
+    _copy(values[:, 3:], out)
+    _product(1.0, values[:, :3], unknown, out)
+
+
 @kernel
 def respond(
     rest_length,
@@ -279,21 +286,15 @@ def respond(
     moved, angle = np.zeros((3, every)), np.zeros((3, every))
     for k in range(steps):
         for i in range(3):
-            d, n, s = directors[k, i], force[k, i], stretch[k, i]
-            _rates_of_places(rest_length[k, i], s, thrust[k, i], d[2], n, rise[i])
+            d, n, node = (
+                directors[k, i],
+                force[k, i],
+                (rest_length[k, i], stretch[k, i], thrust[k, i]),
+            )
             source = rates[6 * i : 6 * i + 6]
+            _rates_of_places(node, d[2], n, rise[i])
             _sources(
-                rest_length[k, i],
-                s,
-                thrust[k, i],
-                d,
-                n,
-                turning[k, i],
-                pushing[k, i],
-                yielding[k, i],
-                hat,
-                climb[i],
-                source,
+                node, d, n, turning[k, i], pushing[k, i], yielding[k, i], hat, climb[i], source
             )
             _law(rest_length[k, i], resistance[k, i], d, moment[k, i], n, rise[i], hat, local[i])
         if loaded:
@@ -309,9 +310,6 @@ def respond(
     if loaded:
         _moment_at_base(state, lever, weight, tipping, angle, unknown)
     for mark in range(len(marks)):
-        _copy(kept[mark, :3, 3:], moves[mark])
-        _copy(kept[mark, 3:, 3:], turns[mark])
-        _product(1.0, kept[mark, :3, :3], unknown, moves[mark])
-        _product(1.0, kept[mark, 3:, :3], unknown, turns[mark])
-    _copy(work[:, 3:], works)
-    _product(1.0, work[:, :3], unknown, works)
+        _solved(kept[mark, :3], unknown, moves[mark])
+        _solved(kept[mark, 3:], unknown, turns[mark])
+    _solved(work, unknown, works)

@@ -34,11 +34,11 @@ from softreach.rod.kinematics import (
     shape_dataset,
     stations_along,
 )
-from softreach.rod.loaded.phase import SHOT_AT_ONCE
-from softreach.rod.loaded.ring import NEUTRAL, SYMMETRIC
+from softreach.rod.loaded.postures import NEUTRAL, SYMMETRIC
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.rods import ArmMap, all_inputs, of_tip, tip_map, with_unstable
+from softreach.rod.loaded.tables import SHOT_AT_ONCE
+from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip
 from softreach.support.arrays import as_floats
@@ -181,7 +181,7 @@ def equilibria(
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
     """
-    asked = of_tip(tip_map(arm, tol, warn=False))  # the degree tells whether any is missing
+    asked = of_tip(as_tip_map(arm, tol, warn=False))  # the degree tells whether any is missing
     gamma = asked.inputs.every(_one(asked, activations))
     rod = with_unstable(all_inputs(asked))
     if not rod.supports_unstable:
