@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,12 +76,6 @@ STRAIGHT = RestShape()
 @dataclass(frozen=True, kw_only=True)
 class RestStrains(Actuator):
     """The rest shape as a bundle that is held at an activation of 1, for tables and kernels."""
-
-    unit: ClassVar[str] = "1"
-    symbol: ClassVar[str] = "1"
-    activation: ClassVar[str] = "share"
-    is_force: ClassVar[bool] = False
-    default_name: ClassVar[str] = "rest shape"
 
     shape: RestShape
 
