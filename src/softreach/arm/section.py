@@ -175,7 +175,11 @@ class Section(Part):
         return [] if same else self.modulus_faults("where materials differ")
 
     def ring(self, which: int | str) -> Ring:
-        """A ring by its index or name; raises as `ring_index`."""
+        """A ring by its index or name.
+
+        Raises:
+            InvalidDesign: There is none.
+        """
         return self.rings[self.ring_index(which)]
 
     def ring_index(self, which: int | str) -> int:
