@@ -82,20 +82,10 @@ class RestStrains(Actuator):
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         return Resultants(np.zeros((len(z), 1)), np.zeros((len(z), 3, 1)))
 
-    def curvature(self, profile: Profile, z: Array) -> Array:
-        """û [1/m], shape (station, 3)."""
-        return self.shape.curvature(z / profile.length)
-
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        zero = np.zeros((len(z), 1))
-        return Outline(
-            center=zero,
-            extent=np.zeros(1),
-            inner_ratio=zero,
-            outer_ratio=zero,
-            shape=("line",),
-            acts=self.acts(profile, z),
-        )
+        axis = dict.fromkeys(("center", "inner_ratio", "outer_ratio"), np.zeros((len(z), 1)))
+        acts = self.acts(profile, z)
+        return Outline(**axis, extent=np.zeros(1), shape=("line",), acts=acts)
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -252,10 +242,8 @@ class Body:
         if not self.rigid_pieces:
             return stiffness
         spans = [piece.span(self.length) for piece in self.rigid_pieces]
-        inside = [
-            (stations >= start) & ((stations < end) | (end >= self.length)) for start, end in spans
-        ]
-        rigid = np.any(inside, axis=0)
+        to_tip = [(start, end if end < self.length else np.inf) for start, end in spans]
+        rigid = np.any([(stations >= start) & (stations < end) for start, end in to_tip], axis=0)
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
     @property
