@@ -78,6 +78,7 @@ def _record(solution: Solution, lengths: Lengths) -> dict[str, object]:
         **lengths.record("residuals", solution.residuals.tolist()),
         "conditions": [value if value < 1e300 else None for value in solution.conditions.tolist()],
         "margins": solution.margins.tolist(),
+        "from_rest": (solution.sheets == 0).tolist(),
         **lengths.record("nearest", solution.nearest.tolist()),
         "nearest_activation": solution.nearest_activation.tolist(),
         **lengths.record("gap", solution.gap),
@@ -91,12 +92,18 @@ def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
         status += f" within {lengths.text(solution.gap, '.4g')}"
     console.line(f"target {lengths.place(solution.target)}: {status}")
     rows = zip(
-        solution.activations, solution.residuals, solution.conditions, solution.margins, strict=True
+        solution.activations,
+        solution.residuals,
+        solution.conditions,
+        solution.margins,
+        solution.sheets,
+        strict=True,
     )
-    for gamma, residual, condition, margin in rows:
+    for gamma, residual, condition, margin, sheet in rows:
         apart = lengths.text(residual, ".1e")
         quality = f"residual {apart}, condition {condition:.3g}, margin {margin:.3g}"
         quality = quality if gamma.size else f"residual {apart}"
+        quality += ", in a posture that it does not take straight from rest" if sheet else ""
         console.line(f"  {activation_text(arm, gamma)}  ({quality})")
     if not len(solution):
         least = lengths.text(solution.gap_bound, ".4g")

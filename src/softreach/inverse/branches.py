@@ -51,7 +51,7 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined, joined_by, rows
 from softreach.workspace.search import CLOSELY, nearest_tips
 
-__all__ = ["distinct", "every_branch"]
+__all__ = ["distinct", "every_branch", "with_other_sheets"]
 
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
@@ -92,6 +92,22 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
             parallel.in_order(partial(_alone, prepared, request, chosen) for chosen in sets)
         )
     return joined_by("target", parts)
+
+
+def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
+    """The roots, and after those of each target the ones in other postures than from rest."""
+    found = [roots]
+    for number, sheet in enumerate(prepared.sheets[1:], 1):
+        part = every_branch(sheet, request)
+        found.append(part._replace(sheet=np.full(len(part.target), number)))
+    others = joined_by("target", found[1:]) if found[1:] else no_roots(prepared.tip_map)
+    if not len(others.target):
+        return roots
+    # A sheet goes on into activations at which its posture is that from rest.
+    at_rest = roots_at(prepared.tip_map, request.targets, others.target, others.gamma)
+    same = at_rest.residual <= request.allowance
+    roots = distinct(prepared, request, roots.joined(rows(at_rest, same)))
+    return roots.joined(distinct(prepared, request, rows(others, ~same)))
 
 
 def _sets(order: Index, size: int) -> list[Index]:
@@ -156,6 +172,7 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
         search.slope[converged],
         np.linalg.norm(placed(tip_map, gamma) - goal, axis=1),
         starts.cell[converged],
+        np.zeros(len(converged), np.int64),
     )
     within = roots.residual <= request.residual
     over = ~within & (gamma != trial).any(axis=1)

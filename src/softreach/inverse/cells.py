@@ -52,6 +52,15 @@ def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornC
     return mesh, TornCells.at(found, tip_map.box.widths / cells)
 
 
+def cells_without_image(
+    tip_map: TipMap, gamma: Array, widths: Array
+) -> tuple[ActivationMesh, TornCells]:
+    """No cells that are mapped, and corners of others of these widths at activations (n, 3)."""
+    vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
+    found = rows(vertices, np.isfinite(vertices.tip[:, 0]))
+    return _mesh(tip_map, found, np.empty((0, 8), np.int64)), TornCells.at(found, widths)
+
+
 class _Vertices(NamedTuple):
     gamma: Array
     tip: Array

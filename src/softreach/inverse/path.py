@@ -309,7 +309,9 @@ def _least_norm(slope: Array, moving: Mask) -> Array:
 def _best_start(
     tip_map: TipMap, tracker: Continuation, target: Array, residual: float
 ) -> BranchPoint | None:
-    solution = solve_inverse(tip_map, target[None], residual_over_length=residual)[0]
+    solution = solve_inverse(tip_map, target[None], residual_over_length=residual, from_rest=True)[
+        0
+    ]
     if not len(solution):
         return None
     best = solution.activations[solution.conditions.argmin()] / tip_map.measures

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +12,7 @@ from softreach.inverse.cells import (
     ImageLeaves,
     TornCells,
     activation_cells,
+    cells_without_image,
     image_tree,
 )
 from softreach.inverse.proofs import CoarseCells
@@ -24,6 +25,8 @@ from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
+from softreach.workspace.grid import cube_grid
+from softreach.workspace.lifted_grid import components
 
 __all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 
@@ -31,6 +34,8 @@ __all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 _CELLS = 32
 _FEW = 500  # targets; to divide space for more takes less time than not to
 _COARSE = 1e-3  # tolerance of the map that searches begin with
+_NODES = 16  # cells along each axis of the grid on which sheets of postures are found
+_SAME = 1e-4  # [L] between tips of one posture
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,8 @@ class PreparedMap:
     """The tip map of all bundles, whose activations are in `measures`."""
     cells: int = _CELLS
     """With three free bundles: cells along each axis of the activation box."""
+    nodes: Array | None = field(default=None, compare=False, repr=False)
+    """Of another sheet of postures: activations at which they are known, shape (n, 3)."""
 
     @lazy
     def measures(self) -> Array:
@@ -75,7 +82,22 @@ class PreparedMap:
 
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
+        if self.nodes is not None:
+            return cells_without_image(self.tip_map, self.nodes, self.tip_map.box.widths / _NODES)
         return activation_cells(self.tip_map, self.cells)
+
+    @lazy
+    def sheets(self) -> tuple[PreparedMap, ...]:
+        """Itself, and the other sheets of postures that a loaded arm of three free bundles holds.
+
+        They are known at the nodes of a grid: one that is narrower than its cells may be missing.
+        """
+        return self, *(
+            PreparedMap(
+                self.whole.continued_from(self.whole.box.with_fixed(gamma), frames), nodes=gamma
+            )
+            for gamma, frames in _other_sheets(self.tip_map)
+        )
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
@@ -153,6 +175,30 @@ def prepared_map(
             raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
     return _of_map(measured_bundles(as_tip_map(arm, tol, frame=frame, point=point)), cells)
+
+
+def _other_sheets(tip_map: TipMap) -> list[tuple[Array, Array]]:
+    """Activations (n, 3) and frames of the postures of each sheet that is not that from rest.
+
+    A sheet goes on beyond its last nodes, as far as the cells beside.
+    """
+    m, box = tip_map.box.dimension, tip_map.box
+    nodes = box.from_free_cube(cube_grid(_NODES, m))
+    held = tip_map.held(nodes, (_NODES + 1,) * m) if m == 3 and tip_map.supports_unstable else None
+    if held is None or held.frames is None:
+        return []
+    apart = np.linalg.norm(held.tips - tip_map.tips(nodes)[held.node], axis=1)
+    is_other = ~(apart <= _SAME * tip_map.length)  # no posture from rest is another, too
+    is_other[held.ends[:, 0]] = True
+    sheet = components(held.links[is_other[held.links].all(axis=1)], len(held.node))
+    # Where a sheet holds several postures of a node, each has a part of its own.
+    order = np.lexsort((held.node, sheet))
+    first = np.r_[True, (np.diff(sheet[order]) != 0) | (np.diff(held.node[order]) != 0)]
+    rank = np.arange(len(order)) - np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))
+    part = np.empty_like(sheet)
+    part[order] = sheet[order] * len(order) + rank
+    sheets = [np.flatnonzero((part == each) & is_other) for each in np.unique(part[is_other])]
+    return [(nodes[held.node[states]], held.frames[states]) for states in sheets]
 
 
 @lru_cache(maxsize=4)

@@ -49,6 +49,8 @@ class Request:
     """Activations wanted for each target where there are infinitely many."""
     seed: int = 0
     """Seed of the random activations that the others stay near to."""
+    from_rest: bool = False
+    """True for postures of loaded arms to which activations lead from rest, and no others."""
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""

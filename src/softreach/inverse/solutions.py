@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.tip_map import Frame
+from softreach.rod.tip_map import Frame, TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
@@ -53,6 +53,11 @@ class Solution:
     """Distance to the nearest bound of a free bundle, relative to its range, shape (k,)."""
     leans: Mask
     """Mask of those whose posture leans to one of two sides, under loads, shape (k,)."""
+    sheets: Index
+    """Number of the tip map that holds each; 0 for postures that activations lead to straight from
+    rest, shape (k,)."""
+    tip_maps: tuple[TipMap, ...]
+    """That of postures from rest, and those of other sheets of postures that loads leave."""
     nearest: Array
     """The reachable point nearest to the target that was found [m], shape (3,)."""
     nearest_activation: Array
@@ -65,6 +70,17 @@ class Solution:
 
     def __len__(self) -> int:
         return len(self.activations)
+
+    def posture(self, number: int = 0) -> TipMap:
+        """The tip map of the arm in the posture of one of the activations.
+
+        `configuration`, `track_path` and `Drag` begin there. Without loads it is that of the arm.
+
+        Args:
+            number: Row of `activations`.
+        """
+        tip_map = self.tip_maps[self.sheets[number]]
+        return tip_map.continued_from(self.activations[number][None])
 
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.target)
@@ -101,6 +117,10 @@ class Solutions(Sequence[Solution]):
     """Shape (n,) [-]."""
     leans: Mask
     """Shape (n,)."""
+    sheets: Index
+    """Numbers of tip maps, shape (n,)."""
+    tip_maps: tuple[TipMap, ...]
+    """That of postures from rest, and those of other sheets."""
     statuses: NDArray[np.int8]
     """`Status` of each target, shape (t,)."""
     nearest: Array
@@ -121,6 +141,7 @@ class Solutions(Sequence[Solution]):
         return cls(
             arm=parts[0].arm,
             frame=parts[0].frame,
+            tip_maps=max((part.tip_maps for part in parts), key=len),
             bundles=parts[0].bundles,
             offsets=np.concatenate([[0], np.cumsum(counts)]),
             **{
@@ -182,6 +203,8 @@ class Solutions(Sequence[Solution]):
             conditions=self.conditions[rows],
             margins=self.margins[rows],
             leans=self.leans[rows],
+            sheets=self.sheets[rows],
+            tip_maps=self.tip_maps,
             nearest=self.nearest[i],
             nearest_activation=self.nearest_activations[i],
             gap=float(self.gaps[i]),
@@ -196,6 +219,7 @@ class Solutions(Sequence[Solution]):
         return Solutions(
             arm=self.arm,
             frame=self.frame,
+            tip_maps=self.tip_maps,
             bundles=self.bundles,
             offsets=offsets,
             **{name: getattr(self, name)[chosen] for name in _PER_TARGET},
@@ -223,6 +247,7 @@ class Solutions(Sequence[Solution]):
                 "condition": ("solution", self.conditions, {"units": "1"}),
                 "margin": ("solution", self.margins, {"units": "1"}),
                 "leans": ("solution", self.leans),
+                "from_rest": ("solution", self.sheets == 0),
             },
             {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)},
             provenance(self.arm, self.frame),
@@ -237,4 +262,4 @@ _PER_TARGET = (
     "gaps",
     "gap_bounds",
 )
-_PER_SOLUTION = ("activations", "residuals", "conditions", "margins", "leans")
+_PER_SOLUTION = ("activations", "residuals", "conditions", "margins", "leans", "sheets")

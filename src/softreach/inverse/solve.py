@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.branches import distinct, every_branch
+from softreach.inverse.branches import distinct, every_branch, with_other_sheets
 from softreach.inverse.direction import compromises
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.nearest import nearest, nearest_from
@@ -29,10 +29,10 @@ from softreach.inverse.roots import (
 )
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import as_tip_map
+from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
-from softreach.support.arguments import as_integer, as_number
+from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Mask, as_directions, joined, rows
 from softreach.support.errors import Range
 from softreach.workspace.search import Nearest
@@ -56,6 +56,7 @@ def solve_inverse(
     direction_weight: float = 0.1,
     family: int = 1,
     seed: int = 0,
+    from_rest: bool = False,
     tol: float = 1e-6,
     frame: Frame = "world",
     point: str | None = None,
@@ -69,9 +70,11 @@ def solve_inverse(
     proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
 
-    Of an arm under loads every activation given holds the arm in its posture; `leans` says where it
-    leans there to one of two sides. Nothing is proved, so that a target that no search reaches is
-    `NOT_FOUND`.
+    Of an arm under loads every activation given holds the arm in a posture; `leans` says where it
+    leans there to one of two sides. Three free bundles may hold several at one activation, which
+    the arm comes to by several ways: all are searched, those to which the activations lead straight
+    from rest come first, and `Solution.posture` is the tip map that goes on from each. Nothing is
+    proved, so that a target that no search reaches is `NOT_FOUND`.
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
@@ -93,6 +96,8 @@ def solve_inverse(
             the others being those nearest to random activations and apart by a thousandth of a
             range; fewer where no more of them are found.
         seed: Seed of these.
+        from_rest: Of an arm under loads: only postures to which activations lead straight from
+            rest, or from where the arm is in whose tip map is given.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
             keeps its own.
@@ -122,6 +127,7 @@ def solve_inverse(
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
         family=as_integer("family", family, 1, 10_000),
         seed=as_integer("seed", seed, 0, 2**63),
+        from_rest=as_flag("from_rest", from_rest),
     )
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
@@ -136,6 +142,8 @@ def solve_inverse(
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     """All roots, and the nearest points to the targets that have none."""
     roots = every_branch(prepared, request)
+    if not request.from_rest:
+        roots = with_other_sheets(prepared, request, roots)
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
@@ -208,12 +216,17 @@ def _solutions(
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
     points = request.targets.copy()
     off = reached[gaps[reached] > request.residual]
-    points[off] = placed(tip_map, gamma[off])
+    for number in np.unique(sheet := roots.sheet[first][gaps[reached] > request.residual]):
+        some = off[sheet == number]
+        points[some] = placed(prepared.sheets[number].tip_map, gamma[some])
     points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
     activations = prepared.whole.box.with_fixed(roots.gamma)
     return Solutions(
         arm=prepared.whole.arm,
+        tip_maps=tuple(
+            all_inputs(each.whole) for each in prepared.sheets[: 1 + max(roots.sheet, default=0)]
+        ),
         frame=prepared.whole.frame,
         bundles=prepared.whole.box.names,
         targets=request.targets,
@@ -223,6 +236,7 @@ def _solutions(
         conditions=conditions(roots.slope),
         margins=tip_map.box.margin(roots.gamma),
         leans=_leans(prepared.whole, activations),
+        sheets=roots.sheet,
         statuses=statuses,
         nearest=points,
         nearest_activations=prepared.whole.box.with_fixed(gamma),

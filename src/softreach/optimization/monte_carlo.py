@@ -151,7 +151,7 @@ def tried(count: int) -> Index:
 def _starts(first: FirstOrder, places: Array) -> list[Array]:
     """Places of the cube to search from: of all solutions of the design, and of a grid."""
     box, count = as_tip_map(first.deviations.arm).box, len(places)
-    solutions = solve_inverse(first.deviations.arm, places)
+    solutions = solve_inverse(first.deviations.arm, places, from_rest=True)
     rows = [solutions.nearest_activations]
     for number in range(int(solutions.counts.max(initial=0))):
         has = solutions.counts > number

@@ -68,7 +68,7 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     arm = rules.arm
     try:
         with no_warnings():
-            solutions = solve_inverse(prepared_map(arm, TOL, cells=_CELLS), places)
+            solutions = solve_inverse(prepared_map(arm, TOL, cells=_CELLS), places, from_rest=True)
     except InvalidInput as error:
         if error.name != "loads":
             raise

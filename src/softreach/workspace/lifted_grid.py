@@ -143,13 +143,13 @@ def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
     """
     corners, joined = states.shape[1], _joined(held, states)
     cell, corner, _ = np.nonzero(states >= 0)
-    state, label = states[states >= 0], _components(joined, len(cell))
+    state, label = states[states >= 0], components(joined, len(cell))
     sheet = np.full((label.max(initial=-1) + 1, corners), -1)
     sheet[label, corner] = state
     of_cell = np.empty(len(sheet), np.int64)
     of_cell[label] = cell
     forked = np.bincount(label * corners + corner)[label * corners + corner] > 1
-    part = _components(joined[forked[joined].all(axis=1)], len(cell))[forked]
+    part = components(joined[forked[joined].all(axis=1)], len(cell))[forked]
     _, first, part = np.unique(part, return_index=True, return_inverse=True)
     parted = label[forked][first]
     parts = sheet[parted]
@@ -193,7 +193,7 @@ def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
     key = corners[row, corner][slot] * total + states[row[slot], other]
     keys, of_key = np.unique(key, return_inverse=True)
     pairs = np.stack([slot, len(row) + of_key], axis=1)
-    label = _components(pairs, len(row) + len(keys))
+    label = components(pairs, len(row) + len(keys))
     groups, group = np.unique(label[: len(row)], return_inverse=True)
     found = np.searchsorted(keys, ends := held.ends @ [1, total]).clip(max=max(len(keys) - 1, 0))
     known = np.flatnonzero(keys[found] == ends) if len(keys) else found[:0]
@@ -208,7 +208,8 @@ def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
     return numbers, np.where(np.isnan(tips), at_others, tips)
 
 
-def _components(pairs: Index, size: int) -> Index:
+def components(pairs: Index, size: int) -> Index:
+    """Number of the connected component of each of so many nodes, of pairs that are linked."""
     graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
     return connected_components(graph, directed=False)[1]
 

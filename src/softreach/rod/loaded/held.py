@@ -112,7 +112,7 @@ class _Grid:
         end_gamma = np.concatenate([self.gamma[:0], *self.end_gamma])
         end_shots = joined([self.shots.of(np.arange(0)), *self.end_shots])
         tips, end_tips = points(self.gamma[self.node], self.shots), points(end_gamma, end_shots)
-        return Held(self.node, tips, pairs, ends, end_tips, is_doubled)
+        return Held(self.node, tips, pairs, ends, end_tips, is_doubled, self.shots.frame)
 
     def _put(self, nodes: Index, shots: Shots) -> Index:
         """Numbers of postures at nodes, known ones or new; none where a node has too many."""

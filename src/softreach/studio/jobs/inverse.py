@@ -38,7 +38,7 @@ def _solution(state: StudioState, target: Vector) -> Solution:
 
     solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
-    return solve_inverse(state.design, [target], near=near, family=_FAMILY)[0]
+    return solve_inverse(state.design, [target], near=near, family=_FAMILY, from_rest=True)[0]
 
 
 def _draw_answer(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
