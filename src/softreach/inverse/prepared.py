@@ -12,7 +12,7 @@ from softreach.inverse.cells import (
     ImageLeaves,
     TornCells,
     activation_cells,
-    cells_without_image,
+    corners_alone,
     image_tree,
 )
 from softreach.inverse.proofs import CoarseCells
@@ -83,7 +83,7 @@ class PreparedMap:
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
         if self.nodes is not None:
-            return cells_without_image(self.tip_map, self.nodes, self.tip_map.box.widths / _NODES)
+            return corners_alone(self.tip_map, self.nodes, self.tip_map.box.widths / _NODES)
         return activation_cells(self.tip_map, self.cells)
 
     @lazy
