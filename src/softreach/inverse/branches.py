@@ -96,11 +96,14 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
 
 def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     """The roots, and after those of each target the ones in other postures than from rest."""
-    found = [roots]
-    for number, sheet in enumerate(prepared.sheets[1:], 1):
-        part = every_branch(sheet, request)
-        found.append(part._replace(sheet=np.full(len(part.target), number)))
-    others = joined_by("target", found[1:]) if found[1:] else no_roots(prepared.tip_map)
+    found = [no_roots(prepared.tip_map)]
+    for number, sheet in enumerate(prepared.sheets, 1):
+        target, start = sheet.starts.starts(request.targets)
+        ends = descend(sheet.tip_map, request.targets[target], start, request.residual)
+        part = roots_at(sheet.tip_map, request.targets, target, ends.gamma)
+        part = part._replace(sheet=np.full(len(target), number))
+        found.append(rows(part, part.residual <= request.allowance))
+    others = joined_by("target", found)
     if not len(others.target):
         return roots
     # A sheet goes on into activations at which its posture is that from rest.
@@ -166,11 +169,13 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     trial, goal = search.trial[converged], goal[converged]
     gamma = tip_map.box.clip(trial)
+    tips = placed(tip_map, gamma)
     roots = Roots(
         starts.target[converged],
         gamma,
+        tips,
         search.slope[converged],
-        np.linalg.norm(placed(tip_map, gamma) - goal, axis=1),
+        np.linalg.norm(tips - goal, axis=1),
         starts.cell[converged],
         np.zeros(len(converged), np.int64),
     )
@@ -191,8 +196,8 @@ def _moved_to_bounds(tip_map: TipMap, request: Request, roots: Roots, goal: Arra
     if not len(goal):
         return roots
     ends = descend(tip_map, goal, roots.gamma, request.residual)
-    slope = tip_map.tips_and_slopes(ends.gamma)[1]
-    roots = roots._replace(gamma=ends.gamma, slope=slope, residual=ends.distance)
+    tip, slope = tip_map.tips_and_slopes(ends.gamma)
+    roots = roots._replace(gamma=ends.gamma, tip=tip, slope=slope, residual=ends.distance)
     return rows(roots, roots.residual <= request.allowance)
 
 

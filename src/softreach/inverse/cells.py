@@ -52,17 +52,6 @@ def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornC
     return mesh, TornCells.at(found, tip_map.box.widths / cells)
 
 
-def corners_alone(tip_map: TipMap, gamma: Array, widths: Array) -> tuple[ActivationMesh, TornCells]:
-    """No mesh, and vertices at activations (n, 3) of a sheet in cells of these widths (3,).
-
-    Some are on steep edges of the sheet, which tips beside see from afar.
-    """
-    vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
-    found = rows(vertices, np.isfinite(vertices.tip[:, 0]))
-    starts = TornCells.at(found, 2.0 * widths)._replace(most=_MOST_OF_SHEET)
-    return _mesh(tip_map, found, np.empty((0, 8), np.int64)), starts
-
-
 class _Vertices(NamedTuple):
     gamma: Array
     tip: Array
@@ -134,6 +123,13 @@ class TornCells(NamedTuple):
         if len(inverse):
             inverse[:] = np.linalg.pinv(vertices.slope * widths)
         return cls(vertices.gamma, vertices.tip, inverse)
+
+    @classmethod
+    def of_sheet(cls, tip_map: TipMap, gamma: Array, widths: Array) -> TornCells:
+        """Places (n, 3) on a sheet in cells of these widths; its steep edges are seen from afar."""
+        vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
+        found = rows(vertices, np.isfinite(vertices.tip[:, 0]))
+        return cls.at(found, 2.0 * widths)._replace(most=_MOST_OF_SHEET)
 
     def starts(self, targets: Array) -> tuple[Index, Array]:
         """Number of the target and activation of each start, sorted by target."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from softreach.inverse.cells import (
     ImageLeaves,
     TornCells,
     activation_cells,
-    corners_alone,
     image_tree,
 )
 from softreach.inverse.proofs import CoarseCells
@@ -25,8 +25,7 @@ from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
-from softreach.workspace.grid import cube_grid
-from softreach.workspace.lifted_grid import components
+from softreach.workspace.grid import components, cube_grid
 
 __all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 
@@ -36,6 +35,17 @@ _FEW = 500  # targets; to divide space for more takes less time than not to
 _COARSE = 1e-3  # tolerance of the map that searches begin with
 _NODES = 16  # cells along each axis of the grid on which sheets of postures are found
 _SAME = 1e-4  # [L] between tips of one posture
+
+
+class Sheet(NamedTuple):
+    """Postures to which activations do not lead straight from rest."""
+
+    whole: TipMap
+    """The tip map of all bundles that goes on from the nearest of them."""
+    tip_map: TipMap
+    """That of the free bundles."""
+    starts: TornCells
+    """Of searches."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +59,6 @@ class PreparedMap:
     """The tip map of all bundles, whose activations are in `measures`."""
     cells: int = _CELLS
     """With three free bundles: cells along each axis of the activation box."""
-    nodes: Array | None = field(default=None, compare=False, repr=False)
-    """Of another sheet of postures: activations at which they are known, shape (n, 3)."""
 
     @lazy
     def measures(self) -> Array:
@@ -82,22 +90,15 @@ class PreparedMap:
 
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
-        if self.nodes is not None:
-            return corners_alone(self.tip_map, self.nodes, self.tip_map.box.widths / _NODES)
         return activation_cells(self.tip_map, self.cells)
 
     @lazy
-    def sheets(self) -> tuple[PreparedMap, ...]:
-        """Itself, and the other sheets of postures that a loaded arm of three free bundles holds.
+    def sheets(self) -> list[Sheet]:
+        """Sheets of other postures than those from rest, of a loaded arm of three free bundles.
 
         They are known at the nodes of a grid: one that is narrower than its cells may be missing.
         """
-        return self, *(
-            PreparedMap(
-                self.whole.continued_from(self.whole.box.with_fixed(gamma), frames), nodes=gamma
-            )
-            for gamma, frames in _other_sheets(self.tip_map)
-        )
+        return _other_sheets(self.whole)
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
@@ -177,28 +178,31 @@ def prepared_map(
     return _of_map(measured_bundles(as_tip_map(arm, tol, frame=frame, point=point)), cells)
 
 
-def _other_sheets(tip_map: TipMap) -> list[tuple[Array, Array]]:
-    """Activations (n, 3) and frames of the postures of each sheet that is not that from rest.
-
-    A sheet goes on beyond its last nodes, as far as the cells beside.
-    """
-    m, box = tip_map.box.dimension, tip_map.box
+def _other_sheets(whole: TipMap) -> list[Sheet]:
+    """Each goes on beyond its last nodes, as far as the cells beside."""
+    m, box = whole.box.dimension, whole.box
     nodes = box.from_free_cube(cube_grid(_NODES, m))
-    held = tip_map.held(nodes, (_NODES + 1,) * m) if m == 3 and tip_map.supports_unstable else None
-    if held is None or held.frames is None:
+    held = whole.held(nodes, (_NODES + 1,) * m) if m == 3 and whole.supports_unstable else None
+    if held is None or held.frames is None or not len(held.node):
         return []
-    apart = np.linalg.norm(held.tips - tip_map.tips(nodes)[held.node], axis=1)
-    is_other = ~(apart <= _SAME * tip_map.length)  # no posture from rest is another, too
+    apart = np.linalg.norm(held.tips - whole.tips(nodes)[held.node], axis=1)
+    is_other = ~(apart <= _SAME * whole.length)  # no posture from rest is another, too
     is_other[held.ends[:, 0]] = True
     sheet = components(held.links[is_other[held.links].all(axis=1)], len(held.node))
     # Where a sheet holds several postures of a node, each has a part of its own.
-    order = np.lexsort((held.node, sheet))
-    first = np.r_[True, (np.diff(sheet[order]) != 0) | (np.diff(held.node[order]) != 0)]
-    rank = np.arange(len(order)) - np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))
-    part = np.empty_like(sheet)
-    part[order] = sheet[order] * len(order) + rank
-    sheets = [np.flatnonzero((part == each) & is_other) for each in np.unique(part[is_other])]
-    return [(nodes[held.node[states]], held.frames[states]) for states in sheets]
+    key = sheet * len(nodes) + held.node
+    order = np.argsort(key, kind="stable")
+    part = sheet * len(key)
+    part[order] += np.arange(len(key)) - np.searchsorted(key[order], key[order])
+    sheets = []
+    for each in np.unique(part[is_other]):
+        states = np.flatnonzero((part == each) & is_other)
+        gamma = nodes[held.node[states]]
+        continued = whole.continued_from(gamma, held.frames[states])
+        known = gamma[:, box.free], box.widths[box.free] / _NODES
+        free = free_bundles(continued)
+        sheets.append(Sheet(continued, free, TornCells.of_sheet(free, *known)))
+    return sheets
 
 
 @lru_cache(maxsize=4)

@@ -31,6 +31,8 @@ class Roots(NamedTuple):
     """Number of the target, shape (n,)."""
     gamma: Array
     """Activations [-], shape (n, m)."""
+    tip: Array
+    """Tips there [m], shape (n, 3)."""
     slope: Array
     """∂r/∂γ there [m], shape (n, 3, m)."""
     residual: Array
@@ -53,7 +55,8 @@ class Roots(NamedTuple):
 def no_roots(tip_map: TipMap) -> Roots:
     """An empty set of roots."""
     none, m = np.empty(0, np.int64), tip_map.box.bundles
-    return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none, none)
+    places = np.empty((0, m)), np.empty((0, 3)), np.empty((0, 3, m))
+    return Roots(none, *places, np.empty(0), none, none)
 
 
 def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
@@ -68,7 +71,7 @@ def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Ro
     tips, slopes = tip_map.tips_and_slopes(gamma)
     residual = np.linalg.norm(tips - targets[target], axis=1)
     cell, sheet = np.full(len(target), -1), np.zeros(len(target), np.int64)
-    return Roots(target, gamma, slopes, residual, cell, sheet)
+    return Roots(target, gamma, tips, slopes, residual, cell, sheet)
 
 
 def placed(tip_map: TipMap, gamma: Array) -> Array:

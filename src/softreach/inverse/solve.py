@@ -24,7 +24,6 @@ from softreach.inverse.roots import (
     conditions,
     nearly_singular_roots,
     no_roots,
-    placed,
     roots_at,
 )
 from softreach.inverse.solutions import Solutions, Status
@@ -215,18 +214,15 @@ def _solutions(
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
     points = request.targets.copy()
-    off = reached[gaps[reached] > request.residual]
-    for number in np.unique(sheet := roots.sheet[first][gaps[reached] > request.residual]):
-        some = off[sheet == number]
-        points[some] = placed(prepared.sheets[number].tip_map, gamma[some])
+    off = gaps[reached] > request.residual
+    points[reached[off]] = roots.tip[first[off]]
     points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
     activations = prepared.whole.box.with_fixed(roots.gamma)
+    maps = [prepared, *prepared.sheets] if roots.sheet.any() else [prepared]
     return Solutions(
         arm=prepared.whole.arm,
-        tip_maps=tuple(
-            all_inputs(each.whole) for each in prepared.sheets[: 1 + max(roots.sheet, default=0)]
-        ),
+        tip_maps=tuple(all_inputs(each.whole) for each in maps),
         frame=prepared.whole.frame,
         bundles=prepared.whole.box.names,
         targets=request.targets,

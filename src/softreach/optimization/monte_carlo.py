@@ -20,8 +20,8 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 from softreach.support.progress import Progress
 from softreach.workspace.reach import reachable_set
+from softreach.workspace.reachable import ReachableSolid
 from softreach.workspace.search import nearest_tips
-from softreach.workspace.solid import ReachableSolid
 
 _POOL = 1 << 17  # places of space among which those are that are followed
 _FOLLOWED = 1 << 13  # near the boundary, and as many away from it

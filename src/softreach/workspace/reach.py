@@ -14,15 +14,12 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
-from softreach.workspace.abstract_set import ReachableSet
+from softreach.workspace.cells import lost_share, searched_set
 from softreach.workspace.flux import grid_faces, signed_volume
-from softreach.workspace.grid import grid_stretches
+from softreach.workspace.grid import LiftedGrid, grid_stretches
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.lifted_grid import LiftedGrid
-from softreach.workspace.planar import planar_set, plane_of_tips
-from softreach.workspace.redundant import lost_share, searched_set
-from softreach.workspace.solid import ReachableSolid
-from softreach.workspace.thin import thin_set
+from softreach.workspace.reachable import ReachableSet, ReachableSolid
+from softreach.workspace.thin import planar_set, plane_of_tips, thin_set
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26

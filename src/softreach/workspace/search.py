@@ -16,11 +16,11 @@ from softreach.kernels.box.bounded_descent import (
 )
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
-from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.rod.tip_map import BLOCK, TipMap, no_stable_equilibrium
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
-from softreach.workspace.image import Lattice
+from softreach.workspace.image import Lattice, covered_cubes
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 
@@ -28,7 +28,11 @@ ENOUGH = 1e-3
 """Distance at which a place counts as reached, in cells."""
 
 _CHUNK = 1 << 16  # places searched for at a time
+CLOUD = 1 << 16  # tips in a cloud that searches start from
+_CLOUDS = 8  # at most
 _FAR = 3.0  # cells, from which on distances are not told apart
+DISTANCE = 0.75
+"""Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
 CLEARLY = 0.02
 """Cells by which a tip must be closer to start another search."""
 
@@ -215,3 +219,77 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
         next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
     nowhere = nearest.distance >= NOWHERE
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
+
+
+def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
+    """All centers that searches find, from one cloud after the other until one finds no more.
+
+    And the distances of those around to the nearest tips.
+    """
+    flood.add(gamma, tips)
+    for number in range(1, _CLOUDS):
+        while not flood.fits():
+            flood = _wider(flood)
+        before = np.count_nonzero(flood.gap == 0.0)
+        flood.add(*cloud_on_faces(flood.tip_map, number))
+        if flood.fits() and np.count_nonzero(flood.gap == 0.0) == before:
+            break
+    spread(flood)
+    while not flood.fits(DISTANCE):
+        flood = _wider(flood)
+        spread(flood)
+    return flood
+
+
+def _wider(flood: Flood) -> Flood:
+    """The same on a lattice with room around what is reached."""
+    lattice = flood.lattice
+    known = np.flatnonzero(flood.near(DISTANCE))
+    room = np.full(3, 4 + max(lattice.shape) // 8)
+    room[2] *= not flood.is_flat
+    nx, ny, nz = np.array(lattice.shape) + 2 * room
+    origin = lattice.origin - room * lattice.cell
+    larger = Lattice(origin, lattice.cell, (int(nx), int(ny), int(nz)))
+    wide = Flood(flood.tip_map, larger, flood.progress, is_flat=flood.is_flat)
+    wide.add(flood.gamma[known], flood.tip_map.tips(flood.gamma[known]))
+    return wide
+
+
+def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
+    """Activations on faces of all dimensions of the box, and their tips."""
+    box, rng = tip_map.box, np.random.default_rng(seed)
+    m = box.dimension
+    cube = rng.random((CLOUD, m))
+    free = np.maximum(rng.integers(0, m + 1, CLOUD), 2)
+    bound = rng.random((CLOUD, m)).argsort(axis=1) >= free[:, None]
+    cube[bound] = rng.integers(0, 2, int(bound.sum()))
+    gamma = np.ascontiguousarray(box.from_free_cube(cube))
+    tips = tip_map.tips(gamma)
+    if not tip_map.supports_unstable:
+        return gamma, tips
+    stable = np.isfinite(tips[:, 0])
+    if not stable.any():
+        raise no_stable_equilibrium(len(tips))
+    return gamma[stable], tips[stable]
+
+
+def spread(flood: Flood) -> None:
+    """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
+    offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ flood.steps
+    offsets = offsets[offsets != 0]
+    near, known = (flood.gap < DISTANCE) & (flood.gap > 0.0), flood.gap <= 0.0
+    inside = covered_cubes(covered_cubes(known.reshape(flood.lattice.shape)))
+    rim = np.flatnonzero((flood.gap == 0.0) & ~np.pad(inside, 1).ravel())
+    front = np.concatenate([np.flatnonzero(near), rim])
+    while len(front):
+        tips = flood.tip_map.tips(flood.gamma[front])
+        sources, ways = np.nonzero(flood.gap[front[:, None] + offsets] > 0.0)
+        cells = front[sources] + offsets[ways]
+        away = np.linalg.norm(flood.centers(cells) - tips[sources], axis=1) / flood.lattice.cell
+        closer = np.flatnonzero(away < flood.gap[cells] - CLEARLY)
+        order = closer[np.lexsort((away[closer], cells[closer]))]
+        order = order[np.diff(cells[order], prepend=-1) > 0]
+        cells, sources = cells[order], front[sources[order]]
+        before = flood.gap[cells]
+        flood.search(cells, flood.gamma[sources])
+        front = cells[(flood.gap[cells] < before) & (flood.gap[cells] < DISTANCE)]

@@ -18,10 +18,8 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace.measure import Estimate
-from softreach.workspace.search import CLEARLY, ENOUGH, Flood, Nearest, nearest_tips
+from softreach.workspace.search import DISTANCE, ENOUGH, Flood, Nearest, nearest_tips
 
-DISTANCE = 0.75
-"""Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
 _ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
 _SHEET = 2e-3  # of its width, the root of its area, that a sheet is thinner than
 _SHEET_TOL = 1e-9  # in L, as a sheet may be no thicker than tips are exact otherwise
@@ -92,28 +90,6 @@ def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
         square = ((stretched * tip_map.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
         gamma, _ = damped_steps(tip_map.box, gamma, miss[:, :, 0], stretched, _DAMPING * square)
     return ((tip_map.tips(gamma) - tips) * unit).sum(axis=1)
-
-
-def spread(flood: Flood) -> None:
-    """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
-    offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ flood.steps
-    offsets = offsets[offsets != 0]
-    near, reached = (flood.gap < DISTANCE) & (flood.gap > 0.0), np.flatnonzero(flood.gap == 0.0)
-    rim = reached[(flood.gap[reached[:, None] + offsets] > 0.0).any(axis=1)]
-    front = np.concatenate([np.flatnonzero(near), rim])
-    while len(front):
-        tips = flood.tip_map.tips(flood.gamma[front])
-        sources = np.repeat(np.arange(len(front)), len(offsets))
-        cells = (front[:, None] + offsets).ravel()
-        sources, cells = sources[flood.gap[cells] > 0.0], cells[flood.gap[cells] > 0.0]
-        away = np.linalg.norm(flood.centers(cells) - tips[sources], axis=1) / flood.lattice.cell
-        order = np.lexsort((away, cells))
-        order = order[away[order] < flood.gap[cells[order]] - CLEARLY]
-        order = order[np.diff(cells[order], prepend=-1) > 0]
-        cells, sources = cells[order], front[sources[order]]
-        before = flood.gap[cells]
-        flood.search(cells, flood.gamma[sources])
-        front = cells[(flood.gap[cells] < before) & (flood.gap[cells] < DISTANCE)]
 
 
 def drawn_tight(flood: Flood, at: Array) -> Nearest:

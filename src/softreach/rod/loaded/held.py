@@ -99,6 +99,8 @@ class _Grid:
         nodes, known = nodes[good], known.of(good)
         at = np.full(len(self.gamma), _NONE)
         at[nodes] = self._put(nodes, _shots(known))
+        if not len(self.node):
+            return
         self._link_smooth(at, postures)
         front = np.arange(first, len(self.node))
         while len(front):
