@@ -102,13 +102,13 @@ def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> 
         ends = descend(sheet.tip_map, request.targets[target], start, request.residual)
         part = roots_at(sheet.tip_map, request.targets, target, ends.gamma)
         part = part._replace(sheet=np.full(len(target), number))
-        found.append(rows(part, part.residual <= request.allowance))
+        found.append(rows(part, part.residual <= request.reach_tol))
     others = joined_by("target", found)
     if not len(others.target):
         return roots
     # A sheet goes on into activations at which its posture is that from rest.
     at_rest = roots_at(prepared.tip_map, request.targets, others.target, others.gamma)
-    same = at_rest.residual <= request.allowance
+    same = at_rest.residual <= request.reach_tol
     roots = distinct(prepared, request, roots.joined(rows(at_rest, same)))
     return roots.joined(distinct(prepared, request, rows(others, ~same)))
 
@@ -188,17 +188,17 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
 def _moved_to_bounds(tip_map: TipMap, request: Request, roots: Roots, goal: Array) -> Roots:
     """Step 8: those of roots beyond bounds that miss little enough on the bounds.
 
-    What moves a tip by the allowance moves a root by that over the smallest singular value, and to
+    What moves a tip by the reach_tol moves a root by that over the smallest singular value, and to
     move it back to the bounds moves the tip by no more than the condition number as much.
     """
-    near = roots.residual <= request.allowance * conditions(roots.slope)
+    near = roots.residual <= request.reach_tol * conditions(roots.slope)
     roots, goal = rows(roots, near), goal[near]
     if not len(goal):
         return roots
     ends = descend(tip_map, goal, roots.gamma, request.residual)
     tip, slope = tip_map.tips_and_slopes(ends.gamma)
     roots = roots._replace(gamma=ends.gamma, tip=tip, slope=slope, residual=ends.distance)
-    return rows(roots, roots.residual <= request.allowance)
+    return rows(roots, roots.residual <= request.reach_tol)
 
 
 def _improved(tip_map: TipMap, goal: Array, starts: Starts) -> Array:

@@ -119,4 +119,4 @@ class Drag:
         gap = float(np.linalg.norm(point.tip - target))
         within = tuple(float(value) for value in activation)
         self._last, held = (within, point), all_inputs(point.tip_map)
-        return Dragged(within, point.tip, 0.0 if gap <= self._tracker.allowance else gap, held)
+        return Dragged(within, point.tip, 0.0 if gap <= self._tracker.reach_tol else gap, held)

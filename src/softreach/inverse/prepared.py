@@ -9,12 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.cells import (
-    ImageLeaves,
-    TornCells,
-    activation_cells,
-    image_tree,
-)
+from softreach.inverse.cells import ImageLeaves, TornCells, activation_cells, image_tree
 from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree

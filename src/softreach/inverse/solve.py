@@ -12,20 +12,8 @@ from softreach.inverse.least_change import least_changes
 from softreach.inverse.nearest import nearest, nearest_from
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import (
-    Request,
-    allowance,
-    as_activations,
-    as_residual,
-    as_targets,
-)
-from softreach.inverse.roots import (
-    Roots,
-    conditions,
-    nearly_singular_roots,
-    no_roots,
-    roots_at,
-)
+from softreach.inverse.request import Request, as_activations, as_residual, as_targets, reach_tol
+from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import all_inputs, as_tip_map
@@ -120,7 +108,7 @@ def solve_inverse(
     request = Request(
         targets=points,
         residual=residual,
-        allowance=max(allowance(prepared.whole, residual), within),
+        reach_tol=max(reach_tol(prepared.whole, residual), within),
         near=as_activations("near", preferred, box, len(points)) / prepared.measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
@@ -177,14 +165,14 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
 
 def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
     """Lower bounds of the distance of targets to all tips; 0 where they prove nothing."""
-    bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.allowance)
+    bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.reach_tol)
     # Where the position yields to a direction, the gap says nothing of what can be reached.
     yielding = request.direction is not None and prepared.dimension <= 3
     if len(out) and not yielding and (prepared.proves or not prepared.dimension):
-        gaps = request.targets[out], gap[out], request.allowance
+        gaps = request.targets[out], gap[out], request.reach_tol
         bounds[out] = gap_bounds(prepared.tip_map, prepared.coarse_cells, *gaps)
     # Within the error of the tips, what is true of them need not be true of the arm.
-    return np.where(bounds > request.allowance, bounds, 0.0)
+    return np.where(bounds > request.reach_tol, bounds, 0.0)
 
 
 def _solutions(
@@ -199,7 +187,7 @@ def _solutions(
     missing = roots.missing(count)
     if bounds is None:
         bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
-    hit = closest.distance <= request.allowance
+    hit = closest.distance <= request.reach_tol
     roots = roots.joined(roots_at(tip_map, request.targets, missing[hit], closest.gamma[hit]))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual

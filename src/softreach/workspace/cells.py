@@ -9,7 +9,7 @@ it; what searches miss is missing from the volume.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,14 @@ from softreach.support.progress import Progress
 from softreach.workspace.crossings import Crossings, line_volume, swept_crossings
 from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.measure import ConvexHull, Estimate, climbed_hull
-from softreach.workspace.search import CLOUD, ENOUGH, Flood, cloud_on_faces, flooded, nearest_tips
+from softreach.workspace.search import (
+    CLOUD,
+    ENOUGH,
+    ReachedGrid,
+    all_reached,
+    cloud_on_faces,
+    nearest_tips,
+)
 from softreach.workspace.wrap import Wrap, wrapped
 
 if TYPE_CHECKING:
@@ -57,7 +64,7 @@ CLIMBERS = 1024
 class ReachedCells:
     """Counterpart of `Image` for more than three free bundles: asked by search."""
 
-    flood: Flood
+    grid: ReachedGrid
     cloud: tuple[Array, Array]
     """Activations on faces of the box, and their tips [m]."""
     wrap: Wrap
@@ -68,17 +75,17 @@ class ReachedCells:
     @property
     def tip_map(self) -> TipMap:
         """The tip map."""
-        return self.flood.tip_map
+        return self.grid.tip_map
 
     @property
     def lattice(self) -> Lattice:
         """The cells."""
-        return self.flood.lattice
+        return self.grid.lattice
 
     @property
     def reached(self) -> Mask:
         """True for cells whose centers are reached."""
-        return self.flood.reached
+        return self.grid.reached
 
     @property
     def is_thick(self) -> bool:
@@ -88,7 +95,7 @@ class ReachedCells:
     @lazy
     def swept(self) -> tuple[Crossings, float]:
         """Places where edges between centers are cut, and what they may miss [m³]."""
-        return swept_crossings(self.flood)
+        return swept_crossings(self.grid)
 
     @lazy
     def volume(self) -> Estimate:
@@ -162,7 +169,7 @@ class ReachedCells:
             cells = np.ravel_multi_index(
                 tuple(np.where(within, i, 0) for i in index.T), self.lattice.shape
             )
-            yield within & (self.flood.gap[cells] == 0.0), self.flood.gamma[cells]
+            yield within & (self.grid.gap[cells] == 0.0), self.grid.gamma[cells]
 
     @lazy
     def _tree(self) -> KDTree:
@@ -207,8 +214,8 @@ def searched_set(
     target = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * mean
     edge = float(max(target, smallest, sides.max() / 1024.0)) if cell is None else cell
 
-    def of_cells(edge: float) -> Flood:
-        return flooded(Flood(tip_map, shifted_lattice(tips, edge), progress), *cloud)
+    def of_cells(edge: float) -> ReachedGrid:
+        return all_reached(ReachedGrid(tip_map, shifted_lattice(tips, edge), progress), *cloud)
 
     coarse = wrapped(of_cells(_FINER * edge))
     begin = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))[
@@ -216,8 +223,8 @@ def searched_set(
     ]
     hull = climbed_hull(tip_map, begin.clip(0.0, 1.0), accuracy)
     while True:
-        flood = of_cells(edge)
-        found = ReachedCells(flood, cloud, wrapped(flood), coarse, hull)
+        grid = of_cells(edge)
+        found = ReachedCells(grid, cloud, wrapped(grid), coarse, hull)
         if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
             return found
         edge, coarse = edge / _FINER, found.wrap
@@ -240,18 +247,25 @@ def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: 
     return needed >= of_sheets
 
 
-def cells_of(tip_map: TipMap, cell: float) -> ReachedCells:
+def cells_of(
+    tip_map: TipMap, cell: float, inside: Callable[[Array], Mask] | None = None
+) -> ReachedCells:
     """What is reached of the image of a box of any number of free bundles, without its hull.
 
     Args:
         tip_map: The tip map.
         cell: Edge of a cell [m]; larger where that takes more than 96 cells along the longest side.
+        inside: Of places [m], shape (n, 3), tells some that are reached, (n,): there is no search,
+            and nothing but the surface is right.
     """
     cloud = cloud_on_faces(tip_map, 0)
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
-    flood = flooded(Flood(tip_map, shifted_lattice(cloud[1], edge)), *cloud)
-    wrap = wrapped(flood)
-    return ReachedCells(flood, cloud, wrap, wrap)
+    grid = ReachedGrid(tip_map, shifted_lattice(cloud[1], edge))
+    if inside is not None:
+        grid.add_inside(inside)
+    grid = all_reached(grid, *cloud)
+    wrap = wrapped(grid)
+    return ReachedCells(grid, cloud, wrap, wrap)
 
 
 def shifted_lattice(tips: Array, cell: float) -> Lattice:

@@ -11,7 +11,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate
-from softreach.workspace.search import ENOUGH, Flood, Nearest, nearest_tips
+from softreach.workspace.search import ENOUGH, Nearest, ReachedGrid, nearest_tips
 
 _PROBE = 0.01  # cells: how closely crossings are enclosed
 _ROUNDS = 24
@@ -48,9 +48,9 @@ class Crossings:
     """Place where the plane of that tip cuts the edge, between `low` and `high`, shape (n,)."""
 
     @classmethod
-    def of(cls, flood: Flood) -> Crossings:
+    def of(cls, grid: ReachedGrid) -> Crossings:
         """The crossings of all edges at the boundary of what was reached."""
-        reached, parts = flood.reached, []
+        reached, parts = grid.reached, []
         flat = np.arange(reached.size).reshape(reached.shape)
         for k in range(3):
             before, after = np.moveaxis(reached, k, 0)[:-1], np.moveaxis(reached, k, 0)[1:]
@@ -59,17 +59,17 @@ class Crossings:
             for side, places in ((1, leaving), (-1, entering)):
                 parts.append((places, np.full(len(places), k), np.full(len(places), side)))
         cell, axis, sense = (np.concatenate(column) for column in zip(*parts, strict=True))
-        n, outside = len(cell), cell + sense * flood.steps[axis]
+        n, outside = len(cell), cell + sense * grid.steps[axis]
         crossings = cls(
-            tip_map=flood.tip_map,
-            lattice=flood.lattice,
+            tip_map=grid.tip_map,
+            lattice=grid.lattice,
             cell=cell,
             axis=axis,
             sense=sense,
             low=np.zeros(n),
             high=np.ones(n),
-            gamma=flood.gamma[cell],
-            beyond=flood.gamma[outside],
+            gamma=grid.gamma[cell],
+            beyond=grid.gamma[outside],
             place=np.zeros(n),
         )
         crossings._cut(np.arange(n))
@@ -138,12 +138,12 @@ class Crossings:
         return self.place[which] - before
 
 
-def swept_crossings(flood: Flood) -> tuple[Crossings, float]:
+def swept_crossings(grid: ReachedGrid) -> tuple[Crossings, float]:
     """Crossings that no neighbor's activation leads beyond, and what may still be missed [m³]."""
     from scipy.spatial import KDTree
 
-    crossings = Crossings.of(flood)
-    volume = flood.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
+    crossings = Crossings.of(grid)
+    volume = grid.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
     gain = 0.0
     for sweep in range(1, _SWEEPS + 1):
         count = len(crossings.cell)
@@ -151,14 +151,14 @@ def swept_crossings(flood: Flood) -> tuple[Crossings, float]:
             return crossings, 0.0
         places = crossings.points(np.arange(count), crossings.place)
         others = np.asarray(KDTree(places).query(places, k=sweep + 1)[1])[:, sweep]
-        apart = np.abs(crossings.gamma[others] - crossings.gamma) / flood.tip_map.box.scales
+        apart = np.abs(crossings.gamma[others] - crossings.gamma) / grid.tip_map.box.scales
         which = np.flatnonzero((apart > _APART).any(axis=1))
         moved = crossings.advance(which, crossings.gamma[others[which]], _BEYOND)
         gain = float(moved.clip(0.0).sum()) * volume
         beyond = np.flatnonzero(crossings.low >= 1.0)
         if len(beyond):
-            flood.add(crossings.gamma[beyond], crossings.points(beyond, crossings.low[beyond]))
-            crossings = Crossings.of(flood)
+            grid.add(crossings.gamma[beyond], crossings.points(beyond, crossings.low[beyond]))
+            crossings = Crossings.of(grid)
     return crossings, gain
 
 

@@ -76,7 +76,7 @@ def grid_tips(
     return tips
 
 
-def grid_stretches(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
+def grid_jacobian_dets(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
     """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
 
     From differences of the tips, and by J itself where these might have the wrong sign, and
@@ -99,7 +99,7 @@ def grid_stretches(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) ->
     unsure = np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
     small = np.flatnonzero((unsure | (not tip_map.is_smooth)) & used)
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
-    determinants[small] = _stretch(tip_map, tip_map.box.from_free_cube(places))
+    determinants[small] = _jacobian_size(tip_map, tip_map.box.from_free_cube(places))
     determinants[~np.isfinite(determinants)] = 0.0
     return determinants
 
@@ -135,10 +135,10 @@ def image_measure(tip_map: TipMap, nodes: int) -> float:
     gamma = tip_map.box.from_free_cube(_product([(1.0 + x) / 2.0] * m))
     weights = np.prod(_product([w / 2.0] * m), axis=1) * tip_map.box.volume
     # Not a BLAS product, whose rounding would depend on its threads.
-    return float((weights * _stretch(refined(tip_map, _TOL), gamma)).sum())
+    return float((weights * _jacobian_size(refined(tip_map, _TOL), gamma)).sum())
 
 
-def _stretch(tip_map: TipMap, gamma: Array) -> Array:
+def _jacobian_size(tip_map: TipMap, gamma: Array) -> Array:
     """The change of measure of the map at each activation: det J where J is square."""
     slopes = tip_map.tips_and_slopes(gamma)[1][:, :, tip_map.box.free]
     with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium

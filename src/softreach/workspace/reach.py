@@ -16,7 +16,7 @@ from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.cells import lost_share, searched_set
 from softreach.workspace.flux import grid_faces, signed_volume
-from softreach.workspace.grid import LiftedGrid, grid_stretches
+from softreach.workspace.grid import LiftedGrid, grid_jacobian_dets
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.reachable import ReachableSet, ReachableSolid
 from softreach.workspace.thin import planar_set, plane_of_tips, thin_set
@@ -251,7 +251,7 @@ class _Grid(NamedTuple):
     """The mapped vertices of a grid of three bundles."""
 
     lifted: LiftedGrid
-    stretches: Array
+    jacobian_dets: Array
     """det J, shape ((n + 1)³,)."""
 
     @classmethod
@@ -259,7 +259,7 @@ class _Grid(NamedTuple):
         """The grid of cells³ boxes over the activation box."""
         lifted = LiftedGrid.of(tip_map, cells, progress)
         tips = lifted.tips[: (cells + 1) ** 3]
-        return cls(lifted, grid_stretches(tip_map, tips, cells, lifted.is_lifted))
+        return cls(lifted, grid_jacobian_dets(tip_map, tips, cells, lifted.is_lifted))
 
     @property
     def cells(self) -> int:
@@ -291,21 +291,21 @@ class _Grid(NamedTuple):
         both orientations cover. Pieces that none covers may have a degree: walls thinner than the
         triangles are flat cross each other.
         """
-        return bool(self.stretches.min() * self.stretches.max() > 0.0) and all(
+        return bool(self.jacobian_dets.min() * self.jacobian_dets.max() > 0.0) and all(
             (spans.cover <= np.minimum(1, np.abs(spans.degree)))[spans.length > 0.0].all()
             for spans in image.spans
         )
 
     def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
         """Image of all cells."""
-        n, (grid, stretches) = self.cells, self
+        n, (grid, jacobian_dets) = self.cells, self
         lifted = {"is_lifted": grid.is_lifted, "lifted": grid.lifted}
-        return image_of(grid.tips, stretches, (n, n, n), lattice, progress, **lifted)
+        return image_of(grid.tips, jacobian_dets, (n, n, n), lattice, progress, **lifted)
 
     def coarser(self, tip_map: TipMap) -> _Grid:
         """The grid of half as many cells."""
         n = self.cells
         if self.lifted.is_torn:
             return _Grid.of(tip_map, n // 2)
-        every_second = self.stretches.reshape((n + 1,) * 3)[::2, ::2, ::2]
+        every_second = self.jacobian_dets.reshape((n + 1,) * 3)[::2, ::2, ::2]
         return _Grid(self.lifted.coarser(tip_map), every_second.ravel())

@@ -386,7 +386,7 @@ class ReachableSolid(ReachableSet):
         corners = self.tip_map.tips(self.tip_map.box.corners())
         outer = corners[~self._covering.are_deep(corners)]
         if (surface.distance(outer) > DIAGONAL * cell).any():  # a spike that no center is in
-            return cells_of(self.tip_map, cell).wrap
+            return cells_of(self.tip_map, cell, self._covering.are_deep).wrap
         return surface
 
     @lazy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -52,7 +53,7 @@ CLOSELY = Stop(settled=1e-13, most=1000)
 """For the nearest tip itself."""
 
 
-class Flood:
+class ReachedGrid:
     """Cell centers that are reached, grown from tips of a cloud to their neighbors.
 
     A center is reached if a search that starts at a neighbor's activation, or at that of a tip
@@ -112,6 +113,15 @@ class Flood:
         """Places [m] of cells given by flat index, shape (n, 3)."""
         index = np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1)
         return self.lattice.origin + self.lattice.cell * index
+
+    def add_inside(self, inside: Callable[[Array], Mask]) -> None:
+        """Take centers for reached, without a search, that are within a part known to be [m]."""
+        free = np.flatnonzero(self.gap > 0.0)
+        known = np.zeros(len(self.gap), bool)
+        known[free] = inside(self.centers(free))
+        known = covered_cubes(covered_cubes(known.reshape(self.lattice.shape)))
+        self.gap[np.pad(known, 1).ravel()] = 0.0  # what is beside has to be searched from tips
+        self.gamma[self.gap == 0.0] = self.tip_map.box.low
 
     def add(self, gamma: Array, tips: Array) -> None:
         """Search around tips that come closer to a center than all before."""
@@ -221,37 +231,37 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
 
 
-def flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
+def all_reached(grid: ReachedGrid, gamma: Array, tips: Array) -> ReachedGrid:
     """All centers that searches find, from one cloud after the other until one finds no more.
 
     And the distances of those around to the nearest tips.
     """
-    flood.add(gamma, tips)
+    grid.add(gamma, tips)
     for number in range(1, _CLOUDS):
-        while not flood.fits():
-            flood = _wider(flood)
-        before = np.count_nonzero(flood.gap == 0.0)
-        flood.add(*cloud_on_faces(flood.tip_map, number))
-        if flood.fits() and np.count_nonzero(flood.gap == 0.0) == before:
+        while not grid.fits():
+            grid = _wider(grid)
+        before = np.count_nonzero(grid.gap == 0.0)
+        grid.add(*cloud_on_faces(grid.tip_map, number))
+        if grid.fits() and np.count_nonzero(grid.gap == 0.0) == before:
             break
-    spread(flood)
-    while not flood.fits(DISTANCE):
-        flood = _wider(flood)
-        spread(flood)
-    return flood
+    spread(grid)
+    while not grid.fits(DISTANCE):
+        grid = _wider(grid)
+        spread(grid)
+    return grid
 
 
-def _wider(flood: Flood) -> Flood:
+def _wider(grid: ReachedGrid) -> ReachedGrid:
     """The same on a lattice with room around what is reached."""
-    lattice = flood.lattice
-    known = np.flatnonzero(flood.near(DISTANCE))
+    lattice = grid.lattice
+    known = np.flatnonzero(grid.near(DISTANCE))
     room = np.full(3, 4 + max(lattice.shape) // 8)
-    room[2] *= not flood.is_flat
+    room[2] *= not grid.is_flat
     nx, ny, nz = np.array(lattice.shape) + 2 * room
     origin = lattice.origin - room * lattice.cell
     larger = Lattice(origin, lattice.cell, (int(nx), int(ny), int(nz)))
-    wide = Flood(flood.tip_map, larger, flood.progress, is_flat=flood.is_flat)
-    wide.add(flood.gamma[known], flood.tip_map.tips(flood.gamma[known]))
+    wide = ReachedGrid(grid.tip_map, larger, grid.progress, is_flat=grid.is_flat)
+    wide.add(grid.gamma[known], grid.tip_map.tips(grid.gamma[known]))
     return wide
 
 
@@ -273,23 +283,23 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     return gamma[stable], tips[stable]
 
 
-def spread(flood: Flood) -> None:
+def spread(grid: ReachedGrid) -> None:
     """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
-    offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ flood.steps
+    offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ grid.steps
     offsets = offsets[offsets != 0]
-    near, known = (flood.gap < DISTANCE) & (flood.gap > 0.0), flood.gap <= 0.0
-    inside = covered_cubes(covered_cubes(known.reshape(flood.lattice.shape)))
-    rim = np.flatnonzero((flood.gap == 0.0) & ~np.pad(inside, 1).ravel())
+    near, known = (grid.gap < DISTANCE) & (grid.gap > 0.0), grid.gap <= 0.0
+    inside = covered_cubes(covered_cubes(known.reshape(grid.lattice.shape)))
+    rim = np.flatnonzero((grid.gap == 0.0) & ~np.pad(inside, 1).ravel())
     front = np.concatenate([np.flatnonzero(near), rim])
     while len(front):
-        tips = flood.tip_map.tips(flood.gamma[front])
-        sources, ways = np.nonzero(flood.gap[front[:, None] + offsets] > 0.0)
+        tips = grid.tip_map.tips(grid.gamma[front])
+        sources, ways = np.nonzero(grid.gap[front[:, None] + offsets] > 0.0)
         cells = front[sources] + offsets[ways]
-        away = np.linalg.norm(flood.centers(cells) - tips[sources], axis=1) / flood.lattice.cell
-        closer = np.flatnonzero(away < flood.gap[cells] - CLEARLY)
+        away = np.linalg.norm(grid.centers(cells) - tips[sources], axis=1) / grid.lattice.cell
+        closer = np.flatnonzero(away < grid.gap[cells] - CLEARLY)
         order = closer[np.lexsort((away[closer], cells[closer]))]
         order = order[np.diff(cells[order], prepend=-1) > 0]
         cells, sources = cells[order], front[sources[order]]
-        before = flood.gap[cells]
-        flood.search(cells, flood.gamma[sources])
-        front = cells[(flood.gap[cells] < before) & (flood.gap[cells] < DISTANCE)]
+        before = grid.gap[cells]
+        grid.search(cells, grid.gamma[sources])
+        front = cells[(grid.gap[cells] < before) & (grid.gap[cells] < DISTANCE)]

@@ -19,17 +19,13 @@ from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import MissingExtra
 from softreach.support.progress import Progress
-from softreach.workspace.cells import (
-    CLIMBERS,
-    lost_share,
-    shifted_lattice,
-)
+from softreach.workspace.cells import CLIMBERS, lost_share, shifted_lattice
 from softreach.workspace.flux import box_slopes
 from softreach.workspace.grid import LiftedGrid, cube_grid, grid_ticks, grid_tips, image_measure
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, HullCorners, climbed_hull
 from softreach.workspace.reachable import ReachableSet, Stored
-from softreach.workspace.search import DISTANCE, ENOUGH, Flood, cloud_on_faces, flooded
+from softreach.workspace.search import DISTANCE, ENOUGH, ReachedGrid, all_reached, cloud_on_faces
 from softreach.workspace.wrap import drawn_tight
 
 _CELLS = {1: 1024, 2: 128}  # of the grids of a curve and of a surface, for distances and pictures
@@ -288,7 +284,7 @@ def planar_set(
     def outline(edge: float) -> _Outline:
         x, y, _ = (lattice := shifted_lattice(tips, edge)).shape
         layers = Lattice(np.array([*lattice.origin[:2], -2.0 * edge]), edge, (x, y, 5))
-        return _Outline.of(flooded(Flood(flat, layers, progress, is_flat=True), *cloud))
+        return _Outline.of(all_reached(ReachedGrid(flat, layers, progress, is_flat=True), *cloud))
 
     coarse = outline(_FINER * edge)
     while True:
@@ -326,18 +322,18 @@ class _Outline(NamedTuple):
     """Of cells that are reached [m], shape (c, 3)."""
 
     @classmethod
-    def of(cls, flood: Flood) -> _Outline:
+    def of(cls, grid: ReachedGrid) -> _Outline:
         """The level set of the distances, drawn tight."""
         try:
             from skimage.measure import find_contours
         except ImportError as error:
             raise MissingExtra(("scikit-image", "surface")) from error
-        curves = find_contours(flood.distances[:, :, 2], DISTANCE, positive_orientation="low")
+        curves = find_contours(grid.distances[:, :, 2], DISTANCE, positive_orientation="low")
         at = np.insert(np.concatenate([np.empty((0, 2)), *curves]), 2, 2.0, axis=1)
         first = np.delete(np.arange(len(at)), np.cumsum([len(curve) for curve in curves]) - 1)
-        gamma, tips, _ = drawn_tight(flood, at)
+        gamma, tips, _ = drawn_tight(grid, at)
         edges = np.stack([first, first + 1], axis=1)
-        return cls(tips, gamma, edges, flood.centers(np.flatnonzero(flood.gap == 0.0)))
+        return cls(tips, gamma, edges, grid.centers(np.flatnonzero(grid.gap == 0.0)))
 
     @property
     def area(self) -> float:

@@ -18,7 +18,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace.measure import Estimate
-from softreach.workspace.search import DISTANCE, ENOUGH, Flood, Nearest, nearest_tips
+from softreach.workspace.search import DISTANCE, ENOUGH, Nearest, ReachedGrid, nearest_tips
 
 _ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
 _SHEET = 2e-3  # of its width, the root of its area, that a sheet is thinner than
@@ -92,39 +92,39 @@ def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
     return ((tip_map.tips(gamma) - tips) * unit).sum(axis=1)
 
 
-def drawn_tight(flood: Flood, at: Array) -> Nearest:
+def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
     """The nearest tips of places on edges of the lattice, from the tips at both ends.
 
     Args:
-        flood: What was found.
+        grid: What was found.
         at: Coordinates of the places in cells, shape (n, 3).
     """
-    lattice, n = flood.lattice, len(at)
+    lattice, n = grid.lattice, len(at)
     places = lattice.origin + lattice.cell * at
-    best = Nearest(np.zeros((n, flood.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
+    best = Nearest(np.zeros((n, grid.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
     for end in (np.floor(at), np.ceil(at)):
-        cells = end.astype(np.int64) @ flood.steps
-        found = nearest_tips(flood.tip_map, flood.gamma[cells], places, ENOUGH * lattice.cell)
+        cells = end.astype(np.int64) @ grid.steps
+        found = nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * lattice.cell)
         closer = found.distance < best.distance
         for kept, new in zip(best, found, strict=True):
             kept[closer] = new[closer]
     return best
 
 
-def wrapped(flood: Flood) -> Wrap:
+def wrapped(grid: ReachedGrid) -> Wrap:
     """The surface around what was found.
 
     Raises:
         MissingExtra: scikit-image is not installed.
     """
-    at, faces = level_set(flood.distances, DISTANCE)
-    gamma, tips, _ = drawn_tight(flood, at)
-    cell, away = flood.lattice.cell, flood.lattice.origin + flood.lattice.cell * at - tips
+    at, faces = level_set(grid.distances, DISTANCE)
+    gamma, tips, _ = drawn_tight(grid, at)
+    cell, away = grid.lattice.cell, grid.lattice.origin + grid.lattice.cell * at - tips
     away /= np.linalg.norm(away, axis=1).clip(1e-9 * cell)[:, None]
     return Wrap(
         vertices=tips + _ASIDE * cell * away,
         faces=faces,
-        tip_map=flood.tip_map,
+        tip_map=grid.tip_map,
         cell=cell,
         gamma=gamma,
         tight_volume=Surface(vertices=tips, faces=faces).volume,
