@@ -20,7 +20,7 @@ from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
-from softreach.workspace.grid import components, cube_grid
+from softreach.workspace.postures import all_postures
 
 __all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 
@@ -29,7 +29,6 @@ _CELLS = 32
 _FEW = 500  # targets; to divide space for more takes less time than not to
 _COARSE = 1e-3  # tolerance of the map that searches begin with
 _NODES = 16  # cells along each axis of the grid on which sheets of postures are found
-_SAME = 1e-4  # [L] between tips of one posture
 
 
 class Sheet(NamedTuple):
@@ -93,7 +92,13 @@ class PreparedMap:
 
         They are known at the nodes of a grid: one that is narrower than its cells may be missing.
         """
-        return _other_sheets(self.whole)
+        every = all_postures(self.whole, _NODES) if self.dimension == 3 else None
+        sheets, box = list[Sheet](), self.tip_map.box
+        for whole, gamma in [] if every is None else every.sheets:
+            tip_map, known = free_bundles(whole), gamma[:, self.whole.box.free]
+            starts = TornCells.of_sheet(tip_map, known, box.widths / _NODES)
+            sheets.append(Sheet(whole, tip_map, starts))
+        return sheets
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
@@ -171,33 +176,6 @@ def prepared_map(
             raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
     return _of_map(measured_bundles(as_tip_map(arm, tol, frame=frame, point=point)), cells)
-
-
-def _other_sheets(whole: TipMap) -> list[Sheet]:
-    """Each goes on beyond its last nodes, as far as the cells beside."""
-    m, box = whole.box.dimension, whole.box
-    nodes = box.from_free_cube(cube_grid(_NODES, m))
-    held = whole.held(nodes, (_NODES + 1,) * m) if m == 3 and whole.supports_unstable else None
-    if held is None or held.frames is None or not len(held.node):
-        return []
-    apart = np.linalg.norm(held.tips - whole.tips(nodes)[held.node], axis=1)
-    is_other = ~(apart <= _SAME * whole.length)  # no posture from rest is another, too
-    is_other[held.ends[:, 0]] = True
-    sheet = components(held.links[is_other[held.links].all(axis=1)], len(held.node))
-    # Where a sheet holds several postures of a node, each has a part of its own.
-    key = sheet * len(nodes) + held.node
-    order = np.argsort(key, kind="stable")
-    part = sheet * len(key)
-    part[order] += np.arange(len(key)) - np.searchsorted(key[order], key[order])
-    sheets = []
-    for each in np.unique(part[is_other]):
-        states = np.flatnonzero((part == each) & is_other)
-        gamma = nodes[held.node[states]]
-        continued = whole.continued_from(gamma, held.frames[states])
-        known = gamma[:, box.free], box.widths[box.free] / _NODES
-        free = free_bundles(continued)
-        sheets.append(Sheet(continued, free, TornCells.of_sheet(free, *known)))
-    return sheets
 
 
 @lru_cache(maxsize=4)

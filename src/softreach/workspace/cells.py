@@ -27,6 +27,7 @@ from softreach.support.progress import Progress
 from softreach.workspace.crossings import Crossings, line_volume, swept_crossings
 from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.measure import ConvexHull, Estimate, climbed_hull
+from softreach.workspace.postures import AllPostures
 from softreach.workspace.search import (
     CLOUD,
     ENOUGH,
@@ -276,6 +277,8 @@ def shifted_lattice(tips: Array, cell: float) -> Lattice:
 
 def lost_share(tip_map: TipMap) -> float:
     """Share of the activation box without a stable equilibrium [-], from a sample."""
+    if isinstance(tip_map, AllPostures):
+        return tip_map.lost_share
     if not tip_map.supports_unstable:
         return 0.0
     (cube,) = cube_blocks("sobol", _SAMPLES, tip_map.box.dimension, 0, _SAMPLES)

@@ -232,8 +232,8 @@ def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
         np.concatenate([tips, end_tips]),
         is_lifted,
         np.where(states < 0, len(tips) + beyond, vertex[states]),
-        _share(count == 0, n, m),
-        _share(held.is_doubled, n, m),
+        share_of_box(count == 0, n, m),
+        share_of_box(held.is_doubled, n, m),
     )
 
 
@@ -354,7 +354,7 @@ def _means(places: Array, number: Index, size: int) -> Array:
         return np.stack(sums, axis=1) / count[:, None]
 
 
-def _share(nodes: Mask, n: int, m: int) -> float:
+def share_of_box(nodes: Mask, n: int, m: int) -> float:
     """Share of the box in which something holds that holds at some nodes."""
     share = nodes.reshape((n + 1,) * m).astype(float)
     for axis in range(m):

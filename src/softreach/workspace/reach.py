@@ -67,7 +67,7 @@ def reachable_set(
 
     Under loads all postures count that are held without a snap from rest, on all their sheets and
     up to the edges of these: `hysteresis_share` tells where two are held, `lost_share` where none
-    is. Of more bundles than three, and in one plane, only the posture of each activation does.
+    is. Of more bundles than three only the posture to which each activation leads from rest does.
 
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no

@@ -88,12 +88,12 @@ class ReachableSet(ABC):
     convex_volume_error: float = 0.0
     """Error of `convex_volume`, estimated from two grids [m³]."""
     lost_share: float = 0.0
-    """Share of the activation box at which no posture is held [-], told by the activation grid; for
-    more than three free bundles, which have no grid, by a sample. 0 for an arm without loads."""
+    """Share of the activation box at which no posture is held [-], by the activation grid; where
+    there is none, by one of postures or a sample. 0 for an arm without loads."""
     hysteresis_share: float = 0.0
     """Share of the activation box at which two postures are held, the one or the other by the way
-    that the arm has come [-]; mirror images of those that lean do not count. 0 where nothing tells:
-    for more than three free bundles, and in one plane."""
+    that the arm has come [-]; mirror images of those that lean do not count. 0 for more than
+    three free bundles, of which nothing tells."""
 
     @property
     def arm(self) -> Manipulator:

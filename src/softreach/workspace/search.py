@@ -22,6 +22,7 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
 from softreach.workspace.image import Lattice, covered_cubes
+from softreach.workspace.postures import AllPostures
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 
@@ -267,6 +268,8 @@ def _wider(grid: ReachedGrid) -> ReachedGrid:
 
 def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     """Activations on faces of all dimensions of the box, and their tips."""
+    if isinstance(tip_map, AllPostures):
+        return tip_map.with_sheets(*cloud_on_faces(tip_map.from_rest, seed))
     box, rng = tip_map.box, np.random.default_rng(seed)
     m = box.dimension
     cube = rng.random((CLOUD, m))

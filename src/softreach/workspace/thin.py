@@ -24,6 +24,7 @@ from softreach.workspace.flux import box_slopes
 from softreach.workspace.grid import LiftedGrid, cube_grid, grid_ticks, grid_tips, image_measure
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, HullCorners, climbed_hull
+from softreach.workspace.postures import all_postures
 from softreach.workspace.reachable import ReachableSet, Stored
 from softreach.workspace.search import DISTANCE, ENOUGH, ReachedGrid, all_reached, cloud_on_faces
 from softreach.workspace.wrap import drawn_tight
@@ -275,7 +276,8 @@ def planar_set(
         points=tuple(map(tuple, plane.rotation.tolist())),  # pyright: ignore[reportArgumentType]
         position=tuple((-plane.rotation @ plane.origin).tolist()),  # pyright: ignore[reportArgumentType]
     )
-    flat = ArmMap.of(tip_map, turned)  # in the axes of the plane
+    every = all_postures(tip_map)  # the map in the axes of the plane
+    flat = ArmMap.of(tip_map, turned) if every is None else every.seen_from(turned)
     cloud = gamma, tips = cloud_on_faces(flat, 0)
     sides = np.ptp(tips[:, :2], axis=0)
     mean = float(np.sqrt(np.prod(sides)))
@@ -295,7 +297,7 @@ def planar_set(
             break
         edge, coarse = edge / _FINER, found
     area = _smooth(tip_map, flat, area)
-    cube = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], found.gamma]))[:, tip_map.box.free]
+    cube = flat.box.to_cube(np.concatenate([gamma[:CLIMBERS], found.gamma]))[:, flat.box.free]
     convex = climbed_hull(flat, cube, accuracy, _FlatCorners).volume
     return ReachableRegion(
         tip_map=tip_map,
@@ -303,7 +305,8 @@ def planar_set(
         area_error=area.error,
         convex_area=convex.value,
         convex_area_error=convex.error,
-        lost_share=lost_share(tip_map),
+        lost_share=lost_share(flat),
+        hysteresis_share=0.0 if every is None else every.hysteresis_share,
         outline=threads(plane.places(found.tips), found.edges),
         mapped_grid=_mesh(found, plane),
     )
