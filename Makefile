@@ -7,7 +7,7 @@ READY := .venv/.ready
 # Bytecode is kept whatever the environment says, or every process would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-all test-lowest tests all-tests ready free-kernels loaded-kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all test-lowest test-newest tests all-tests ready free-kernels loaded-kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -15,6 +15,7 @@ help:
 	@echo "make quick   format, lint, layers, types and the fast tests: for every edit"
 	@echo "make test-all  as make test, with the large sizes"
 	@echo "make test-lowest  the fast tests with the lowest versions that pyproject.toml allows"
+	@echo "make test-newest  the fast tests with the newest versions there are; NEWEST_PYTHON names a Python"
 	@echo "make record  every test; which are slow goes into tests/durations.json"
 	@echo "make check   format, lint, types, layers, documentation"
 	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
@@ -93,6 +94,19 @@ $(LOWEST)/.ready: $(READY)
 	PATH="$(CURDIR)/$(LOWEST)/bin:$(CURDIR)/$(BIN):$$PATH" uv pip install --quiet --python $(LOWEST)/bin/python --no-deps --no-build-isolation --editable .
 	@touch $@
 
+# The same with the newest version of each dependency.
+NEWEST := .venv-newest
+NEWEST_PYTHON ?= $(PYTHON)
+
+test-newest: $(NEWEST)/.ready
+	NUMBA_CACHE_DIR=$(CURDIR)/.cache/newest $(MAKE) --no-print-directory fast BIN=$(NEWEST)/bin
+
+$(NEWEST)/.ready: $(READY)
+	$(NEWEST_PYTHON) -m venv --clear $(NEWEST)
+	PATH="$(CURDIR)/$(BIN):$$PATH" uv pip install --quiet --python $(NEWEST)/bin/python --upgrade --only-binary :all: -r pyproject.toml --all-extras --group dev
+	PATH="$(CURDIR)/$(NEWEST)/bin:$(CURDIR)/$(BIN):$$PATH" uv pip install --quiet --python $(NEWEST)/bin/python --no-deps --no-build-isolation --editable .
+	@touch $@
+
 # Renews the list of slow tests, which `make quick` leaves out; on an idle machine.
 record: setup browser
 	$(TESTS) --record
@@ -107,6 +121,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 types: setup
+	$(BIN)/python -m tools.pages
 	$(BIN)/basedpyright
 
 format: setup
@@ -131,4 +146,4 @@ lock:
 	uv export --quiet --all-extras --all-groups --no-emit-project --no-header --format requirements-txt --output-file requirements.lock
 
 clean:
-	rm -rf .venv $(LOWEST) out site .cache
+	rm -rf .venv $(LOWEST) $(NEWEST) out site build .cache

@@ -33,7 +33,7 @@ from softreach.arm import (
     Tendon,
 )
 from softreach.calibration import Measurements, PlacementErrors, read_measurements
-from softreach.calibration.baselines import constant_curvature, quadratic
+from softreach.calibration.calibration import constant_curvature, quadratic
 from softreach.calibration.errors import misses
 from softreach.rod.kinematics import marker_positions
 

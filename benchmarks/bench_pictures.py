@@ -15,8 +15,6 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.memory import peak_bytes, reset_peak
 from softreach import plot
 from softreach.arm import designs
@@ -26,7 +24,6 @@ from softreach.plot.style import pyplot
 from softreach.support.errors import SoftreachWarning
 
 ALPHA = 0.05
-PANELS = 4  # columns and rows of the sheet
 
 
 def main(points: int = 2_000_000, tips: int = 50_000_000) -> None:
@@ -59,19 +56,10 @@ def print_pictures(points: int) -> None:
     arm = designs.minimal_trunk()
     cloud, small = compute_cloud(arm, points), compute_cloud(arm, min(points, 400_000))
     hull = concave_hull(small.tip, ALPHA * arm.length)
-    axis = plot.SheetAxis("x", tuple(range(PANELS)))
-    sheet = {"length": arm.length, "box_over_length": np.array([[-1.0] * 3, [1.0] * 3])}
-
-    def hulls() -> None:
-        plot.plot_hull_sheet(
-            lambda *_: concave_hull(small.tip, ALPHA * arm.length), axis, axis, **sheet
-        )
-
     rows: dict[str, Callable[[], object]] = {
         f"one view of {points:,} points": lambda: plot.plot_cloud(cloud),
         f"four views of {points:,} points and the arm": lambda: plot.plot_views(cloud, arm),
         f"a hull of {len(hull.faces):,} faces": lambda: plot.plot_hull(hull),
-        f"a sheet of {PANELS**2} hulls of {len(small.tip):,} points, with their computation": hulls,
     }
     print("\nPictures, not yet written to a file, the best of three:\n")
     print("| What | Wall [s] | CPU [s] | Wanted |\n|---|--:|--:|--:|")

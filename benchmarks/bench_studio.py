@@ -22,7 +22,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.drag import Drag
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.scene import Scene
-from softreach.studio.serve.server import start_server, stop_server
+from softreach.studio.serve import start_server, stop_server
 from softreach.studio.state import Appearance
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)

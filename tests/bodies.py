@@ -15,7 +15,7 @@ from softreach.arm.tables import tables
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import Body
+from softreach.rod.loaded.tables import ArmBody
 from tests.oracles import rod
 
 _DEGREE = 40
@@ -55,7 +55,7 @@ def uniform(bending, axial=np.inf, torsion=None, mass=0.0):
     return Uniform((1.0 / axial, 1.0 / bending, 1.0 / (torsion or bending)), mass)
 
 
-def oracle_rod(arm: Manipulator, body: Body, gamma, loads: Loads) -> tuple[rod.Rod, rod.Loads]:
+def oracle_rod(arm: Manipulator, body: ArmBody, gamma, loads: Loads) -> tuple[rod.Rod, rod.Loads]:
     """An activated arm and its loads as the oracles take them."""
     breaks = tuple(arm.breakpoints)
     at = _polynomials(lambda z: _sections(arm, body, gamma, z), sorted({0.0, *breaks, arm.length}))
@@ -66,7 +66,7 @@ def oracle_rod(arm: Manipulator, body: Body, gamma, loads: Loads) -> tuple[rod.R
         torsion=lambda z: at(z)[2],
         mass=lambda z: at(z)[3],
         stretch=lambda z: at(z)[4],
-        growth=lambda z: at(z)[5],
+        rest_length_factor=lambda z: at(z)[5],
         curvature=lambda z: at(z)[6:],
         breaks=breaks,
     ), rod.Loads(
@@ -85,13 +85,13 @@ def oracle_rod(arm: Manipulator, body: Body, gamma, loads: Loads) -> tuple[rod.R
     )
 
 
-def _sections(arm: Manipulator, body: Body, gamma, z):
+def _sections(arm: Manipulator, body: ArmBody, gamma, z):
     """K0, K1, K3, mass per length, ζ̂, η and û at stations, shape (station, 9)."""
     table, yields = tables(arm, z), body.compliance(z)
     stiff = [1.0 / np.maximum(one, 1e-300) for one in yields]
-    stretch, growth = 1.0 + table.extension @ gamma, 1.0 + table.growth @ gamma
+    stretch, eta = 1.0 + table.extension @ gamma, 1.0 + table.rest_length_factor @ gamma
     bend = table.curvature @ gamma
-    return np.column_stack([*stiff, body.mass_per_length(z), stretch, growth, bend])
+    return np.column_stack([*stiff, body.mass_per_length(z), stretch, eta, bend])
 
 
 def _polynomials(values: Callable, ends: list[float]) -> Callable:

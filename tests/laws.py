@@ -78,7 +78,7 @@ def integrated_tip(arm: Manipulator, gamma: Array) -> Array:
     def rhs(z: float, state: Array) -> Array:
         table = tables(arm, [z])
         directors = state[3:].reshape(3, 3)  # rows d1, d2, d3
-        zeta, eta = 1.0 + table.extension[0] @ gamma, 1.0 + table.growth[0] @ gamma
+        zeta, eta = 1.0 + table.extension[0] @ gamma, 1.0 + table.rest_length_factor[0] @ gamma
         u = (table.curvature[0] @ gamma) @ directors
         return np.concatenate([zeta * directors[2], (eta * np.cross(u, directors)).ravel()])
 

@@ -138,7 +138,7 @@ def test_strains_are_the_tables_times_the_activations(arm):
     z, gamma = stations(arm), in_box(arm, 20)
     table, (curvature, extension) = tables(arm, z), as_tip_map(arm).strains(gamma, z)
     scale = np.abs(table.curvature).max()
-    assert table.growth is table.extension
+    assert table.rest_length_factor is table.extension
     u = np.einsum("scb,nb->nsc", table.curvature, gamma)
     np.testing.assert_allclose(curvature, u, rtol=1e-12, atol=1e-13 * scale)
     np.testing.assert_allclose(extension, 1 + gamma @ table.extension.T, rtol=1e-12)

@@ -2,10 +2,9 @@
 
 A fence in `README.md` or `docs/` is one of these, or the test fails:
 
-- `python`: executed, in order, in one namespace per page and a folder that is empty but for the
-  files `tentacle.*`, `three_fibers.toml` and `five_places.toml` of `examples/`. One that cannot be
-  says why in its first line: `# not executed: REASON`. One that begins with a name, `# magnets.py`,
-  is written to a file of this name, from which others can import.
+- `python`: executed, in order, in one namespace per page and a folder that is empty at first. One
+  that cannot be says why in its first line: `# not executed: REASON`. One that begins with a name,
+  `# magnets.py`, is written to a file of this name, from which others can import.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
   `# exit code 2` must fail so, one in `# exit code 1` find a requirement missed, and
   `softreach studio` is ended once it serves its page; with `--static` it ends by itself. Other
@@ -27,7 +26,6 @@ import json
 import math
 import re
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -39,17 +37,13 @@ from sybil.document import Document
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.markdown import CodeBlockParser
 from sybil.region import Lexeme
+from tools.address import SPELLED_OUT, address
 
 import softreach as sr
 from softreach.cli.app import run
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-EXAMPLES = [
-    path
-    for pattern in ("tentacle.*", "five_places.toml", "three_fibers.toml")
-    for path in sorted((ROOT / "examples").glob(pattern))
-]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
 FEW = 5_000  # samples
@@ -69,8 +63,6 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    for file in EXAMPLES:
-        shutil.copy(file, tmp_path)
     known = {*sys.modules}
     parsers = [
         CodeBlockParser("python", run_python),
@@ -147,7 +139,28 @@ def test_every_row_of_a_table_has_as_many_cells_as_it_has_heads(page):
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
 def test_every_picture_on_a_page_exists(page):
     for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
-        assert (page.parent / picture).is_file(), picture
+        if not picture.startswith(address()):
+            assert (page.parent / picture).is_file(), picture
+
+
+def test_links_of_the_readme_hold_on_a_package_index():
+    """They are absolute, begin with the address of pyproject.toml, and lead to what exists."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)]+)\)", readme)
+    own = [link.removeprefix(address()) for link in links if link.startswith(address())]
+    assert len(own) > 10
+    assert all(link.startswith("https://") for link in links)
+    for link in own:
+        assert (ROOT / re.sub(r"^/(blob|raw)/main/|#.*", "", link)).exists(), link
+
+
+def test_another_address_is_written_wherever_the_present_one_stands():
+    hosts = [
+        path
+        for path in ROOT.glob("*")
+        if path.is_file() and address() in path.read_text("utf-8", errors="ignore")
+    ]
+    assert {path.name for path in hosts} == {*SPELLED_OUT}
 
 
 def test_the_readme_is_short():

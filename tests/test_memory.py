@@ -57,7 +57,9 @@ def test_without_a_limit_the_system_says_what_is_free(container, files):
 
 
 def test_a_cloud_for_which_there_is_no_memory_is_refused():
-    with pytest.raises(sr.InvalidInput, match=r"^n = 10.*of memory, of which .* GB are free$"):
+    with pytest.raises(
+        sr.errors.NotPossible, match=r"^n = 10.*of memory, of which .* GB are free$"
+    ):
         sr.compute_cloud(sr.designs.minimal_trunk(), 10**12)
 
 
@@ -65,7 +67,7 @@ def test_cells_for_which_there_is_no_memory_are_refused(trunk, monkeypatch):
     image = dataclasses.replace(sr.reachable_set(trunk, accuracy=0.05).image)  # nothing counted
     monkeypatch.setattr(memory, "_NOTICED", 0)
     monkeypatch.setattr(memory, "free_memory", lambda: 100.0)
-    with pytest.raises(sr.InvalidInput, match="cells of the lattice = "):
+    with pytest.raises(sr.errors.NotPossible, match="cells of the lattice = "):
         _ = image.counts
 
 

@@ -87,7 +87,7 @@ def test_the_gradient_of_an_objective_is_its_derivative(terms):
     arrays = {"multiplier": rng.normal(size=(9, 3)), "near": in_box(rod.arm, 9, seed=5)}
     chosen = {name: arrays.get(name, value) for name, value in terms.items()}
     targets = rng.normal(size=(9, 3))
-    objective = Objective(rod=rod, targets=targets, direction=direction, **chosen)
+    objective = Objective(tip_map=rod, targets=targets, direction=direction, **chosen)
     which = np.array([3, 3, 0, 8, 1, 2, 7, 5, 4])
     expected = differences(lambda x: objective(which, x)[0], gamma)
     gradient = objective(which, gamma)[1]

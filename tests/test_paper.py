@@ -11,14 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.arm.actuators.ring_integrals import ring_integrals
+from softreach.arm.actuators.sector import ring_integrals
 from softreach.cli.app import run
-from softreach.paper import printed, reproduce, reproduce_paper
-from softreach.paper.claims import CLAIMS, Verdict
-from softreach.paper.notebook import QUICK, Notebook
+from softreach.paper import reproduce, reproduce_paper
+from softreach.paper.notebook import QUICK, Notebook, Verdict
+from softreach.paper.reproduce import CLAIMS
+from softreach.paper.sections import uniqueness
+from softreach.paper.sections.misprints import printed_deltas
 from softreach.paper.sections.sweep import shapes
-from softreach.paper.sections.uniqueness import uniqueness
-from softreach.plot import atlas, axes, style
+from softreach.plot import axes, sheets, style
 from softreach.support.errors import InvalidInput
 
 TINY = replace(
@@ -39,7 +40,7 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduce, "QUICK", TINY)
-        for module in (style, axes, atlas):  # pictures are small
+        for module in (style, axes, sheets):  # pictures are small
             patch.setattr(module, "DPI", 60)
         assert run(["paper", "--out", str(out), "--quick"]) == 0
     return out
@@ -63,11 +64,11 @@ def checked(part, numbers, words):
 
 def test_every_figure_of_the_paper_is_there_as_png_and_pdf(folder):
     pictures = [p for part in reproduce.PARTS for p in notebook(folder, part)["pictures"]]
-    labels = {picture["label"] for picture in pictures}
+    labels = {label for label, _, _ in pictures}
     assert labels == {"1b", "1c", "1d", "2a", "2b", "3a", "3b", "3c", "4a", "4b-d", ""}
-    for picture in pictures:
+    for _, name, _ in pictures:
         for suffix, head in ((".png", b"\x89PNG"), (".pdf", b"%PDF-")):
-            path = folder / "quick" / "figures" / f"{picture['name']}{suffix}"
+            path = folder / "quick" / "figures" / f"{name}{suffix}"
             assert path.read_bytes().startswith(head)
 
 
@@ -165,7 +166,7 @@ def test_what_only_the_full_sizes_test_is_marked_so_in_a_quick_run(folder):
 def test_a_part_computed_by_itself_is_that_of_a_whole_run_to_the_last_bit(folder, tmp_path):
     """As when a run is killed and resumed; all but the seconds that it took."""
     notes = Notebook(tmp_path, "volume", notebook(folder, "volume")["key"])
-    reproduce.PARTS["volume"](TINY, notes)
+    notes.numbers = reproduce.PARTS["volume"](TINY, notes)
     notes.close(0.0)
     whole = notebook(folder, "volume") | {"seconds": 0.0}
     assert json.loads((tmp_path / "volume.json").read_text()) == whole
@@ -200,7 +201,7 @@ def test_an_interrupted_report_keeps_its_finished_parts(tmp_path, small, monkeyp
             calls.append(name)
             if fails:
                 raise KeyboardInterrupt
-            notes.note(**{name: 1.0})
+            return {name: 1.0}
 
         return compute
 
@@ -246,16 +247,15 @@ def test_printed_appendix_a_is_the_integrals_but_for_delta3(ratio, taper, angle,
     if abs(taper - angle) < 0.02:
         return
     exact = ring_integrals(ratio, taper, hand * angle, nu)
-    alpha = hand * angle
-    assert printed.delta0(ratio, taper, alpha, nu) == pytest.approx(4 * exact.axial, rel=1e-6)
-    assert printed.delta1(ratio, taper, alpha, nu) == pytest.approx(6 * exact.bending, rel=1e-6)
-    corrected = printed.delta3(ratio, taper, alpha, corrected=True)
+    delta0, delta1, delta3, corrected = printed_deltas(ratio, taper, hand * angle, nu)
+    assert delta0 == pytest.approx(4 * exact.axial, rel=1e-6)
+    assert delta1 == pytest.approx(6 * exact.bending, rel=1e-6)
     assert corrected == pytest.approx(6 * exact.torsion, rel=1e-6)
-    assert abs(printed.delta3(ratio, taper, alpha)) > 2 * abs(corrected)
+    assert abs(delta3) > 2 * abs(corrected)
 
 
 def test_an_atlas_that_was_removed_is_asked_for_and_does_not_come_back(tmp_path):
     notes = Notebook(tmp_path / "figures", "uniqueness", {})
     with pytest.raises(InvalidInput, match=r"atlas = .*remove .*sweep\.json too"):
-        uniqueness(TINY, notes)
+        uniqueness.computed(TINY, notes)
     assert not (tmp_path / "atlas.zarr").exists()

@@ -166,7 +166,7 @@ def test_every_command_that_gives_a_volume_gives_the_area(tmp_path, region, caps
     shown = printed_json(capsys, "reach", path, "--out", mesh)
     assert mesh.stat().st_size > 1000
     assert shown["unreachability"] == pytest.approx(region.unreachability)
-    assert region.area == pytest.approx(shown["area_in_one_plane_m2"])
+    assert region.area == pytest.approx(shown["area_m2"])
     shown = printed_json(capsys, "volume", path, "--n", 4096, "--alpha", "10mm")
     assert 0.0 < shown["unreachability"] < 1.0
     assert shown["area_in_one_plane_m2"] < shown["convex_area_m2"]

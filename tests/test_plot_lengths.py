@@ -86,7 +86,8 @@ def everything(tmp_path_factory) -> SimpleNamespace:
     cloud = sr.compute_cloud(arm, n=3000, seed=1)
     space = sr.DesignSpace.grid(arm, length=[LENGTH, 2 * LENGTH], taper=np.radians([0.0, 1.0]))
     store = tmp_path_factory.mktemp("lengths") / "atlas.zarr"
-    atlas = sr.build_atlas(space, store, n=500, metrics=("extent",))
+    metrics = ("extent", "concave")
+    atlas = sr.build_atlas(space, store, n=500, metrics=metrics, alpha_over_length=0.5)
     return SimpleNamespace(
         known=True,
         length=LENGTH,
@@ -214,20 +215,19 @@ def plot_arm(of):
     yield from space(plot.plot_arm(of.arm, view=OBLIQUE), of.rest)
 
 
-@case(may_not_know=False)
-def plot_check(of):
-    """At the tip of the arm at rest, inside a box around it."""
+def checked(of):
+    """The arm at rest, inside a box around it, and that box."""
     needs = sr.requirements
     box = needs.Box(*(of.rest.min(axis=0) - 0.01, of.rest.max(axis=0) + 0.01))
-    check = sr.check(
-        of.arm,
-        sr.Requirements(
-            targets=[needs.Target([0.0, 0.0, LENGTH])],
-            keeps=[needs.Keep(box, True)],
-        ),
-    )
-    yield from plane(plot.plot_check(check, view="side"), box.bounds)
-    yield from space(plot.plot_check(check), box.bounds)
+    target = needs.Target([0.0, 0.0, LENGTH])
+    return sr.check(of.arm, sr.Requirements(targets=[target], keeps=[needs.Keep(box, True)])), box
+
+
+@case(may_not_know=False)
+def plot_check(of):
+    check, box = checked(of)
+    yield from plane(plot.plot_check(check, view="side", unit="L"), box.bounds)
+    yield from space(plot.plot_check(check, unit="L"), box.bounds)
 
 
 @case(may_not_know=False)
@@ -273,12 +273,11 @@ def plot_opposite_sides(of):
 
 
 def sheet(of, draw) -> Iterator[Shown]:
-    """Panels and the bar of half a length in the margin."""
-    axis = plot.SheetAxis("parameter", (1.0,))
-    box = np.array([of.tips.min(axis=0), of.tips.max(axis=0)]) / LENGTH
-    figure = draw(axis, axis, box)
+    """Panels of one design, of the length LENGTH, and the bar of half a length in the margin."""
+    figure = draw(of.atlas.isel(length=[0], taper=[0]))
     (panel,) = image_axes(figure)
-    seen = project(of.tips, OBLIQUE)
+    at = {"length": LENGTH, "taper": 0.0}
+    seen = project(sr.atlas.atlas_cloud(of.atlas, **at).tip.values, OBLIQUE)
     yield "x / L", panel.get_xlim(), seen[:, 0]
     yield "y / L", panel.get_ylim(), seen[:, 1]
     margin = figure.axes[-1]
@@ -293,22 +292,12 @@ def sheet(of, draw) -> Iterator[Shown]:
 
 @case(may_not_know=False)
 def plot_cloud_sheet(of):
-    yield from sheet(
-        of,
-        lambda *axes: plot.plot_cloud_sheet(
-            lambda *_: of.cloud, *axes[:2], box_over_length=axes[2]
-        ),
-    )
+    yield from sheet(of, plot.plot_cloud_sheet)
 
 
 @case(may_not_know=False)
 def plot_hull_sheet(of):
-    yield from sheet(
-        of,
-        lambda *axes: plot.plot_hull_sheet(
-            lambda *_: of.hull, *axes[:2], length=LENGTH, box_over_length=axes[2]
-        ),
-    )
+    yield from sheet(of, plot.plot_hull_sheet)
 
 
 @case(may_not_know=False)
@@ -362,6 +351,14 @@ def texts() -> list[str]:
     return [text.get_text() for figure in figures for text in figure.findobj(Text)]
 
 
+def test_a_check_is_drawn_in_the_unit_that_its_design_is_shown_in(everything):
+    plt.close("all")
+    ax = plot.plot_check(checked(everything)[0], view="side")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("y [mm]", "z [mm]")
+    assert ax.get_ylim()[1] > 1e3 * LENGTH
+    assert not any(re.search(r"\bL\b", text) for text in texts())
+
+
 def test_numbers_along_a_box_stand_where_they_say(everything):
     ax = plot.plot_cloud(everything.cloud, view=OBLIQUE)
     axis, ticks = 0, []
@@ -386,18 +383,13 @@ def test_data_in_meters_do_not_go_over_data_in_lengths(everything):
     assert ax.get_xlabel() == "x / L"
 
 
-def test_sheets_and_rows_take_no_mixture(everything, ignorant):
+def test_rows_take_no_mixture(everything, ignorant):
     both = {"a": everything.cloud, "b": ignorant.cloud}
     distances = dict.fromkeys(both, everything.distance)
     with pytest.raises(InvalidInput, match="some with and some without"):
         plot.plot_redundancy(both, distances)
     with pytest.raises(InvalidInput, match="some with and some without"):
         plot.plot_views(ignorant.cloud, everything.arm)
-    axis = plot.SheetAxis("parameter", (1.0,))
-    with pytest.raises(InvalidInput, match="unit of the sheet"):
-        plot.plot_cloud_sheet(
-            lambda *_: ignorant.cloud, axis, axis, box_over_length=[[-1, -1, -1], [1, 1, 1]]
-        )
 
 
 def test_boxes_and_points_of_another_shape_are_refused(everything):

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 import softreach as sr
 from softreach.arm import Base, Loads, Manipulator, designs
 from softreach.arm.actuators import Chamber
-from softreach.arm.load_number import load_number
+from softreach.arm.body import load_number
 from softreach.arm.parameters import changed, find_parameters
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.dexterity import dexterity, solution_measure

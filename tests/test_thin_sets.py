@@ -130,7 +130,7 @@ def test_a_sheet_of_microns_has_a_thickness_and_leads_with_it(capsys):
     assert solid(designs.minimal_trunk(), accuracy=0.1).shell is None
     assert run(["reach", "three_tendon_robot", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
-    assert next(iter(shown)).startswith("area_middle_of_the_shell")
+    assert next(iter(shown)).startswith("shell_area")
     # the wrap of the same set, which knows nothing of its faces, pushes tips to both sides
     wrap = cells_of(as_tip_map(robot), 0.2 / 24).wrap
     assert wrap.volume_of_tips.value == pytest.approx(found.volume, rel=5e-3)

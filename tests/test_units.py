@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach import export, plot
-from softreach.arm.load_number import scale_warnings
+from softreach.arm.manipulator import scale_warnings
 from softreach.cli.app import run
 from softreach.rod.summary import design_warnings
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning

@@ -16,8 +16,8 @@ from tests.studio.tab import Tab
 
 from softreach.arm import designs
 from softreach.studio import Studio
-from softreach.studio.settings import PlotSettings
 from softreach.studio.start import start_on_design
+from softreach.studio.state import PlotSettings
 
 SIZES = {"laptop": (1366, 768), "phone": (390, 844)}
 GRAVE = """async () => {

@@ -21,8 +21,8 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.studio import Studio
-from softreach.studio.settings import PlotSettings
 from softreach.studio.start import start_on_design
+from softreach.studio.state import PlotSettings
 
 PICTURES = Path(__file__).parent.parent / "docs" / "images"
 LAPTOP, PHONE = (1366, 768), (390, 844)

@@ -14,6 +14,10 @@ def __getattr__(name: str) -> object:
     """A public name, loaded at its first use."""
     if name in __all__:
         return _public(name)
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("softreach")
     from softreach.support.errors import did_you_mean
 
     hint = did_you_mean(name, __all__)

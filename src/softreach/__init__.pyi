@@ -60,3 +60,5 @@ from .workspace import payload as payload
 from .workspace import reachable_set as reachable_set
 from .workspace import volume_gradient as volume_gradient
 from .workspace.payload import payload_curve as payload_curve
+
+__version__: str

@@ -9,10 +9,9 @@ bundles follow a path of stable equilibria along which the force grows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property, partial
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -20,9 +19,6 @@ import numpy as np
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.loaded.pushing_tip import PushingTip, TipResponse
 from softreach.support.arrays import Array, Mask
-
-__all__ = ["FixedTip", "Grown", "Growth", "Stop"]
-
 
 _FIRST, _LONGEST, _SHORTEST = 0.05, 0.2, 1e-7  # largest change of an activation, of its range
 _AGAIN_FIRST = 0.01  # the same near the end
@@ -92,9 +88,6 @@ class _Program(NamedTuple):
     slope: float
     """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
 
-    def shortened(self, share: float) -> _Program:
-        return self._replace(gamma=share * self.gamma, force=share * self.force)
-
 
 @dataclass(frozen=True, eq=False)
 class Growth:
@@ -124,7 +117,6 @@ class Growth:
 
     @cached_property
     def _begun(self) -> TipResponse:
-        """The tip near its place, without force."""
         return self.pushing.respond(self.box.clip(self.start), 0.0)
 
     @cached_property
@@ -171,7 +163,7 @@ class Growth:
                 return self._end(path, best)
             share = _OF_ROOM * _room(path) / best.force
             if share < 1.0:
-                best = best.shortened(share)
+                best = best._replace(gamma=share * best.gamma, force=share * best.force)
                 reach = float(np.abs(best.gamma / self.box.scales).max())
                 if reach < _OF_SHORTEST * self._shortest:
                     return None
@@ -200,14 +192,12 @@ class Growth:
         return share, False
 
     def _is_too_coarse(self, fixed: FixedTip) -> bool:
-        """True if steps along the arm err too much to go on where stability is about to be lost."""
         if fixed.response.margin > _NEAR_LOSS or self.pushing.is_finest:
             return False
         return self.pushing.error(*fixed) > 0.5 * self.allowed
 
     @property
     def _shortest(self) -> float:
-        """The step below which nothing is gained by further ones."""
         return _LOCAL if self.box.dimension > 3 else _TURNING
 
     def _end(self, path: list[FixedTip], best: _Program, stop: Stop | None = None) -> Grown:
@@ -239,11 +229,11 @@ class Growth:
         ends = [*zip(np.minimum(lowest, 0.0), np.maximum(highest, 0.0), strict=True), (0.0, most)]
         goal = np.zeros(box.bundles + 1)
         goal[-1] = -1.0
-        solve = partial(linprog, goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends)
-        solution = solve(method="highs-ds")
-        if solution.x is None:
-            solution = solve(method="highs-ipm")
-        if solution.x is None:
+        for method in ("highs-ds", "highs-ipm"):
+            solution = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method=method)
+            if solution.x is not None:
+                break
+        else:
             return _Program(np.zeros(box.bundles), 0.0, 0.0, np.zeros(box.bundles), np.nan)
         change = reach * solution.x
         price = solution.lower.marginals + solution.upper.marginals
@@ -314,11 +304,16 @@ class Growth:
 
         box, length = self.box, self.pushing.rod.length
         x = np.append(box.to_cube(fixed.gamma[None])[0], fixed.force / self.unit)
-        at = _remembered(
-            lambda x: self.pushing.respond(
-                box.low + x[:-1] * box.scales, x[-1] * self.unit, fixed.response
-            )
-        )
+
+        @lru_cache(maxsize=1)  # values and slopes are asked in turn
+        def respond(key: bytes) -> TipResponse:
+            *gamma, force = np.frombuffer(key)
+            gamma = box.low + np.array(gamma) * box.scales
+            return self.pushing.respond(gamma, force * self.unit, fixed.response)
+
+        def at(x: Array) -> TipResponse:
+            return respond(x.tobytes())
+
         gradient = np.append(np.zeros(box.bundles), -1.0)
         solution: Any = minimize(
             lambda x: -x[-1],
@@ -366,16 +361,3 @@ def _ahead(path: list[FixedTip], force: float) -> TipResponse:
     before, now = (each.response.equilibrium.frame for each in (past, fixed))
     equilibrium = response.equilibrium._replace(frame=now + share * (now - before))
     return response._replace(equilibrium=equilibrium)
-
-
-def _remembered(respond: Callable[[Array], TipResponse]) -> Callable[[Array], TipResponse]:
-    """The same function, which remembers its last value; values and slopes are asked in turn."""
-    last: list[tuple[bytes, TipResponse]] = []
-
-    def at(x: Array) -> TipResponse:
-        key = x.tobytes()
-        if not last or last[0][0] != key:
-            last[:] = [(key, respond(x))]
-        return last[0][1]
-
-    return at

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -89,8 +88,8 @@ def blocked_force(
     for target, along, choice in zip(targets, directions, starts, strict=True):
         push, place = rod.pose.directions_to_base(along), rod.pose.to_base(target)
         choice = rod.inputs.activations(choice)
-        results = [_grown(yielding, push, place, gamma) for gamma in choice]
-        best.append(max((result for result in results if result), key=_force, default=None))
+        results = [each for gamma in choice if (each := _grown(yielding, push, place, gamma))]
+        best.append(max(results, key=lambda each: each.end.fixed.force, default=None))
         progress(1)
     return _dataset(rod, targets, directions, best)
 
@@ -102,14 +101,9 @@ class _Best(NamedTuple):
     settles: bool
 
 
-def _force(result: _Best) -> float:
-    return result.end.fixed.force
-
-
 def _starts(
     rod: TipMap, places: ArrayLike | None, start: ArrayLike | None
 ) -> tuple[Array, list[Array]]:
-    """Places, and activations (k, bundles) to start from for each."""
     if start is None:
         if places is None:
             raise InvalidInput("places", None, "given, or `start`")
@@ -132,16 +126,11 @@ def _grown(rod: LoadedRod, direction: Array, place: Array, start: Array) -> _Bes
     while first is not None and end is not None:
         error = pushing.error(*end.fixed)
         if error <= 0.5 * allowed or pushing.is_finest:
-            settles = pushing.settles(*end.fixed)
-            return _Best(first.gamma, end, error + growth.residual, settles)
+            return _Best(first.gamma, end, error + growth.residual, pushing.settles(*end.fixed))
         pushing = pushing.finer()
         growth = replace(growth, pushing=pushing)
         end = growth.grown(end.before) or growth.grown()
     return None
-
-
-def _rows(best: list[_Best | None]) -> Iterator[tuple[int, _Best]]:
-    return ((k, result) for k, result in enumerate(best) if result is not None)
 
 
 def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | None]) -> xr.Dataset:
@@ -152,39 +141,31 @@ def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | N
     activation, begun = np.full((2, n, bundles), np.nan)
     status, limit = np.full(n, Stop.NO_START, np.int8), np.zeros((n, bundles), bool)
     settles = np.zeros(n, bool)
-    for k, result in _rows(best):
-        force[k], status[k] = result.end.fixed.force, result.end.stop
-        limit[k] = result.end.limits[:bundles]
-        error[k] = result.end.slope * result.tip_error
-        activation[k], begun[k] = result.end.fixed.gamma[:bundles], result.start[:bundles]
-        settles[k] = result.settles
+    found = [(k, result) for k, result in enumerate(best) if result is not None]
+    for k, (start, end, tip_error, settled) in found:
+        force[k], status[k], settles[k] = end.fixed.force, end.stop, settled
+        error[k], limit[k] = end.slope * tip_error, end.limits[:bundles]
+        activation[k], begun[k] = end.fixed.gamma[:bundles], start[:bundles]
+    of_axes, of_bundles = ("place", "axis"), ("place", "bundle")
     units = activation_attributes(rod.arm)
     dead = np.array(yielding_rod(rod).loads.tip_force)
     acting = rod.pose.directions_to_world(dead) - force[:, None] * directions
+
+    def about(meaning: str, unit: str = "1") -> dict[str, str]:
+        return {"units": unit, "long_name": meaning}
+
     return xr.Dataset(
         {
-            "position": (("place", "axis"), places, {"units": "m"}),
-            "direction": (("place", "axis"), directions, {"units": "1"}),
-            "force": ("place", force, {"units": "N", "long_name": "blocked force"}),
-            "force_error": ("place", error, {"units": "N", "long_name": "error of the force"}),
-            "tip_force": (
-                ("place", "axis"),
-                acting,
-                {"units": "N", "long_name": "force that acts on the tip in the end"},
-            ),
-            "activation": (("place", "bundle"), activation, units),
-            "start_activation": (("place", "bundle"), begun, units),
+            "position": (of_axes, places, {"units": "m"}),
+            "direction": (of_axes, directions, {"units": "1"}),
+            "force": ("place", force, about("blocked force", "N")),
+            "force_error": ("place", error, about("error of the force", "N")),
+            "tip_force": (of_axes, acting, about("force that acts on the tip in the end", "N")),
+            "activation": (of_bundles, activation, units),
+            "start_activation": (of_bundles, begun, units),
             "status": ("place", status, {"units": "1", "meanings": _MEANINGS}),
-            "settles": (
-                "place",
-                settles,
-                {"units": "1", "long_name": "reached by the force alone, too"},
-            ),
-            "limit": (
-                ("place", "bundle"),
-                limit,
-                {"units": "1", "long_name": "at a bound that keeps the force from growing"},
-            ),
+            "settles": ("place", settles, about("reached by the force alone, too")),
+            "limit": (of_bundles, limit, about("at a bound that keeps the force from growing")),
         },
         {"axis": list(AXES), **bundle_coordinates(rod.arm)},
         {**provenance(rod.arm, rod.frame), "tol": rod.tol},

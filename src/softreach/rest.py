@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipStatus
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 __all__ = ["Rest", "rest"]
@@ -19,9 +19,9 @@ __all__ = ["Rest", "rest"]
 class Rest:
     """Equilibrium of an arm that nothing drives."""
 
-    activation: NDArray[np.float64]
+    activation: Array
     """The activation of least size within the bounds, zero where these hold it [unit]."""
-    tip: NDArray[np.float64]
+    tip: Array
     """Of the loaded arm in the world [m]; NaN without equilibrium."""
     sag: float
     """Distance by which the loads move the tip [m]; NaN without equilibrium."""

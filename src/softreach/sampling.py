@@ -14,8 +14,6 @@ from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
-__all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
-
 Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 
@@ -71,13 +69,10 @@ def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
 
 
 def _nothing(first: int, count: int) -> Array:
-    """The only point of a cube without dimensions, again and again."""
-    del first
     return np.empty((count, 0))
 
 
 def _uniform(n: int, dim: int, seed: int) -> Draw:
-    del n
     rng = np.random.default_rng(seed)
     return lambda first, count: rng.random((count, dim))
 
@@ -99,7 +94,6 @@ def _boundary(n: int, dim: int, seed: int) -> Draw:
 def _sobol(n: int, dim: int, seed: int) -> Draw:
     from scipy.stats import qmc
 
-    del n
     sequence = qmc.Sobol(dim, scramble=True, rng=np.random.default_rng(seed))
     # Blocks need not be powers of two, the whole is: its balance is what counts. SciPy would warn
     # of a first draw that is none, so that the first point is drawn by itself.
@@ -115,7 +109,6 @@ def _sobol(n: int, dim: int, seed: int) -> Draw:
 
 def _grid(n: int, dim: int, seed: int) -> Draw:
     """A lattice with both ends, the last coordinate running fastest."""
-    del seed
     side = _root(n, dim)
     ticks = np.linspace(0.0, 1.0, side) if side > 1 else np.array([0.5])
 
@@ -131,7 +124,6 @@ def _any(n: int, dim: int) -> str | None:
 
 
 def _power_of_two(n: int, dim: int) -> str | None:
-    del dim
     if n & (n - 1) == 0:
         return None
     low = 1 << (n.bit_length() - 1)

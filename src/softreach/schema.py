@@ -14,35 +14,13 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import as_numbers
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.versions import SCHEMA_VERSION, versions
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.geometry.lattice import CellGrid
-
-__all__ = [
-    "AXES",
-    "a_cloud",
-    "a_configuration",
-    "activation_attributes",
-    "activation_symbols",
-    "activation_units",
-    "base_of",
-    "bundle_coordinates",
-    "cell_dataset",
-    "check_cloud",
-    "check_stored_cloud",
-    "cloud_dataset",
-    "configuration_dataset",
-    "frame_of",
-    "is_stable",
-    "provenance",
-    "storable",
-    "tip_cells",
-    "with_status",
-]
 
 AXES = ("x", "y", "z")
 
@@ -63,11 +41,11 @@ _CONFIGURATION = {
     "radius": (("station",), "m", "outer radius R2 before activation"),
     "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
-_LINES = {
+_OTHERS = {  # where they are asked for
     "line_length": (("sample", "line"), "m", "length of the middle line of each bundle"),
     "bundle_activation": (("sample", "line"), None, "activation that drives and lengths lead to"),
+    "marker_position": (("sample", "marker", "axis"), "m", "place of each marker"),
 }
-_MARKERS = {"marker_position": (("sample", "marker", "axis"), "m", "place of each marker")}
 
 
 def cloud_dataset(
@@ -122,10 +100,9 @@ def configuration_dataset(
     """
     import xarray as xr
 
-    marked = "marker_position" in arrays
-    others = {name: about for name, about in (_MARKERS | _LINES).items() if name in arrays}
-    table = _CONFIGURATION | others
-    variables = _variables(table, arm, {**arrays, "activation": activation}, names)
+    others = {name: about for name, about in _OTHERS.items() if name in arrays}
+    arrays["activation"] = activation
+    variables = _variables(_CONFIGURATION | others, arm, arrays, names)
     if "bundle_activation" in variables:
         units = inner_arm(arm).bundle_units
         listed = units[0] if len(set(units)) == 1 else ", ".join(units)
@@ -135,8 +112,8 @@ def configuration_dataset(
         "axis": list(AXES),
         "director": ["d1", "d2", "d3"],
         "component": ["u1", "u2", "u3"],
-        **({"marker": [marker.name for marker in arm.markers]} if marked else {}),
-        **({"line": list(arm.bundle_names)} if "line_length" in arrays else {}),
+        **({"marker": [each.name for each in arm.markers]} if "marker_position" in others else {}),
+        **({"line": list(arm.bundle_names)} if "line_length" in others else {}),
         **bundle_coordinates(arm, names),
     }
     return xr.Dataset(variables, coordinates, provenance(arm, frame))
@@ -148,7 +125,6 @@ def a_cloud(name: str, value: object) -> xr.Dataset:
 
 
 def _along_axes(name: str, cloud: xr.Dataset) -> xr.Dataset:
-    """The cloud itself, if its axes are labeled x, y, z or not at all."""
     labels = tuple(map(str, cloud["axis"].values))
     if "axis" in cloud.coords and labels != AXES:
         raise InvalidInput(f"{name}.axis", ", ".join(labels), "x, y, z in this order")
@@ -188,43 +164,50 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
         InvalidInput: What is missing, of another type, or does not agree.
     """
     check_cloud(cloud)
-    for name, kind in (("tip", np.float64), ("activation", np.float64), ("status", np.int8)):
-        if name in cloud and cloud[name].dtype != kind:
-            allowed = f"of {np.dtype(kind)}"
-            raise InvalidInput(f"cloud.{name}", f"of type {cloud[name].dtype}", allowed)
-    for name, values in cloud.variables.items():
-        if values.dtype.kind not in "biufUOT":  # texts may be objects
-            raise InvalidInput(f"cloud.{name}", f"of type {values.dtype}", "of numbers or of texts")
-    for name, (types, allowed) in _ATTRIBUTES.items():
-        value = cloud.attrs.get(name)
-        if not isinstance(value, types) or isinstance(value, bool):
-            raise InvalidInput(f"cloud.attrs['{name}']", repr(value), allowed)
-    if not 0 < cloud.attrs["tol"] < np.inf:
-        raise InvalidInput("cloud.attrs['tol']", cloud.attrs["tol"], "a finite number > 0")
-    seed = cloud.attrs.get("seed", 0)  # a cloud of another program has none
-    if not isinstance(seed, int) or isinstance(seed, bool):
-        raise InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
-    frame_of(cloud)
-    arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
-    for what, shown, wanted in _disagreements(cloud, arm):
-        raise InvalidInput(f"cloud.{what}", shown, f"{wanted}, as its design says")
-    if "status" in cloud.coords and not np.isin(cloud["status"].values, np.arange(5)).all():
-        raise InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
+    for what, given, allowed in _faults(cloud):
+        raise InvalidInput(f"cloud.{what}", given, allowed)
     return cloud
 
 
+_KINDS = {"tip": np.float64, "activation": np.float64, "status": np.int8}
 _ATTRIBUTES = {
     "design": (str, "the text of a design file"),
     "softreach_version": (str, "a text"),
     "sampler": (str, "the name of a sampler"),
     "tol": ((int, float), "a number"),
+    "seed": (int, "a whole number"),  # a cloud of another program has none
 }
+
+
+def _faults(cloud: xr.Dataset) -> Iterator[tuple[str, Any, Any]]:
+    """What is wrong, what is there, and what is allowed; each needs that those before are right."""
+    for name, values in cloud.variables.items():
+        if values.dtype != (kind := np.dtype(_KINDS.get(str(name), values.dtype))):
+            yield str(name), f"of type {values.dtype}", f"of {kind}"
+        if values.dtype.kind not in "biufUOT":  # texts may be objects
+            yield str(name), f"of type {values.dtype}", "of numbers or of texts"
+    for name, (types, allowed) in _ATTRIBUTES.items():
+        value = cloud.attrs.get(name, 0 if name == "seed" else None)
+        if not isinstance(value, types) or isinstance(value, bool):
+            yield f"attrs['{name}']", repr(value), allowed
+    if not 0 < cloud.attrs["tol"] < np.inf:
+        yield "attrs['tol']", cloud.attrs["tol"], "a finite number > 0"
+    frame_of(cloud)
+    if "status" in cloud.coords and not np.isin(cloud["status"].values, np.arange(5)).all():
+        yield "status", "another number", f"one of {_STATUS}"
+    try:
+        arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
+    except InvalidDesign as error:
+        if all(fault.path.endswith(".kind") for fault in error.faults):
+            return  # classes that are not imported: the points can be used without them
+        raise
+    for what, given, wanted in _disagreements(cloud, arm):
+        yield what, given, f"{wanted}, as its design says"
 
 
 def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[tuple[str, Any, Any]]:
     """What of a cloud is not as its design has it: what is there, and what should be."""
-    named = {"axis": AXES, "bundle": arm.input_names, "unit": arm.input_units}
-    for name, wanted in named.items():
+    for name, wanted in (("axis", AXES), ("bundle", arm.input_names), ("unit", arm.input_units)):
         labels = cloud.get(name)
         if labels is not None and tuple(map(str, labels.values)) != tuple(wanted):
             yield name, ", ".join(map(str, labels.values)), ", ".join(wanted)
@@ -248,10 +231,8 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
 
 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
-    if names is None:
-        return arm.input_units
     of_name = dict(zip(arm.input_names, arm.input_units, strict=True))
-    return tuple(of_name[name] for name in names)
+    return tuple(of_name[name] for name in (arm.input_names if names is None else names))
 
 
 _SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}
@@ -284,12 +265,8 @@ def _variables(
 ) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
     activation = activation_attributes(arm, names)
     return {
-        name: (
-            dims,
-            arrays[name],
-            {**({"units": unit} if unit else activation), "long_name": meaning},
-        )
-        for name, (dims, unit, meaning) in table.items()
+        name: (dims, arrays[name], ({"units": unit} if unit else activation) | {"long_name": about})
+        for name, (dims, unit, about) in table.items()
     }
 
 
@@ -327,12 +304,18 @@ def base_of(data: xr.Dataset) -> Array:
 
 def storable(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with its names as variable-length strings, which Zarr v3 specifies."""
-    names = {
-        name: coordinate.astype(np.dtypes.StringDType())
-        for name, coordinate in dataset.coords.items()
-        if coordinate.dtype.kind == "U"
-    }
-    return dataset.assign_coords(names)
+    names = {name: each for name, each in dataset.coords.items() if each.dtype.kind == "U"}
+    texts = np.dtypes.StringDType()
+    return dataset.assign_coords({name: each.astype(texts) for name, each in names.items()})
+
+
+def stored_names(dataset: xr.Dataset) -> xr.Dataset:
+    """The inverse of `storable`: names that xarray can fill, join and pickle."""
+    names = {name: each for name, each in dataset.coords.items() if each.dtype.kind == "T"}
+    texts = {name: np.array(each.values.tolist(), dtype=str) for name, each in names.items()}
+    return dataset.assign_coords(
+        {name: (each.dims, texts[name], each.attrs) for name, each in names.items()}
+    )
 
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
@@ -361,9 +344,7 @@ def cell_dataset(
     """Variables, each with its attributes, over the centers x, y, z [m] of cubes."""
     import xarray as xr
 
-    centers = {
-        axis: (axis, places, {"units": "m"})
-        for axis, places in zip(AXES, grid.centers(), strict=True)
-    }
+    pairs = zip(AXES, grid.centers(), strict=True)
+    centers = {axis: (axis, places, {"units": "m"}) for axis, places in pairs}
     data = {name: (AXES, *content) for name, content in variables.items()}
     return xr.Dataset(data, centers, {"cell": grid.edge})

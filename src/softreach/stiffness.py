@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
@@ -16,7 +16,7 @@ from softreach.rod.rods import as_tip_map, of_tip
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
-from softreach.support.arrays import as_directions, as_floats
+from softreach.support.arrays import Array, as_directions, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ __all__ = [
     "stiffness_along",
     "tip_compliance",
 ]
-
-Array = NDArray[np.float64]
 
 
 def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
@@ -147,25 +145,16 @@ def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
         axes = principal_compliances(matrices[rows])
         largest[rows], smallest[rows] = axes.largest, axes.smallest
         soft[rows] = axes.displacements[:, 0]
-    named = {"units": "m/N", "scale": "log"}
+    each, size = ("sample", "axis"), {"units": "m/N", "scale": "log"}
+    most, least = ({"long_name": f"{which} compliance"} for which in ("largest", "smallest"))
+    whole = {"units": "m/N", "long_name": "compliance of the tip"}
+    along = {"units": "1", "long_name": "direction of the largest compliance"}
     return xr.Dataset(
         {
-            "compliance": (
-                ("sample", "axis", "force"),
-                matrices,
-                {"units": "m/N", "long_name": "compliance of the tip"},
-            ),
-            "largest_compliance": ("sample", largest, named | {"long_name": "largest compliance"}),
-            "smallest_compliance": (
-                "sample",
-                smallest,
-                named | {"long_name": "smallest compliance"},
-            ),
-            "softest_direction": (
-                ("sample", "axis"),
-                soft,
-                {"units": "1", "long_name": "direction of the largest compliance"},
-            ),
+            "compliance": ((*each, "force"), matrices, whole),
+            "largest_compliance": ("sample", largest, size | most),
+            "smallest_compliance": ("sample", smallest, size | least),
+            "softest_direction": (each, soft, along),
         },
         {"axis": list(AXES), "force": list(AXES)},
         cloud.attrs,

@@ -79,7 +79,7 @@ REFUSED = {
     "design lce_arm --payload -2g": "payload = -2g: must be a mass >= 0",
     "design lce_arm --gravity Down": "gravity = Down: must be down, up, sideways, none, or",
     "design lce_arm --gravity 0,0,-9.81N": "three finite numbers x,y,z in m/s²",
-    "design lce_arm --base hanging --gravity hanging": "its base, which points down",
+    "design lce_arm --gravity hanging": "gravity = hanging: must be down, up, sideways, none, or",
     "design lce_arm --base=z": "must be one of upright, hanging, up, down, x, -x, y, -y",
     "design lce_arm --tip-force 1,2": "tip_force = 1,2: must be three finite numbers x,y,z in N",
     "design lce_arm --set taper": "set = taper: must be PATH=VALUE",

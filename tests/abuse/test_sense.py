@@ -93,13 +93,6 @@ def test_a_mesh_is_never_unpacked(tmp_path):
     assert ".stl, .ply" in str(raised_by(lambda: Mesh.load(tmp_path / "bomb.zip", unit="m")))
 
 
-@pytest.mark.parametrize("date", ["x", "-1", "9" * 20])
-def test_a_date_of_the_environment_that_is_none_is_refused(date, monkeypatch, capsys, tmp_path):
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", date)
-    said = refusal_of(["show", "minimal_trunk", "--out", str(tmp_path / "a.pdf")], capsys, tmp_path)
-    assert "SOURCE_DATE_EPOCH" in said
-
-
 def test_names_are_drawn_as_they_are(tmp_path):
     pytest.importorskip("matplotlib")
     cloud = sr.compute_cloud(sr.designs.redundant_trunk(), 500)

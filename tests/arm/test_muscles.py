@@ -308,9 +308,3 @@ def test_an_architecture_of_several_bundles_is_refused():
     pair = FiberArchitecture(revolution=0.0, extent=0.3, bundles=2)
     with pytest.raises(InvalidInput, match=r"fiber 1\.bundles = 2.*independent already"):
         arm_of(pair).split(0, 2)
-
-
-def test_the_parts_of_a_fiber_without_a_name_have_none():
-    parts = FiberArchitecture(helical_angle=0.0, extent=0.3).split(2)
-    assert [part.name for part in parts] == ["", ""]
-    assert arm_of(*parts).bundle_names == ("fiber 1", "fiber 2")

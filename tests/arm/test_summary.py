@@ -25,7 +25,7 @@ from softreach.arm import (
     Tendon,
     designs,
 )
-from softreach.arm.actuators.ring_integrals import ring_integrals
+from softreach.arm.actuators.sector import ring_integrals
 from softreach.arm.bending import (
     bending_at,
     largest_bending,

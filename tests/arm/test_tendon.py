@@ -21,7 +21,7 @@ from softreach.arm import (
     Section,
     Tendon,
 )
-from softreach.arm.linear_law import law_warning, pull_error
+from softreach.arm.lines import law_warning, pull_error
 from softreach.arm.parameters import changed
 from softreach.arm.tables import tables
 from softreach.rod.summary import describe

@@ -24,7 +24,7 @@ from softreach.arm import (
     Section,
     Tendon,
 )
-from softreach.arm.load_number import load_number, mass
+from softreach.arm.body import load_number, mass
 from softreach.arm.loads import GRAVITY
 from softreach.arm.parameters import changed, parameters
 from softreach.arm.tables import compliance, tables

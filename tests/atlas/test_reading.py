@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from functools import partial
 from pathlib import Path
 
@@ -27,10 +28,9 @@ from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command
 from softreach.cli.app import run
-from softreach.paper.atlas_figures import hulls_of
 from softreach.picture.projection import view_axes
-from softreach.plot import box_over_length, plot_metric_map
-from softreach.plot.atlas import panel_extent
+from softreach.plot import plot_metric_map
+from softreach.plot.sheets import box_over_length, hull_over_length, panel_extent
 from softreach.support.errors import InvalidInput
 from tests.atlas.families import (
     SMALL,
@@ -51,6 +51,47 @@ def test_stored_clouds_are_those_of_the_cloud_alone_to_half_a_step(paper):
     assert stored.activation.equals(alone.activation)
     assert np.abs(stored.tip.values - alone.tip.values).max() <= 0.5e-5 * (1 + 1e-9)
     assert stored.attrs == alone.attrs
+
+
+EVERYDAY = {
+    "where": lambda data, dim: data.where(data[dim] == data[dim]),
+    "where drop": lambda data, dim: data.where(data[dim] > data[dim][0], drop=True),
+    "reindex": lambda data, dim: data.reindex({dim: [*data[dim].values, 1e3]}),
+    "merge": lambda data, dim: xr.merge([data, data], compat="override", join="outer"),
+    "fillna": lambda data, dim: data.fillna(0.0),
+    "max": lambda data, dim: data.max(),
+    "mean": lambda data, dim: data.mean(dim),
+    "diff": lambda data, dim: data.diff(dim),
+    "sel": lambda data, dim: data.sel({dim: data[dim][-1]}),
+    "sortby": lambda data, dim: data.sortby(dim, ascending=False),
+    "concat": lambda data, dim: xr.concat([data, data], "again"),
+    "to_dataframe": lambda data, dim: data.drop_dims("sample").to_dataframe(),
+    "pickle": lambda data, dim: pickle.loads(pickle.dumps(data.load())),
+}
+
+
+@pytest.mark.parametrize("operation", EVERYDAY.values(), ids=EVERYDAY)
+def test_an_atlas_that_was_read_is_a_dataset_like_any_other(whole, operation):
+    operation(whole, "taper")._repr_html_()
+
+
+@pytest.mark.parametrize("name", ["where", "where drop", "reindex", "max", "diff", "pickle"])
+def test_so_is_a_cloud(tmp_path, trunk, name):
+    sr.save_cloud(sr.compute_cloud(trunk, 50), tmp_path / "cloud.zarr")
+    cloud = sr.open_cloud(tmp_path / "cloud.zarr")
+    numbered = cloud.assign_coords(sample=np.arange(50.0))
+    EVERYDAY[name](numbered, "sample")._repr_html_()
+    assert cloud.reindex(axis=["z", "none"]).tip.isnull().any()
+
+
+def test_a_cloud_of_somebodys_own_actuator_opens_without_its_module(tmp_path, trunk):
+    cloud = sr.compute_cloud(trunk, 50)
+    cloud.attrs["design"] = cloud.attrs["design"].replace('kind = "fiber"', 'kind = "Magnets"')
+    sr.save_cloud(cloud, tmp_path / "cloud.zarr")
+    found = sr.open_cloud(tmp_path / "cloud.zarr")
+    assert sr.convex_hull(found.tip).volume == sr.convex_hull(cloud.tip).volume
+    with pytest.raises(sr.InvalidDesign, match="Magnets.*--import"):
+        sr.cloud.design_of(found)
 
 
 def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
@@ -80,17 +121,17 @@ def test_designs_with_more_bundles_share_the_activations_of_the_others(tmp_path)
 
 
 def test_best_designs_are_the_best_that_meet_the_constraints(paper):
-    found = best_designs(paper, "volume", where={"taper": (None, 0.01)}, count=3)
+    found = best_designs(paper, "volume", where="taper<=0.01", count=3)
     truth = np.sort(paper.volume.sel(taper=0.0).values)[::-1]
     np.testing.assert_array_equal(found.volume, truth[:3])
-    for where in (["taper_deg<=0.57"], "taper<=0.01", {"taper_deg": (None, 0.57)}):
+    for where in (["taper_deg<=0.57"], "taper_deg<0.57"):
         assert best_designs(paper, "volume", where=where, count=3).identical(found)
     between = best_designs(paper, "volume", where=["taper_deg>=0.9", "taper_deg<=2.1"], count=99)
     taper = np.degrees(between.taper)
     assert 0.9 < taper.min() <= taper.max() < 2.1  # both constraints of one name
     least = best_designs(paper, "unreachability", smallest=True)
     np.testing.assert_allclose(least.unreachability, [paper.unreachability.min()])
-    assert best_designs(paper, "volume", where={"volume": (9.0, None)}).sizes["rank"] == 0
+    assert best_designs(paper, "volume", where=["volume>=9"]).sizes["rank"] == 0
     with pytest.raises(InvalidInput, match="metric = volumes: must be one of"):
         best_designs(paper, "volumes")
 
@@ -215,11 +256,10 @@ def test_maps_and_hulls_of_an_atlas_over_length_are_relative_to_each_length(tmp_
     best = float((atlas.volume / np.array([0.5, 2.0]) ** 3).max())
     marked = plot_metric_map(atlas, "volume").texts[-1].get_text()
     assert marked == f"{best:.3f}"
-    hull_at = hulls_of(atlas)
-    for column in range(2):
-        for row in range(2):
-            volume = float(over_length(atlas, "volume")[column, row])
-            np.testing.assert_allclose(hull_at(column, row).volume, volume, rtol=1e-3)
+    for place in np.ndindex(2, 2):
+        volume = over_length(atlas, "volume")[place]
+        cloud = atlas_cloud(atlas, revolution=volume.revolution, length=volume["length"])
+        np.testing.assert_allclose(hull_over_length(cloud, 0.5).volume, volume, rtol=1e-3)
 
 
 # `softreach atlas`: what it prints, draws and refuses
@@ -255,6 +295,12 @@ def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
     assert run(["atlas", "best", store, "volume", "--where", "taper_deg<=1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["taper_deg"] == [0.0]
+    design = tmp_path / "best.toml"
+    assert run(["atlas", "best", store, "volume", "--out", str(design)]) == 0
+    best = best_designs(open_atlas(store), "volume")
+    taper = float(best.taper[0])
+    assert sr.Manipulator.load(design) == sr.designs.minimal_trunk(taper=taper)
+    assert run(["atlas", "best", store, "volume", "--where", "volume>=9", "--out", "a.toml"]) == 2
 
 
 def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
@@ -322,7 +368,7 @@ def test_a_file_names_the_same_paths(table):
 
 def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
     pytest.importorskip("matplotlib")
-    from softreach.plot import plot_metric_map, sheet_axes
+    from softreach.plot.atlas import plot_metric_map, sheet_axes
 
     atlas = varied(tmp_path / "a.zarr")
     across, up = sheet_axes(atlas)

@@ -87,12 +87,24 @@ MODULUS = "rings[0].material.young_modulus"
 """Young's modulus of all arms here."""
 
 
-def measured(arm, count=20, noise=2e-4, seed=0, inputs=None):
-    """Poses of an arm as a laboratory would have them: columns of inputs, and places with noise."""
+def measured(arm, count=20, noise=2e-4, seed=0, inputs=None, shared=0.0, runs=1):
+    """Poses of an arm as a laboratory would have them: columns of inputs, and places with noise.
+
+    Each run shares an error besides [m].
+    """
     inputs = random_inputs(arm, count, seed) if inputs is None else inputs
-    places = sr.rod.marker_positions(arm, inputs, 1e-8)
-    places = places + noise * np.random.default_rng(seed + 1).standard_normal(places.shape)
-    return table(places, inputs, arm.input_names, [marker.name for marker in arm.markers])
+    if arm.markers:
+        places = sr.rod.marker_positions(arm, inputs, 1e-9)
+    else:
+        places = sr.tip_positions(arm, inputs, 1e-9)[:, None]
+    rng = np.random.default_rng(seed + 1)
+    run = np.arange(len(inputs)) % runs
+    places = places + noise * rng.standard_normal(places.shape)
+    places = places + shared * rng.standard_normal((runs, *places.shape[1:]))[run]
+    unit = {"m": "mm"}.get(arm.input_units[0], "N")
+    markers = [marker.name for marker in arm.markers] or ["tip"]
+    data = table(places, inputs, arm.input_names, markers, unit)
+    return data | {"run": [f"run {k}" for k in run]} if runs > 1 else data
 
 
 def on_the_bench(arm):

@@ -17,7 +17,6 @@ from tests.calibration.arms import (
     on_the_bench,
     pulled_wire,
     random_inputs,
-    table,
 )
 
 ARM = hanging_tentacle()
@@ -206,10 +205,7 @@ def test_a_number_that_ran_away_is_warned_of_and_has_no_error_of_0():
     tendon = pulled_wire().actuators[1]
     arm = pulled_wire().replace(actuators=(tendon,))
     stiff = arm.replace(actuators=(tendon.replace(tendon_stiffness=None),))
-    x = 0.3 * random_inputs(stiff, 10)
-    places = sr.tip_positions(stiff, x, 1e-9)[:, None]
-    places = places + 2e-3 * np.random.default_rng(0).standard_normal(places.shape)
-    data = table(places, x, stiff.input_names, ["tip"], "mm")
+    data = measured(stiff, noise=2e-3, seed=-1, inputs=0.3 * random_inputs(stiff, 10))
     name = "s2.tendon_stiffness"
     with pytest.warns(SoftreachWarning) as caught:
         result = sr.calibrate(arm, data, free=["pose.z", name], rivals=False)

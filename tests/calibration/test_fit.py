@@ -6,31 +6,11 @@ import pytest
 import softreach as sr
 from softreach.calibration.calibration import leave_one_run_out
 from softreach.calibration.errors import judged, repeatability
+from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import read_measurements
+from softreach.calibration.model import MarkerModel
 from softreach.rod.kinematics import marker_positions
-from tests.calibration.arms import hanging_tentacle, pulled_wire, random_inputs, table
-
-MODULUS = "rings[0].material.young_modulus"
-
-
-def columns(arm, inputs, places):
-    """A table of measured poses."""
-    names = [name.replace(" ", "_") for name in arm.input_names]
-    unit = arm.input_units[0]
-    markers = [marker.name for marker in arm.markers] or ["tip"]
-    return table(places, inputs, names, markers, "mm" if unit == "m" else unit)
-
-
-def measured(arm, count, noise=0.0, seed=0, shared=0.0, runs=1):
-    """Poses of an arm with noise of each coordinate, and an error that each run shares [m]."""
-    rng = np.random.default_rng(seed)
-    inputs = random_inputs(arm, count, seed)
-    places = marker_positions(arm, inputs, 1e-9)
-    run = np.arange(count) % runs
-    places = places + noise * rng.standard_normal(places.shape)
-    places = places + shared * rng.standard_normal((runs, *places.shape[1:]))[run]
-    data = columns(arm, inputs, places)
-    return data | {"run": [f"run {k}" for k in run]} if runs > 1 else data
+from tests.calibration.arms import MODULUS, hanging_tentacle, measured, pulled_wire, random_inputs
 
 
 def test_poses_without_noise_lead_back_to_the_arm():
@@ -41,7 +21,7 @@ def test_poses_without_noise_lead_back_to_the_arm():
         actuators=(truth.actuators[0].replace(distance=0.007),),
     )
     free = ["pose", "t.distance", "rest.curvature_x", "markers.half.offset[0]"]
-    data = measured(truth, 5)
+    data = measured(truth, 5, noise=0.0)
     # Gravity is known in the world, so that the data says which way is up.
     result = sr.calibrate(start, data, free=free, rivals=False, robust=False)
     assert result.train.rms < 1e-6
@@ -54,8 +34,7 @@ def test_tendons_driven_by_length_are_found_with_their_slack():
     truth = pulled_wire()
     tendon = truth.actuators[0].replace(slack=0.4e-3, tendon_stiffness=5e3)
     truth = truth.replace(actuators=(tendon, truth.actuators[1]))
-    inputs = 0.3 * random_inputs(truth, 40)
-    data = columns(truth, inputs, sr.tip_positions(truth, inputs, 1e-9)[:, None])
+    data = measured(truth, noise=0.0, inputs=0.3 * random_inputs(truth, 40))
     free = ["s1.slack", "s1.tendon_stiffness", "pose.z"]
     result = sr.calibrate(pulled_wire(), data, free=free, rivals=False, robust=False)
     assert result.values["s1.slack"] == pytest.approx(0.4e-3, abs=2e-6)
@@ -65,12 +44,10 @@ def test_tendons_driven_by_length_are_found_with_their_slack():
 def test_a_prior_and_the_data_share_a_number_by_their_widths():
     truth = hanging_tentacle()
     data = measured(truth, 12, noise=1e-3)
-    alone = sr.calibrate(truth, data, free=[MODULUS], rivals=False, robust=False, noise=1e-3)
+    options = {"free": [MODULUS], "rivals": False, "robust": False, "noise": 1e-3}
+    alone = sr.calibrate(truth, data, **options)
     mean, sigma = alone.values[MODULUS], alone.sigma[MODULUS]
-    prior = {MODULUS: (mean + 4 * sigma, sigma)}
-    both = sr.calibrate(
-        truth, data, free=[MODULUS], prior=prior, rivals=False, robust=False, noise=1e-3
-    )
+    both = sr.calibrate(truth, data, prior={MODULUS: (mean + 4 * sigma, sigma)}, **options)
     middle = (both.values[MODULUS] - mean) / (4 * sigma)
     assert 0.3 < middle < 0.7
 
@@ -110,9 +87,8 @@ def test_errors_shared_by_runs_widen_the_intervals():
     data = measured(arm, 48, noise=3e-4, shared=2e-3, runs=12)
     by_run = sr.calibrate(arm, data, free=[MODULUS], rivals=False)
     assert by_run.uncertainty.clusters == "run"
-    unaware = sr.calibrate(
-        arm, {k: v for k, v in data.items() if k != "run"}, free=[MODULUS], rivals=False
-    )
+    del data["run"]
+    unaware = sr.calibrate(arm, data, free=[MODULUS], rivals=False)
     assert by_run.values == unaware.values
     assert by_run.sigma[MODULUS] != pytest.approx(unaware.sigma[MODULUS], rel=0.05)
 
@@ -128,6 +104,13 @@ def test_bands_are_those_of_the_arms_that_are_as_likely():
     np.testing.assert_allclose(spread, sigma, rtol=0.3, atol=1e-6)
 
 
+def test_a_row_that_names_no_run_leaves_the_others_theirs():
+    arm = hanging_tentacle()
+    data = measured(arm, 12, runs=3)
+    data["run"][4] = None
+    assert {"run 0", "run 1", "run 2"} < {*read_measurements(arm, data).run_names}
+
+
 def test_a_run_left_out_is_predicted_by_the_others():
     arm = hanging_tentacle()
     errors = leave_one_run_out(arm, measured(arm, 12, noise=1e-3, runs=3), free=[MODULUS])
@@ -140,7 +123,7 @@ def test_samples_far_off_are_slips_if_they_are_few_and_of_different_inputs():
     corners = np.stack(np.meshgrid(*[[0.0, 2.0]] * 3), axis=-1).reshape(-1, 3)
     inputs = np.tile(corners, (15, 1))
     left = 1e-3 * np.random.default_rng(0).standard_normal((len(inputs), 2, 3))
-    data = read_measurements(arm, columns(arm, inputs, marker_positions(arm, inputs) - left))
+    data = read_measurements(arm, measured(arm, inputs=inputs))
 
     def verdict(rows):
         far = np.isin(np.arange(len(inputs)), rows)
@@ -153,3 +136,95 @@ def test_samples_far_off_are_slips_if_they_are_few_and_of_different_inputs():
     assert "11 of 120 rows are far off, more than slips would be" in many.sentence
     assert "15 of 15 rows with inputs such as" in one.sentence
     assert {many.limit, one.limit} == {"physics"}
+
+
+HEAVY = sr.Loads(payload=0.01, payload_arm=(0.005, 0.0, 0.02), tip_force=(0.02, 0.0, 0.0))
+LIGHT = sr.Loads(payload=0.002)
+
+
+def model_of(arm, free, inputs):
+    count = max(1, len(arm.markers))
+    return MarkerModel(free_numbers(arm, free), inputs, np.arange(count))
+
+
+@pytest.mark.parametrize("arm", [hanging_tentacle(), hanging_tentacle(HEAVY)])
+def test_places_are_those_of_the_markers(arm):
+    inputs = random_inputs(arm, 5)
+    places = model_of(arm, ["pose"], inputs).of_arm(arm).places
+    np.testing.assert_allclose(places, marker_positions(arm, inputs, 1e-9), atol=1e-8)
+
+
+@pytest.mark.parametrize("loads", [None, LIGHT])
+def test_places_are_those_of_tips_pulled_by_length(loads):
+    arm = pulled_wire(loads)
+    inputs = 0.3 * random_inputs(arm, 4)
+    places = model_of(arm, ["pose"], inputs).of_arm(arm).places
+    np.testing.assert_allclose(places[:, 0], sr.tip_positions(arm, inputs, 1e-9), atol=2e-7)
+
+
+def by_differences(model, values, way):
+    """Derivative of places along a direction of the values, of fourth order."""
+    step = 2e-3
+    places = [model.predict(values + k * step * way).places for k in (-2, -1, 1, 2)]
+    return (places[0] - 8 * places[1] + 8 * places[2] - places[3]) / (12 * step)
+
+
+TENTACLE = [
+    "pose",
+    "rings[0].material.young_modulus",
+    "rings[0].material.density",
+    "rings[0].material.poisson_ratio",
+    "length",
+    "outer_radius",
+    "taper",
+    "t.distance",
+    "t.offset",
+    "t.end_over_length",
+    "rest.curvature_y",
+    "markers.half.station",
+    "markers.tool.offset[0]",
+]
+WIRE = [
+    "pose",
+    "s1.tendon_stiffness = s2.tendon_stiffness",
+    "s1.slack",
+    "s2.distance",
+    "s2.offset",
+    "rest.curvature_x",
+    "rest.twist",
+    "length",
+    "outer_radius",
+    "s1.end_over_length",
+]
+
+
+@pytest.mark.parametrize(
+    ("arm", "free", "share", "each"),
+    [
+        pytest.param(hanging_tentacle(), TENTACLE, 1.0, True, id="tentacle"),
+        pytest.param(hanging_tentacle(HEAVY), TENTACLE, 1.0, False, id="heavy tentacle"),
+        pytest.param(pulled_wire(), WIRE, 0.3, True, id="wire"),
+        pytest.param(pulled_wire(LIGHT), WIRE, 0.3, False, id="heavy wire"),
+        *(
+            pytest.param(*case, id=name, marks=pytest.mark.large)
+            for name, case in {
+                "each of a heavy tentacle": (hanging_tentacle(HEAVY), TENTACLE, 1.0, True),
+                "each of a heavy wire": (pulled_wire(LIGHT), WIRE, 0.3, True),
+            }.items()
+        ),
+    ],
+)
+def test_derivatives_are_those_of_differences(arm, free, share, each, rng):
+    """By each number, or along two directions in which all of them change."""
+    model = model_of(arm, free, share * random_inputs(arm, 2, seed=3))
+    values = model.free.start
+    slopes = model.predict(values, slopes=True).slopes
+    assert slopes is not None
+    count = len(values)
+    ways = np.eye(count) if each else rng.choice([-1, 1], (2, count)) / np.sqrt(count)
+    for way in ways * np.maximum(model.free.scale, 0.3 * np.abs(values)):
+        change = by_differences(model, values, way)
+        worst = np.abs(slopes @ way - change).max()
+        reach = max(np.abs(change).max(), 1e-3 * arm.length)
+        # Tensions under loads are found to 1e-11 L, over a step of 2e-3 of the scale.
+        assert worst <= 1e-7 * reach + (3e-7 * reach if arm.loads else 0.0), way

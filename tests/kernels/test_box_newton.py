@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear, minimize
 from softreach.arm import designs
 from softreach.inverse.least_change import sqp
 from softreach.inverse.request import Request
-from softreach.kernels.box.box_newton import box_steps
+from softreach.kernels.box.bounded_descent import box_steps
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.complementarity import complementary
 from softreach.rod import as_tip_map

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softreach.inverse.cells import ImageLeaves, image_tree
-from softreach.kernels.branches import candidates, folds
+from softreach.kernels.branches import candidates, newton
 from softreach.kernels.branches.candidates import MOST_STARTS, find_starts
 from softreach.kernels.branches.space_tree import SpaceTree, leaf_at
 from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic, sampled
@@ -161,7 +161,7 @@ def second_preimages(mesh, f, gamma, reach, low=-FAR, high=FAR):
     start, near = np.full_like(gamma, np.nan), np.zeros(len(gamma), bool)
     cell = np.zeros(len(gamma), np.int64)
     bounds = low, high
-    folds.second_preimages(
+    newton.second_preimages(
         mesh, cell, gamma, slope, smallest, reach, OVERSHOOT, *bounds, start, near
     )
     return start, near

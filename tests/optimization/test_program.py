@@ -1,18 +1,33 @@
-"""Values and derivatives of a polish against differences."""
+"""The program of a design: derivatives against differences, and what they say of an optimum."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import softreach as sr
-from softreach.optimization.design_point import DesignPoint
+from softreach.arm.body import mass
+from softreach.arm.parameters import changed, find_parameter
+from softreach.optimization import sensitivity
 from softreach.optimization.free_parameters import free_parameters
-from softreach.optimization.objectives import goals
 from softreach.optimization.polish import point_of
-from softreach.optimization.problem import Problem
-from softreach.optimization.program import Point, stacked, stacked_slopes
+from softreach.optimization.problem import (
+    Candidate,
+    DesignCase,
+    Goal,
+    Objective,
+    Problem,
+    Value,
+    goals,
+)
+from softreach.optimization.program import DesignPoint, Point, stacked, stacked_slopes
 from softreach.requirements import Box, Keep, Limits, Requirements, Sphere, Target
+from softreach.support.errors import InvalidInput, NotPossible
+from softreach.workspace import volume_gradient
 
 ARM = sr.designs.minimal_trunk(revolution=np.radians(40), taper=np.radians(2))
 PLACES = sr.tip_positions(ARM, [[-0.4, -0.7, -0.2], [-0.9, -0.2, -0.6]])
@@ -32,14 +47,14 @@ NEEDS = Requirements(
 )
 
 
-def problem(needs, free=FREE, **options):
+def problem(needs, free=FREE, arm=ARM, coarse=0.03, **options):
     """A problem of the arm."""
     return Problem(
-        parameters=free_parameters(ARM, free),
+        parameters=free_parameters(arm, free),
         requirements=needs,
         goals=goals(options.get("maximize", ()), options.get("minimize", ()), needs),
         accuracy=0.01,
-        coarse=0.03,
+        coarse=coarse,
     )
 
 
@@ -101,7 +116,7 @@ def test_rooms_are_differentiated(start):
 
 def test_coverage_of_a_region_is_differentiated_by_what_the_boundary_sweeps(monkeypatch):
     # as many places as the differences need
-    monkeypatch.setattr("softreach.optimization.design_point._PLACES", 1 << 16)
+    monkeypatch.setattr("softreach.optimization.program._PLACES", 1 << 16)
     needs = Requirements(targets=[Target(region=Sphere(tuple(PLACES[0]), 0.3), share=0.1)])
     of = problem(needs, {"length": (0.8, 1.2), "lower": (-2.0, -1.0)}, maximize="coverage")
     values = {"length": 1.0, "lower": -5.0 / 3.0}
@@ -119,13 +134,7 @@ def test_poses_and_shares_are_those_of_the_arm_under_each_payload():
     rubber = sr.Material(young_modulus=1e6, density=1000.0)
     arm = sr.designs.minimal_trunk(length=0.3, material=rubber)
     needs = Requirements(targets=[Target(region=Sphere((0, 0, 0.2), 0.1))], payloads=(0.0, 0.1))
-    of = Problem(
-        parameters=free_parameters(arm, {"taper": (0.0, 0.05)}),
-        requirements=needs,
-        goals=goals("coverage", (), needs),
-        accuracy=0.1,
-        coarse=0.1,
-    )
+    of = problem(needs, {"taper": (0.0, 0.05)}, arm, 0.1, maximize="coverage")
     design = DesignPoint(of, {"taper": 0.01}, 0.1)
     gamma = np.array([[-0.4, -0.7, -0.2]])
     for rod, payload in zip(design.rods, needs.payloads, strict=True):
@@ -136,3 +145,126 @@ def test_poses_and_shares_are_those_of_the_arm_under_each_payload():
     shares = [design.share(number, needs.targets[0].region) for number in range(2)]
     assert shares[0] != shares[1]
     np.testing.assert_allclose(shares, checked, atol=0.15)
+
+
+NARROW = sr.designs.minimal_trunk(
+    material=sr.Material(young_modulus=1e6, density=1000.0)
+).with_bounds((-0.9, -0.3))
+"""One to one: its volume is exact."""
+
+
+def within(free, needs=None, **options):
+    """A problem of the narrow arm."""
+    return problem(needs or Requirements(), free, NARROW, coarse=0.05, **options)
+
+
+def test_a_multiplier_is_the_derivative_of_the_optimum_by_its_requirement():
+    radius = find_parameter(NARROW, "outer_radius").value(NARROW)
+    ends = (0.95 * radius, 1.05 * radius)
+    limit = mass(NARROW)
+
+    def best(most):
+        size: Any = brentq(lambda r: mass(changed(NARROW, {"outer_radius": r})) - most, *ends)
+        return sr.reachable_set(changed(NARROW, {"outer_radius": size})).volume
+
+    # The volume falls as the arm becomes thicker: the least is where its mass ends.
+    needs = Requirements(limits=Limits(mass=limit))
+    asked = within({"outer_radius": ends}, needs, minimize="exact_volume")
+    result = sensitivity(asked, Candidate(values={"outer_radius": radius}), n=0)
+    (multiplier,) = result.multipliers
+    expected = (best(1.01 * limit) - best(0.99 * limit)) / (0.02 * limit)
+    assert multiplier.name == "mass"
+    assert multiplier.value == pytest.approx(-expected, rel=1e-3)
+    assert result.residual < 1e-6
+
+
+def test_an_end_of_a_range_decides_where_nothing_else_does():
+    value = find_parameter(NARROW, "taper").value(NARROW)
+    asked = within({"taper": (value, value + 0.01)}, minimize="exact_volume")
+    result = sensitivity(asked, Candidate(values={"taper": value}), n=0)
+    slope = volume_gradient(NARROW, "taper").volume[0]
+    names = [each.name for each in result.multipliers]
+    assert names == (["low end of taper"] if slope > 0 else [])
+    assert result.gradient[0, 0] == pytest.approx(slope, rel=1e-3)
+
+
+def test_a_target_on_the_boundary_decides_by_one_number():
+    place = sr.tip_positions(NARROW, [[-0.9, -0.5, -0.6]])
+    needs = Requirements(targets=(Target(place),))
+    asked = within({"length": (0.9, 1.1)}, needs, minimize="mean_effort")
+    result = sensitivity(asked, Candidate(values={"length": NARROW.length}), n=0)
+    assert "place 1" in {each.name for each in result.multipliers}
+    assert all(each.value > 0.0 for each in result.multipliers)
+
+
+def test_effort_is_differentiated_with_poses_that_follow():
+    place = sr.tip_positions(NARROW, [[-0.7, -0.5, -0.6]])
+    needs = Requirements(targets=(Target(place),))
+    asked = within({"length": (0.9, 1.1)}, needs, minimize="mean_effort")
+    result = sensitivity(asked, Candidate(values={"length": NARROW.length}), n=0)
+    step = 1e-3
+    ends = [
+        DesignCase(
+            changed(NARROW, {"length": NARROW.length + side}), needs, 1e-2
+        ).check.effort.mean()
+        for side in (-step, step)
+    ]
+    assert result.gradient[0, 0] == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-3)
+
+
+def of_design(name, compute):
+    """A goal that is a function of the arm."""
+    return Goal(
+        Objective(name=name, unit="1", meaning="", compute=lambda case: compute(case.arm)), 1.0
+    )
+
+
+def test_indices_of_a_sum_are_shares_of_its_variances():
+    ends = {"length": (0.9, 1.1), "taper": (0.0, 0.01)}
+    known = {name: find_parameter(NARROW, name) for name in ends}
+
+    def total(arm):
+        first, second = (
+            (known[name].value(arm) - low) / (high - low) for name, (low, high) in ends.items()
+        )
+        return Value(2.0 * first + second)
+
+    asked = replace(
+        within(ends), goals=(of_design("sum", total), of_design("1", lambda _: Value(1.0)))
+    )
+    best = Candidate(values={"length": 1.0, "taper": 0.005})
+    shares, constant = sensitivity(asked, best, n=256).variance
+    expected = np.array([0.8, 0.2])
+    for got, error in ((shares.first, shares.first_error), (shares.total, shares.total_error)):
+        assert (np.abs(got - expected) < np.maximum(3.0 * error, 0.02)).all()
+        assert (error < 0.2).all()
+    assert not constant.total.any()
+
+
+def test_all_variance_is_that_of_the_only_parameter():
+    best = Candidate(values={"taper": 0.01})
+    (shares,) = sensitivity(within({"taper": (0.0, 0.02)}, maximize="mass"), best, n=64).variance
+    assert shares.total == pytest.approx(1.0, abs=0.05)
+
+
+def test_no_shares_are_said_of_ranges_in_which_a_design_cannot_exist():
+    asked = within({"rings[0].inner_ratio": (0.5, 0.9), "taper": (0.0, 0.12)}, maximize="mass")
+    best = Candidate(values={"rings[0].inner_ratio": 0.7, "taper": 0.01})
+    assert sensitivity(asked, best, n=16).variance == (None,)
+    existing = replace(
+        asked,
+        parameters=free_parameters(
+            NARROW, {"rings[0].inner_ratio": (0.5, 0.9), "taper": (0.0, 0.02)}
+        ),
+    )
+    (shares,) = sensitivity(existing, best, n=16).variance
+    assert shares.total[1] > 0.5
+    assert shares.total[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_problem_needs_a_design_and_rows_a_power_of_two():
+    asked = within({"taper": (0.0, 0.02)}, maximize="mass")
+    with pytest.raises(NotPossible, match="candidate"):
+        sensitivity(asked)
+    with pytest.raises(InvalidInput, match="power of two"):
+        sensitivity(asked, Candidate(values={"taper": 0.01}), n=12)

@@ -217,13 +217,13 @@ class _Shooting:
     def _rates(self, z: float, flat: Complex, load: Complex) -> Complex:
         y, rod = flat.reshape(18, -1), self.rod
         frame, moment, force = y[3:12].reshape(3, 3, -1), y[12:15], y[15:]
-        k1, k3, growth = rod.bending(z), rod.torsion(z), rod.grown(z)
+        k1, k3, eta = rod.bending(z), rod.torsion(z), rod.grown(z)
         in_directors = (frame * moment[:, None]).sum(axis=0)
         u = np.asarray(rod.curvature(z))[:, None] + in_directors / np.array([[k1], [k1], [k3]])
-        turn = _turned(frame, growth * u)
+        turn = _turned(frame, eta * u)
         thrust = (frame[:, 2] * force).sum(axis=0)
         rates = np.empty_like(y)
-        rates[:3] = (rod.stretch(z) + growth * thrust / rod.axial(z)) * frame[:, 2]
+        rates[:3] = (rod.stretch(z) + eta * thrust / rod.axial(z)) * frame[:, 2]
         rates[3:12] = _cross(turn[:, None], frame).reshape(9, -1)
         rates[12:15] = -_cross(rates[:3], force)
         rates[15:] = -self._per_length(z)[:, None] * load

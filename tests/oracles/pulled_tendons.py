@@ -48,9 +48,9 @@ class PulledArm:
         """(ζ, ω) at the nodes without these tendons, and η, shape (station, 4) and (station,)."""
         gamma = np.where(self.is_pulled, 0.0, self.activation)
         table = tables(self.arm, self.nodes[0].ravel())
-        growth = 1.0 + table.growth @ gamma
-        turn = growth[:, None] * (table.curvature @ gamma)
-        return np.column_stack([1.0 + table.extension @ gamma, turn]), growth
+        eta = 1.0 + table.rest_length_factor @ gamma
+        turn = eta[:, None] * (table.curvature @ gamma)
+        return np.column_stack([1.0 + table.extension @ gamma, turn]), eta
 
     @property
     def is_pulled(self) -> NDArray[np.bool_]:
@@ -79,14 +79,14 @@ class PulledArm:
 
     def strains(self) -> Array:
         """(ζ, ω) of least energy at the nodes, shape (station, 4)."""
-        before, growth = self.unpulled
+        before, eta = self.unpulled
         stiffness = self.arm.section.stiffness_at(self.arm.profile, self.nodes[0].ravel())
         resists = np.stack(
             [
                 stiffness.axial,
-                stiffness.bending / growth,
-                stiffness.bending / growth,
-                stiffness.torsion / growth,
+                stiffness.bending / eta,
+                stiffness.bending / eta,
+                stiffness.torsion / eta,
             ],
             axis=1,
         )

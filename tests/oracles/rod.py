@@ -30,7 +30,7 @@ class Rod:
     """Mass per length Z [kg/m]."""
     stretch: Number = lambda z: 1.0
     """ζ̂(Z) [-]."""
-    growth: Number | None = None
+    rest_length_factor: Number | None = None
     """η(Z) [-], what of ζ̂ changes the length of matter at rest; all of it if None."""
     curvature: Vector = lambda z: ZERO
     """û(Z) per length of η, in the directors [1/m]."""
@@ -41,7 +41,7 @@ class Rod:
 
     def grown(self, z: float) -> float:
         """η(Z) [-]."""
-        return (self.growth or self.stretch)(z)
+        return (self.rest_length_factor or self.stretch)(z)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,8 +15,8 @@ from softreach.cloud.curvature import strain_ranges
 from softreach.rod import TipStatus, as_tip_map, free_bundles
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import all_equilibria as equilibria_by_degree
-from softreach.rod.loaded import following
-from softreach.rod.loaded import steps as loaded_steps
+from softreach.rod.loaded import flood
+from softreach.rod.loaded import rod as loaded_rod
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
@@ -330,7 +330,7 @@ def test_a_smooth_branch_is_not_lost_under_a_little_more_load():
 def test_a_search_that_is_cut_short_is_undecided(heavy, monkeypatch):
     """Nothing is said of what was not followed to its end."""
     gamma = np.array([[-0.72288394, -0.72127314, -4.22473062]])
-    monkeypatch.setattr(following, "_MOST_STEPS", 1)
+    monkeypatch.setattr(flood, "_MOST_STEPS", 1)
     found = heavy.solver.empty(1)
     Postures.of(heavy.solver).by_line(gamma, np.array([0]), found)
     assert found.status[0] == TipStatus.UNDECIDED
@@ -481,7 +481,7 @@ def test_steps_that_are_not_found_are_not_searched_again(monkeypatch):
         return find(postures, gamma)
 
     monkeypatch.setattr(Postures, "find", counted)
-    monkeypatch.setattr(loaded_steps, "_MOST_STEPS", 4)
+    monkeypatch.setattr(loaded_rod, "_MOST_STEPS", 4)
     rod = LoadedRod(weighed(STIFF_TRUNK, 2.5, (9.81, 0.0, 0.0)), 1e-9)
     for _ in range(2):
         with pytest.raises(InvalidInput, match="reachable within 4 steps"):
@@ -493,7 +493,7 @@ def test_a_few_activations_near_the_loss_of_stability_do_not_choose_the_steps(mo
     """Nor do they have a design refused."""
     rod = LoadedRod(weighed(STIFF_TRUNK, 2.5, (9.81, 0.0, 0.0)), 1e-6)
     expected = rod.steps
-    judged = loaded_steps.tip_differences
+    judged = loaded_rod.tip_differences
 
     def magnified(solver, gamma, known):
         found = judged(solver, gamma, known)

@@ -99,7 +99,7 @@ def walked(arm, gamma, ends):
     def rates(z, state, last):
         table = tables(arm, [min(z, last)])
         directors = state[3:].reshape(3, 3)
-        zeta, eta = 1.0 + table.extension[0] @ gamma, 1.0 + table.growth[0] @ gamma
+        zeta, eta = 1.0 + table.extension[0] @ gamma, 1.0 + table.rest_length_factor[0] @ gamma
         u = (table.curvature[0] @ gamma) @ directors
         return np.concatenate([zeta * directors[2], (eta * np.cross(u, directors)).ravel()])
 

@@ -11,7 +11,7 @@ from softreach.arm import Base, Chamber, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.cloud.curvature import stream_statistics
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded import rod as loaded_module
+from softreach.rod.loaded import postures
 from softreach.rod.loaded import solver as equilibrium
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
@@ -294,7 +294,7 @@ def test_shapes_do_not_depend_on_the_blocks_they_are_found_in(monkeypatch):
     rod, stations = loaded(KINDS["along the arm"], 1e-6), [0.0, 0.5, 0.7, 1.0]
     together, strains = rod.frames(GAMMA, stations), rod.strains(GAMMA, stations)
     monkeypatch.setattr(equilibrium, "_TRACED", 1)
-    monkeypatch.setattr(loaded_module, "_BLOCK", 1)
+    monkeypatch.setattr(postures, "_AT_ONCE", 1)
     for found, expected in zip(rod.frames(GAMMA, stations), together, strict=True):
         np.testing.assert_array_equal(found, expected)
     for found, expected in zip(rod.strains(GAMMA, stations), strains, strict=True):

@@ -15,7 +15,7 @@ from softreach.rod.free import FreeRod
 from softreach.rod.loaded.all_equilibria import equilibria
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
+from softreach.rod.loaded.tables import ArmBody, LoadTables
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import oracle_rod, rubber
 from tests.oracles import column
@@ -32,7 +32,7 @@ ANY = np.array([[-1.2, -0.3, -0.8], [-1.6, -1.6, -1.6]])
 class Inextensible:
     """A body that bends and twists alone."""
 
-    whole: Body
+    whole: ArmBody
 
     def compliance(self, z):
         axial, bending, torsion = self.whole.compliance(z)
@@ -234,7 +234,7 @@ def test_an_arm_of_another_size_with_loads_to_match_has_the_same_shape(loads):
 class HeavyEnd:
     """A body with a mass spread over the end of the arm."""
 
-    whole: Body
+    whole: ArmBody
     start: float
     extra: float
 

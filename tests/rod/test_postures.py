@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 import softreach as sr
 from softreach.arm import Manipulator, designs
 from softreach.arm.loads import Loads
-from softreach.rod.loaded import following
+from softreach.rod.loaded import flood
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.tables import ArmBody
@@ -62,7 +62,7 @@ def test_strict_steps_along_lines_lead_to_the_same_postures(name, monkeypatch):
     found = rod.equilibria(gamma)
     assert (found.status == TipStatus.STABLE).mean() >= share
     for limit in ("_CORRECTION", "_CORRECTION_OF_NODES"):
-        monkeypatch.setattr(following, limit, 0.1 * getattr(following, limit))
+        monkeypatch.setattr(flood, limit, 0.1 * getattr(flood, limit))
     strictly = by_lines(rod.solver, gamma)
     both = (found.status == TipStatus.STABLE) & (strictly.status == TipStatus.STABLE)
     assert both.mean() > 0.98

@@ -260,11 +260,7 @@ class Tab:
 
     def click_at(self, point: np.ndarray) -> None:
         """Click where a point of the scene [L] appears."""
-        canvas = self.page.locator("canvas").first.bounding_box()
-        right, down = self.projected(point)
-        self.page.mouse.click(
-            canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
-        )
+        self.page.mouse.click(*self.screen(point))
 
     def projected(self, point: np.ndarray) -> tuple[float, float]:
         """Place of a point in the canvas, 0 to 1 from its upper left."""

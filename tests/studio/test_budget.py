@@ -82,7 +82,7 @@ def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk
     assert fine.notes == ("exact set coarser than asked: to 5 % it needs more than 30 s",)
     *_, none = reaching.stages(trunk, 12, SMALL, nothing)
     assert none.exact is None
-    assert none.refusal == "to 5 % it needs more than 30 s"
+    assert none.refusal == "to 10 % it needs more than 30 s"
 
 
 def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_given(

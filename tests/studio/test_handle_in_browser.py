@@ -92,14 +92,13 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
     tab.wait(lambda: tab.session.found.lag and tab.session.found.lag.dragged.gap > 0.02, "a gap")
     tab.settle()
     pull = tab.session.found.lag
-    assert tab.drawn("/lag").visible
-    assert tab.drawn("/lag label").text == f"{pull.dragged.gap:.3g} m short"
+    assert tab.drawn("/lag/label").text == f"{pull.dragged.gap:.3g} m short"
     tab.page.get_by_text(f"This branch ends {pull.dragged.gap:.3g} m short").wait_for()
     answer = sr.solve_inverse(tab.session.state.design, [pull.wanted])[0]
     assert len(answer) == 0
     assert pull.dragged.gap == pytest.approx(answer.gap, abs=1e-5)
     tab.page.mouse.up()
-    tab.wait(lambda: not tab.drawn("/lag").visible, "the drag rests")
+    tab.wait(lambda: tab.drawn("/lag") is None, "the drag rests")
     tab.settle()
     assert tab.drawn("/gap")
 

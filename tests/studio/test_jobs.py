@@ -11,13 +11,12 @@ from numba import njit
 from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements
-from softreach.studio.app import JOBS
 from softreach.studio.found import Found
 from softreach.studio.job import Job, Learned, what_follows
+from softreach.studio.jobs import JOBS
 from softreach.studio.reach import Reach
 from softreach.studio.session import Session
-from softreach.studio.settings import PlotSettings
-from softreach.studio.state import Camera, Slice, StudioState
+from softreach.studio.state import Camera, PlotSettings, Slice, StudioState
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import InvalidInput
 from tests.studio.sockets import page
@@ -43,7 +42,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     state = StudioState(design=trunk)
     other = changed(trunk, {"taper": 0.01})
     changes = {
-        state.replace(activation=(-1.0, 0.0, 0.0)): {"arm", "sample"},
+        state.replace(activation=(-1.0, 0.0, 0.0)): {"arm"},
         state.showing(color="multiplicity"): {"cloud", "surface"},
         state.showing(slice=Slice(axis="x")): {"cloud", "surface"},
         state.showing(surface=False): {"cloud", "surface"},
@@ -53,7 +52,7 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
         state.showing(dark=True): {"theme", "surface"},
         state.replace(needs=NEEDS): {"needs"},
         state.replace(reference=trunk): {"reference"},
-        state.replace(design=other): {"reach", "slopes", "arm", "sample"},
+        state.replace(design=other): {"reach", "slopes", "arm"},
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
     }
     for new, jobs in changes.items():
@@ -68,7 +67,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
     other = changed(trunk, {"taper": 0.01})
     moves = {
         full.replace(design=other): {
-            "reach", "slopes", "arm", "sample", "inverse", "needs", "sweep",
+            "reach", "slopes", "arm", "inverse", "needs", "sweep",
         },
         full.showing(slice=Slice(axis="x")): {"cloud", "reference", "surface", "section"},
         full.showing(plots=PlotSettings()): {"sweep", "section"},
@@ -100,14 +99,13 @@ def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
 
 
 def test_a_job_that_fails_forgets_what_it_knew_and_takes_away_what_it_drew(studio):
-    def compute(state, found, tools):
+    def compute(given):
         yield Learned({"check_refusal": "known"})
-        if state.target is not None:
+        if given.state.target is not None:
             raise InvalidInput("target", "wrong", "right")
 
-    def draw(page, state, found):
-        page.scene.draw_dots("/mark", np.zeros((1, 3)), (0, 0, 0))
-        return {}
+    def draw(given):
+        given.scene.dots("/mark", np.zeros((1, 3)), (0, 0, 0), 0.01)
 
     mark = Job("mark", ("target",), compute, draw, makes=("check_refusal",), draws=("/mark",))
     with page(studio) as tab:

@@ -16,6 +16,7 @@ import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
 from softreach.inverse.prepared import prepared_map
 from softreach.studio import Studio, work
+from softreach.studio.job import Job
 from softreach.studio.session import Session
 from tests.studio.sockets import PATIENCE, connected, page, until
 
@@ -29,7 +30,7 @@ def studio(studio) -> Iterator[Studio]:
 
 @pytest.fixture(autouse=True)
 def _short_rest(monkeypatch) -> None:
-    monkeypatch.setattr(work, "_LONG_REST", 0.5)  # its thread would be counted
+    monkeypatch.setattr(work, "LONG_REST", 0.5)  # its thread would be counted
 
 
 def own_threads() -> int:
@@ -53,21 +54,22 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
 ):
     seen, loaded = [], threading.Event()
 
-    def follow(session, old):
-        scene = session.client.scene
-        drawn = [scene.get_handle_by_name(path) is not None for path in ("/arm/0", "/axes/lines")]
-        room = np.ptp(session.scene.axes.corners, axis=0).min() > 1.0  # a view is framed by it
-        seen.append((*drawn, room, session.doing, loaded.is_set()))
+    def compute(given):
+        find, paths = given.client.scene.get_handle_by_name, ("/arm/0", "/axes/lines")
+        drawn = [find(path) is not None for path in paths]
+        room = np.ptp(given.scene.axes.corners, axis=0).min() > 1.0  # a view is framed by it
+        seen.append((*drawn, room, loaded.is_set()))
+        yield from ()
 
     def load():
         time.sleep(0.05)
         loaded.set()
 
-    monkeypatch.setattr(Session, "_follow_change", follow)
-    monkeypatch.setattr(softreach.studio.app, "_load_libraries", load)
+    monkeypatch.setattr(softreach.studio.app, "JOBS", (Job("first", ("design",), compute),))
+    monkeypatch.setattr(softreach.studio.app, "load_libraries", load)
     with Studio(studio.start) as other, connected(other):
         until(lambda: seen)
-    assert seen[0] == (True, True, True, "computing", True)
+    assert seen[0] == (True, True, True, True)
 
 
 @pytest.mark.large
@@ -150,7 +152,7 @@ def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):
 
 
 def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, monkeypatch):
-    go, furnish = threading.Event(), softreach.studio.app._furnish
+    go, furnish = threading.Event(), softreach.studio.app.furnish
     entered = threading.Event()
 
     def waits(*given):
@@ -158,7 +160,7 @@ def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, m
         assert go.wait(PATIENCE)
         furnish(*given)
 
-    monkeypatch.setattr(softreach.studio.app, "_furnish", waits)
+    monkeypatch.setattr(softreach.studio.app, "furnish", waits)
     with connected(studio):
         assert entered.wait(PATIENCE)
     until(lambda: not studio.server.get_clients())

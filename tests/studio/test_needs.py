@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import softreach as sr
-import softreach.studio.jobs.needs as jobs
+import softreach.studio.jobs.goals as jobs
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.studio import Studio
-from softreach.studio.needs import requirements_of
 from softreach.studio.scene.needs import COLORS
 from softreach.studio.session import Session
-from softreach.studio.tabs.needs import NeedsPanel
+from softreach.studio.state import requirements_of
+from softreach.studio.tabs import click, goals
 from softreach.support.errors import SoftreachError
 from tests.studio.sockets import page
 
@@ -36,27 +35,20 @@ def opened(studio: Studio) -> Iterator[Session]:
 
 
 @pytest.fixture
-def session(opened, monkeypatch) -> Session:
-    monkeypatch.setattr(jobs, "_PAUSE", 0.0)
+def session(opened) -> Session:
     opened.update(lambda state: state.replace(design=ARM, activation=POSE, needs="", target=None))
     opened.settle()
     opened.end_step()
     return opened
 
 
-def panel_of(session) -> NeedsPanel:
-    return next(panel for panel in session.panels if isinstance(panel, NeedsPanel))
-
-
 def added(session, kind, text="") -> None:
-    panel = panel_of(session)
-    panel._kind.value, panel._field.value = kind, text
-    panel._added()
+    goals.add_need(session, kind, text)
     session.settle()
 
 
 def verdict(session) -> str:
-    return panel_of(session)._verdict._widget.content
+    return goals.verdict(session.found, session.state)
 
 
 def drawn(session, name):
@@ -139,7 +131,7 @@ def test_a_payload_without_a_modulus_is_refused_below_the_needs(session):
     added(session, "payload", "50")
     assert requirements_of(session.state.needs).payloads == (0.05,)
     added(session, "place to reach")
-    assert "modulus" in panel_of(session)._refusal._widget.content
+    assert "modulus" in session.found.check_refusal
     assert session.found.check is None
 
 
@@ -158,7 +150,7 @@ def test_files_and_numbers_of_no_needs_are_refused_and_the_needs_before_stay(ope
     before = opened.state
     for content, words in BAD_FILES.values():
         with pytest.raises(SoftreachError, match=words) as caught:
-            panel_of(opened)._read(SimpleNamespace(name="<b>.toml", content=content))
+            goals.read_needs(opened, "<b>.toml", content)
         assert "root" not in str(caught.value)
         assert opened.state == before
     for kind, text in (("place to reach", "1, b"), ("box to avoid", ""), ("payload", "-1")):
@@ -173,9 +165,10 @@ def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session)
     tip = session.found.reach.cloud.tip.values[3]
     point = tip / ARM.length
     origin = 3.0 * point
-    assert not panel_of(session).click(origin, point - origin)
+    click(session, origin, point - origin)
+    assert session.state.needs == ""
     session.update(lambda state: state.showing(mouse="place"))
-    assert panel_of(session).click(origin, point - origin)
+    click(session, origin, point - origin)
     session.settle()
     (place,) = requirements_of(session.state.needs).places
     assert np.linalg.norm(np.cross(place, point) / np.linalg.norm(point)) < 0.02 * ARM.length

@@ -1,14 +1,13 @@
-"""End to end: plots beside the scene that follow the arm, the design and the slice."""
+"""Plots beside the scene follow the design and the slice, in the page and as numbers."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-import softreach as sr
-from softreach.arm.parameters import changed, find_parameter
-from softreach.studio.settings import PlotSettings
-from softreach.studio.state import Slice
+from softreach.geometry.surface import plane_cut
+from softreach.studio.figures import enclosed_area, section_curves
+from softreach.studio.state import PlotSettings, Slice
 
 
 @pytest.fixture(autouse=True)
@@ -19,55 +18,63 @@ def _nothing_beside_the_scene(tab):
 
 
 @pytest.mark.large
-def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
+def test_the_section_is_that_of_the_exact_set(tab):
     tab.open("Plots")
-    tab.page.get_by_label("V against parameter").check()
-    tab.wait(lambda: "sweep" in tab.session.state.appearance.plots.shown, "it is wanted")
-    tab.settle()
-    tab.choose("parameter", "taper φ [deg]")
-    tab.wait(lambda: tab.session.state.appearance.plots.parameter == "taper", "it is chosen")
-    tab.page.get_by_text("here V =").wait_for()
-    tab.settle()
-    found, design = tab.session.found.sweep, tab.session.state.design
-    assert found.complete
-    assert (np.diff(found.value) > 0).all()
-    assert found.refused  # the steepest tapers leave no tip
-    tab.page.get_by_text(f"{len(found.refused)} values make no design").wait_for()
-    made = changed(design, {"taper": np.radians(found.value[1])})
-    assert found.volume[1] == pytest.approx(sr.reachable_set(made).volume, rel=0.02)
-
-
-LINES = """Object.values(window.__viserTestpoints?.uplots ?? {}).map(({chart}) => {
-    const x = chart.data[0], line = chart.data[chart.data.length - 1];
-    return [...x].filter((_, k) => line[k] === 0 || line[k] === 1);
-})"""
-"""Places of the two ends of the line in each chart of the page."""
+    tab.page.get_by_label("section", exact=True).check()
+    tab.page.get_by_text("y = 0 m: ").wait_for()
+    picture = tab.page.locator("img").first
+    assert picture.evaluate("image => image.naturalWidth") > 600
+    reach = tab.session.found.reach
+    curves = section_curves(reach, Slice())
+    points = np.concatenate(curves)
+    assert np.ptp(points[:, 1]) == 0.0
+    assert all(np.array_equal(curve[0], curve[-1]) for curve in curves)
+    onto = reach.exact.distance(points[::10] * reach.arm.length)
+    assert np.abs(onto).max() < 2 * reach.exact.image.lattice.cell
 
 
 @pytest.mark.large
-def test_a_line_stands_at_the_value_of_the_slider_and_follows_it(tab):
-    settings = PlotSettings(shown=("sweep",), parameter="taper")
-    tab.session.update(lambda s: s.showing(plots=settings))
+def test_the_section_follows_the_slice_and_the_design(tab):
+    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
     tab.settle()
-    tab.wait(lambda: [2, 2] in tab.page.evaluate(LINES), "the line stands at 2 degrees")
-    known = tab.session.found.sweep
+    before = tab.page.locator("img").first.get_attribute("src")
+    cut = Slice(axis="z", center=0.5, thickness=0.1)
+    tab.session.update(lambda s: s.showing(slice=cut))
+    tab.page.get_by_text("z = 0.5 m: ").wait_for()
+    assert tab.page.locator("img").first.get_attribute("src") != before
+    area = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
+    tab.page.get_by_text(f"{area:.4g} m²").wait_for()
+    tab.open("Design")
+    tab.drag("revolution Ω [deg]", 40)
+    tab.settle()
+    assert tab.session.found.section.arm == tab.session.state.design
+    changed = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
+    assert changed != area
+    tab.page.get_by_text(f"{changed:.4g} m²").wait_for()
+
+
+@pytest.mark.large
+def test_the_areas_of_sections_sum_up_to_the_volume(tab):
+    reach = tab.session.found.reach
+    surface, length = reach.exact.surface(), reach.arm.length
+    low, high = surface.vertices[:, 2].min(), surface.vertices[:, 2].max()
+    edges = np.linspace(low, high, 41)
+    middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
+    areas = [enclosed_area(plane_cut(surface, 2, at), 2) for at in middles]
+    assert abs(sum(areas) * width / length**3 - reach.volume) < 0.02 * reach.volume
+
+
+@pytest.mark.large
+def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
+    tab.open("Plots")
+    tab.page.get_by_label("V against parameter").check()
+    tab.settle()
+    tab.choose("parameter", "taper φ [deg]")
+    tab.wait(lambda: tab.session.state.appearance.plots.parameter == "taper", "it is chosen")
+    tab.page.get_by_text("values make no design").wait_for()
+    before = tab.page.locator("img").first.get_attribute("src")
+    tab.open("Design")
     tab.drag("taper φ [deg]", -20)
     tab.settle()
-    arm = tab.session.state.design
-    there = pytest.approx([np.degrees(find_parameter(arm, "taper").value(arm))] * 2)
-    tab.wait(lambda: there in tab.page.evaluate(LINES), "the line follows")
-    after = tab.session.found.sweep
-    assert {*known.value} < {*after.value}  # nothing was computed twice
-
-
-def test_names_in_a_chart_are_text(tab):
-    from softreach.studio.plots.chart import Chart, Curve
-
-    gui = tab.session.client.gui
-    folder = gui.add_folder("names")
-    chart = Chart(gui, folder, "y")
-    name = "<img src=x onerror=alert(1)>"
-    chart.show("x", np.array([0.0, 1.0]), (Curve(name, "red"),), (np.array([0.0, 1.0]),))
-    tab.page.get_by_text(name).wait_for()
-    assert tab.page.locator("img[src=x]").count() == 0
-    folder.remove()
+    assert tab.session.found.sweep.arm == tab.session.state.design
+    tab.wait(lambda: tab.page.locator("img").first.get_attribute("src") != before, "it follows")

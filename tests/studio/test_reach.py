@@ -12,7 +12,7 @@ import pytest
 import softreach as sr
 from softreach import schema
 from softreach.arm import designs
-from softreach.arm.loads import Loads
+from softreach.arm.loads import GRAVITIES, Loads
 from softreach.cloud.clouds import compute_cloud
 from softreach.picture.axes_box import axes_box, seen_from
 from softreach.plot.coloring import BundleKey, ScalarKey
@@ -30,24 +30,16 @@ from softreach.studio.reach import (
     unstable_samples,
 )
 from softreach.studio.scene.camera import is_behind, picked_point
-from softreach.studio.scene.clouds import (
+from softreach.studio.scene.colors import (
     color_names,
-    in_slice,
     key_html,
     sample_colors,
     sample_values,
+    surface_colors,
 )
-from softreach.studio.scene.surfaces import Skin, glb, sliced, surface_colors
+from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Slice, StudioState, solvable_rod
-from softreach.studio.tabs.loads import (
-    GRAVITIES,
-    TypedLoads,
-    base_field,
-    gravity_name,
-    other_loads,
-    typed_loads,
-    with_loads,
-)
+from softreach.studio.tabs.design import base_field, gravity_name, load_field, other_loads
 from softreach.studio.work import Dropped, affordable_level
 from softreach.support.errors import InvalidDesign, InvalidInput
 
@@ -222,9 +214,11 @@ def test_numbers_of_an_edge_keep_their_distance_in_a_small_picture(eye):
 
 @pytest.mark.parametrize("eye", [(2.1, -3.85, 1.45), (-3, 3, 1), (3, 2, -2), (1.5, -5, 0.9)])
 @pytest.mark.parametrize("focal", [420.0, 600.0, 1200.0])
-def test_the_name_of_an_axis_keeps_its_distance_from_the_number_beside_it(eye, focal):
+def test_numbers_stand_outside_and_the_name_of_an_axis_keeps_its_distance_from_them(eye, focal):
     low, high = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
     box = axes_box(low[None], high[None], camera=eye, focal=focal)
+    texts = np.array([at for _, at in box.labels])
+    assert ((texts < low) | (texts > high)).any(axis=1).all()
     forward = (low + high) / 2 - eye
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, (0.0, 0.0, 1.0))
@@ -253,35 +247,61 @@ def lce():
     return designs.lce_arm()
 
 
+def loaded(arm, **typed):
+    """The arm under loads that are typed one after another."""
+    state = StudioState(design=arm)
+    for name, value in typed.items():
+        state = load_field(name).write(state, value)
+    return state.design
+
+
+def typed_loads(arm):
+    names = ("gravity", "payload", "payload_arm", "tip_force")
+    return {name: load_field(name).read(StudioState(design=arm)) for name in names}
+
+
 def hanging(arm, grams: float):
-    return with_loads(arm, TypedLoads(gravity=HANGING, payload=grams))
+    return loaded(arm, gravity=HANGING, payload=grams)
+
+
+NOTHING = {
+    "gravity": (0.0, 0.0, 0.0),
+    "payload": 0.0,
+    "payload_arm": (0.0, 0.0, 0.0),
+    "tip_force": (0.0, 0.0, 0.0),
+}
 
 
 def test_what_is_typed_is_what_the_design_has(lce):
-    typed = TypedLoads((0.0, 1.0, -9.81), 2.5, (1.0, 0.0, -3.0), (0.0, 0.01, 0.0))
-    arm = with_loads(lce, typed)
+    typed = {
+        "gravity": (0.0, 1.0, -9.81),
+        "payload": 2.5,
+        "payload_arm": (1.0, 0.0, -3.0),
+        "tip_force": (0.0, 0.01, 0.0),
+    }
+    arm = loaded(lce, **typed)
     assert arm.loads.payload == pytest.approx(0.0025)
     np.testing.assert_allclose(arm.loads.payload_arm, (0.001, 0, -0.003))
     assert typed_loads(arm) == typed
-    assert typed_loads(lce) == TypedLoads()
+    assert typed_loads(lce) == NOTHING
 
 
 def test_without_any_load_an_arm_is_an_arm_without_loads(lce):
-    assert with_loads(lce, TypedLoads()) == lce
-    assert with_loads(hanging(lce, 5.0), TypedLoads()) == lce
+    assert loaded(lce, **NOTHING) == lce
+    assert loaded(hanging(lce, 5.0), **NOTHING) == lce
 
 
 def test_directions_are_known_by_name(lce):
     for name, gravity in GRAVITIES.items():
-        assert gravity_name(gravity) == name
-        assert typed_loads(with_loads(lce, TypedLoads(gravity=gravity))).gravity == gravity
-    assert gravity_name((0.0, 0.0, -1.62)) == ""
+        arm = loaded(lce, gravity=gravity)
+        assert gravity_name(StudioState(design=arm)) == name
+        assert typed_loads(arm)["gravity"] == gravity
+    assert gravity_name(StudioState(design=loaded(lce, gravity=(0.0, 0.0, -1.62)))) == ""
 
 
 def test_place_and_turn_of_the_base_are_typed_in_mm_and_degrees_and_the_rest_of_it_stays(lce):
     state = StudioState(design=lce.replace(base=sr.Base(points="down", position=(1 / 3, 0, 0))))
     place, turn = base_field("position"), base_field("turn")
-    assert place.write(state, place.read(state)).design.base.position == (1 / 3, 0, 0)
     moved = turn.write(place.write(state, (10.0, 0.0, 250.0)), -30.0)
     assert (place.read(moved), turn.read(moved)) == ((10.0, 0.0, 250.0), -30.0)
     base = sr.Base(points="down", position=(0.01, 0.0, 0.25), turn=math.radians(-30))
@@ -294,14 +314,14 @@ def test_place_and_turn_of_the_base_are_typed_in_mm_and_degrees_and_the_rest_of_
 def test_loads_without_a_field_stay(lce):
     twisted = lce.replace(loads=sr.Loads(gravity=HANGING, tip_moment=(0.0, 0.0, 1e-4)))
     assert other_loads(twisted) == ["tip moment"]
-    changed = with_loads(twisted, TypedLoads(gravity=(0.0, 0.0, 0.0)))
+    changed = loaded(twisted, gravity=(0.0, 0.0, 0.0))
     assert changed.loads.tip_moment == (0.0, 0.0, 1e-4)
     assert other_loads(lce) == []
 
 
 def test_matter_that_lacks_what_loads_need_is_named_in_one_line(trunk):
     with pytest.raises(InvalidDesign) as caught:
-        with_loads(trunk, TypedLoads(gravity=HANGING))
+        loaded(trunk, gravity=HANGING)
     line = str(caught.value)
     assert "\n" not in line
     assert "Young's modulus E and the density ρ of ring 0" in line
@@ -317,9 +337,8 @@ def test_a_payload_that_cannot_be_is_refused_in_grams(lce, wrong):
 @pytest.mark.parametrize("field", ["gravity", "payload_arm", "tip_force"])
 @pytest.mark.parametrize("wrong", [1e9, -1e9, math.nan])
 def test_a_vector_that_cannot_be_is_refused(lce, field, wrong):
-    typed = TypedLoads()._replace(**{field: (0.0, wrong, 0.0)})
     with pytest.raises(InvalidInput, match=r"must be -1,000,000 to 1,000,000"):
-        with_loads(lce, typed)
+        loaded(lce, **{field: (0.0, wrong, 0.0)})
 
 
 def test_a_state_keeps_its_loads(lce):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ from softreach.arm.parameters import changed
 from softreach.rod import as_tip_map
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.reach import Size, stages
-from softreach.studio.scene.axes import NumberedBox
+from softreach.studio.scene.camera import NumberedBox
 from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import Appearance, Slice, StudioState
@@ -46,11 +47,28 @@ class Meshes:
     def add_glb(self, path, data, **style):
         self.added[path] = SimpleNamespace(data=data, **style)
 
-    def remove_by_name(self, path):
-        del self.added[path]
+    def _at(self, path):
+        return [each for each in self.added if each == path or each.startswith(f"{path}/")]
 
-    def get_handle_by_name(self, path):
-        return self.added.get(path)
+    def remove_by_name(self, path):
+        for each in self._at(path):
+            del self.added[each]
+
+    def get_handle_by_name(self, path):  # viser has nodes above those that are added
+        return next((self.added[each] for each in self._at(path)), None)
+
+    def add_icosphere(self, path, radius, color, position, **style):
+        self.added[path] = SimpleNamespace(position=position, **style)
+
+
+def test_a_path_ends_in_a_ball_where_the_arm_follows_it_no_further():
+    points, meshes = np.linspace([0.0, 0.0, 1.0], [0.5, 0.0, 1.0], 11), Meshes()
+    scene = Scene(meshes)
+    scene.draw_path(points, np.concatenate([points[:4], [[0.17, 0.0, 1.0]]]))
+    np.testing.assert_array_equal(meshes.added["/path/end"].position, [0.17, 0.0, 1.0])
+    assert len(meshes.added["/path/followed"].points) == 4
+    scene.draw_path(points, points)
+    assert "/path/end" not in meshes.added
 
 
 @pytest.mark.parametrize(("unit", "size"), [("mm", 1e-3), ("cm", 1e-2), ("L", 0.2)])
@@ -141,17 +159,19 @@ def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or
     assert drawn(reach, replace(look, surface=False))[1] == set()
 
 
-def test_the_reach_without_loads_is_a_faint_surface_and_points_only_where_it_has_none(trunk):
+def test_a_reach_beside_is_a_faint_surface_and_points_only_where_it_has_none(trunk):
     *_, reach = stages(trunk, 12, SMALL, lambda: None)
     meshes = Meshes()
     scene = Scene(meshes)
-    scene.draw_free(reach, Slice())
-    free = meshes.added["/free"]
+    scene.draw_beside("/free", reach, Slice())
+    trimesh = pytest.importorskip("trimesh")
+    loaded = trimesh.load_scene(io.BytesIO(meshes.added["/free"].data), file_type="glb")
+    (free,) = loaded.geometry.values()
     np.testing.assert_allclose(free.vertices, reach.sheets.vertices / trunk.length, atol=1e-6)
-    assert free.opacity < 0.3
-    scene.draw_free(replace(reach, exact=None), Slice())
+    assert free.visual.vertex_attributes["color"][:, 3].max() < 0.3 * 255
+    scene.draw_beside("/free", replace(reach, exact=None), Slice())
     assert len(meshes.added["/free"].points)
-    scene.draw_free(None, Slice())
+    scene.draw_beside("/free", None, Slice())
     assert not meshes.added
 
 

@@ -13,11 +13,14 @@ from urllib.parse import urlencode
 import pytest
 
 import softreach.studio
-from softreach.studio.serve.guard import headed, page_headers, refusal, same_origin
-from softreach.studio.serve.server import (
+from softreach.studio.serve import (
+    headed,
     page_address,
+    page_headers,
     page_url,
     reachable_hosts,
+    refusal,
+    same_origin,
     start_server,
     stop_server,
 )
@@ -200,7 +203,7 @@ def test_only_one_file_uses_names_that_viser_keeps_to_itself():
     room = Path(softreach.studio.__file__).parent
     private = re.compile(r"server\._[a-z]|_live_connections|_websock|sockets\.serve")
     users = {p.name for p in room.rglob("*.py") if private.search(p.read_text(encoding="utf-8"))}
-    assert users == {"guard.py"}
+    assert users == {"serve.py"}
 
 
 def test_a_server_whose_requests_cannot_be_checked_does_not_start(monkeypatch):

@@ -14,12 +14,20 @@ from softreach.cli.studio import _start, _work
 from softreach.inverse import solve_inverse
 from softreach.rod.rods import as_tip_map
 from softreach.studio.files import LARGEST
-from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.reach import Quality, Reach, cloud_points, shown_rows, stages
-from softreach.studio.scene.clouds import key_html, sample_colors, sample_values
+from softreach.studio.reach import (
+    Quality,
+    Reach,
+    cloud_points,
+    count_activations,
+    shown_rows,
+    stages,
+    uncounted,
+)
+from softreach.studio.scene.colors import key_html, sample_colors, sample_values
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, work_on
 from softreach.studio.state import StudioState
+from softreach.studio.tabs import click
 from softreach.studio.work import Dropped
 from tests.studio.sockets import page
 
@@ -32,9 +40,8 @@ def session(studio) -> Iterator[Session]:
 
 def clicked_path(session: Session, origin, direction) -> np.ndarray | None:
     """The path [L] after a click that may lead it on."""
-    (panel,) = (one for one in session.panels if type(one).__name__ == "PathPanel")
     session.update(lambda state: state.showing(mouse="path"))
-    panel.click(origin, direction)
+    click(session, origin, direction)
     assert session.settle()
     path, length = session.state.path, session.state.design.length
     return None if path is None else np.array(path.points) / length
@@ -44,12 +51,12 @@ def test_a_click_for_a_path_hits_no_point_that_is_cut_away(session):
     session.update(lambda state: state.showing(cloud=True))
     assert session.settle()
     points = cloud_points(session.found.reach, session.state.appearance.level)
-    hidden = session.scene.clouds.hidden(points)
+    hidden = session.scene.hidden(points)
     eye = np.asarray(session.client.camera.position)
     distance = np.linalg.norm(points - eye, axis=1)
     target = points[np.argmin(np.where(hidden, distance, np.inf))]
     path = clicked_path(session, eye, target - eye)
-    assert path is None or not session.scene.clouds.hidden(path[-1:]).any()
+    assert path is None or not session.scene.hidden(path[-1:]).any()
 
 
 def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_design(session):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.studio.fields import Attribute, Fields, attribute
+from softreach.studio.found import Found
 from softreach.studio.shown_parameters import (
     named_parameters,
     part_parameters,
@@ -71,7 +73,7 @@ def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
         gain: float = 4.0
         turns: int = 3
         angle: float = number("α", "rad", "an angle", default=0.0)
-        share: float = number("s", "", "a share", low=0.0, high=1.0, open_low=True, default=0.8)
+        share: float = number("s", "", "a share", above=0.0, high=1.0, default=0.8)
         width: float = number("w", "m", "a width", low=0.0, default=0.02)
         unknown: float = 0.0
 
@@ -250,13 +252,15 @@ class Tab:
 
     def __init__(self) -> None:
         self.state = StudioState(design=designs.minimal_trunk())
+        self.found = Found()
         self.client: Any = SimpleNamespace(gui=Gui())
+        self.lock = threading.RLock()
         self.revision, self.updates = 0, 0
         self.failures: list[Exception] = []
 
-    def update(self, change, *, by_widget=False):
-        self.state = change(self.state)
-        self.updates += 1
+    def update(self, change, *, by_widget=False, goes_on=False):
+        before, self.state = self.state, change(self.state)
+        self.updates += self.state != before
         self.revision += not by_widget
 
     def fail(self, error):
@@ -275,9 +279,9 @@ def page() -> Any:
 CENTER = attribute("appearance.slice.center")
 
 
-def field(page, *, dragged=True, at=CENTER):
+def field(page, *, at=CENTER):
     """Fields with one slider: its parts, in the order in which a panel shows them."""
-    fields = Fields(page, dragged=dragged)
+    fields = Fields(page)
     bound = fields.slider("center / L", (-1.5, 1.5), 0.01, at, "hint")
     slider, form, text, line = page.widgets
     return fields, bound, slider, form, text, line
@@ -309,10 +313,10 @@ def test_a_field_shows_what_others_change_but_is_not_set_back_while_it_is_dragge
     fields, bound, slider, *_ = field(page)
     slider.moved(0.5)
     slider.value = 0.7  # the hand is ahead of its events
-    fields.show(page)
+    fields.show()
     assert (page.state.appearance.slice.center, slider.value) == (0.5, 0.7)
     page.update(lambda state: CENTER.write(state, -0.2))
-    fields.show(page)
+    fields.show()
     assert (bound.value, slider.value) == (-0.2, -0.2)
 
 
@@ -356,7 +360,8 @@ def test_a_refusal_of_a_widget_without_a_line_is_said_in_that_of_the_panel(page)
     at = Attribute(lambda _: False, refuse)
     Fields(page).checkbox("alone", at, "hint").moved(True)
     assert "box = True" in str(page.failures[0])
-    fields = Fields(page, Line(page.client.gui))
+    fields = Fields(page)
+    fields.message = Line(page.client.gui)
     fields.checkbox("with a line", at, "hint").moved(True)
     *_, line, _ = page.widgets
     assert "box = True" in line.content
@@ -365,7 +370,7 @@ def test_a_refusal_of_a_widget_without_a_line_is_said_in_that_of_the_panel(page)
 
 def test_a_button_gives_up_what_was_refused(page):
     fields, bound, _, form, text, line = field(page)
-    fields.button("Rest", lambda state: state, "hint")
+    fields.change("Rest", lambda state: state, "hint")
     typed(text, form, "5000")
     page.widgets[-1].moved()
     assert (bound.value, text.value, line.content) == (0.0, "0", "")
@@ -384,25 +389,25 @@ def test_a_menu_offers_what_the_design_has(page):
     assert page.state.appearance.color == "extent"
     straight = page.state.design.replace(actuators=page.state.design.actuators[2:])
     page.update(lambda state: state.replace(design=straight), by_widget=True)
-    fields.show(page)
+    fields.show()
     assert "revolution Ω [deg]" not in menu.options
     menu.moved("revolution Ω [deg]")  # an event from before
     assert page.state.appearance.color == "extent"
 
 
 def test_fields_follow_a_design_that_others_change(page):
-    fields = Fields(page, dragged=False)
+    fields = Fields(page)
     at = Attribute(lambda state: state.design.length, lambda state, value: state)
     bound = fields.number("L [m]", at, "hint")
     longer = changed(page.state.design, {"length": 1.2})
     page.update(lambda state: state.replace(design=longer), by_widget=True)
-    fields.show(page)
+    fields.show()
     assert bound.value == 1.2
 
 
 def test_fields_that_are_removed_leave_nothing(page):
     fields = field(page)[0]
-    fields.button("Rest", lambda state: state, "hint")
+    fields.change("Rest", lambda state: state, "hint")
     fields.remove()
     assert all(widget.removed for widget in page.widgets)
 

@@ -143,43 +143,31 @@ def see_all(tab):
 
 
 @pytest.mark.large
-def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(opened):
+@pytest.mark.parametrize("narrows", ["plots", "window"])
+def test_arm_and_numbers_stay_in_sight_where_the_scene_gets_narrow_and_wide_again(opened, narrows):
     tab = opened("laptop")
     see_all(tab)
     wide = tab.page.locator("canvas").first.bounding_box()["width"]
     before = tab.session.camera.actual()
-    tab.open("Plots")
-    tab.page.get_by_label("section", exact=True).check()
-    tab.wait(lambda: tab.page.locator("canvas").first.bounding_box()["width"] < wide, "it docks")
+
+    def narrow(on: bool) -> None:
+        if narrows == "plots":
+            tab.open("Plots")
+            tab.page.get_by_label("section", exact=True).set_checked(on)
+        else:
+            size = SIZES["phone" if on else "laptop"]
+            tab.page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
 
     def in_sight() -> bool:
         canvas = tab.page.locator("canvas").first.bounding_box()
-        right = in_canvas(tab, [one.position for one in labels(tab)])[:, 0] - canvas["x"]
-        return bool(((right > 0) & (right < canvas["width"])).all())
+        points = [(0, 0, 0), (0, 0, 1.0), *(one.position for one in labels(tab))]
+        right = in_canvas(tab, points)[:, 0] - canvas["x"]
+        return canvas["width"] < wide and bool(((right > 0) & (right < canvas["width"])).all())
 
-    tab.wait(in_sight, "all numbers are in sight")
-    tab.page.get_by_label("section", exact=True).uncheck()
+    narrow(True)
+    tab.wait(in_sight, "arm and numbers are in sight")
+    narrow(False)
     tab.wait(
         lambda: np.allclose(tab.session.camera.actual().position, before.position, rtol=1e-2),
         "the eye steps forth again",
     )
-
-
-@pytest.mark.large
-def test_the_arm_stays_in_sight_in_a_window_that_gets_narrow_and_wide_again(opened):
-    tab = opened("laptop")
-    see_all(tab)
-    before = tab.session.camera.actual()
-    distance = np.linalg.norm(np.subtract(before.position, before.look_at))
-    tab.page.set_viewport_size({"width": 390, "height": 844})
-    tab.wait(lambda: tab.session.camera.aspect < 0.5, "the window is narrow")
-
-    def stretch() -> float:
-        now = tab.session.camera.actual()
-        return float(np.linalg.norm(np.subtract(now.position, now.look_at)) / distance)
-
-    tab.wait(lambda: 1.5 < stretch() < 3.0, "the eye steps back")
-    right = in_canvas(tab, [(0, 0, 0), (0, 0, 1.0)])[:, 0]
-    assert ((right > 0) & (right < 390)).all()
-    tab.page.set_viewport_size({"width": 1366, "height": 768})
-    tab.wait(lambda: 0.98 < stretch() < 1.02, "the eye steps forth")

@@ -6,7 +6,6 @@ import base64
 import io
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import pytest
 from softreach.atlas import DesignSpace
 from softreach.cli.app import run
 from softreach.geometry.surface import Surface
-from softreach.studio import static
 from softreach.studio.static import write_static
 from softreach.support.errors import InvalidInput
 from softreach.workspace import reachable_set
@@ -53,10 +51,6 @@ def places(part: dict) -> np.ndarray:
     return low + steps / 65535 * (high - low)
 
 
-def files_of(written) -> dict[str, int]:
-    return {path.name: path.stat().st_mtime_ns for path in written.page.parent.rglob("*.js")}
-
-
 def test_numbers_on_the_page_are_those_of_the_reachable_set(written, trunk):
     space = grid(trunk)
     for number in (0, 1):
@@ -70,18 +64,17 @@ def test_numbers_on_the_page_are_those_of_the_reachable_set(written, trunk):
         assert numbers["volume"][2].startswith(f"{1e3 * reached.volume:.1f}")
 
 
-def test_places_are_those_of_the_surface_within_what_the_page_says(written, trunk):
+def test_places_are_those_of_the_surface_within_a_hundredth_of_the_length(written, trunk):
     design = drawn(written, sheet(written)["designs"][1]["file"])
     surface = next(part for part in design["parts"] if part["surface"])
     corners = np.frombuffer(base64.b64decode(surface["faces"]), "<u2")
     assert 5_000 < len(corners) / 3 < 15_000
     assert corners.max() < len(places(surface))
-    said = re.search(r"within (\S+) cm .* rounded to (\S+) cm", design["note"])
-    within, rounding = map(float, said.groups())
+    rounding = float(re.search(r"rounded to (\S+) cm", design["note"])[1])
     computed = reachable_set(grid(trunk).design(1)).sheets()
     mesh = Surface(vertices=places(surface) / 100, faces=corners.reshape(-1, 3))
     distance = 100 * mesh.distance(computed.vertices[::7])
-    assert 0.9 < np.mean(distance <= within) < 0.999
+    assert np.quantile(distance, 0.99) < 0.01 * 100
     step = np.ptp(design["box"], axis=0).max() / 65535
     assert rounding == pytest.approx(step, rel=0.5)
 
@@ -102,34 +95,6 @@ def test_no_file_names_a_host_or_ends_its_script_and_none_is_large(written):
         assert "fetch(" not in text
         assert len(text) < _LARGEST
     assert written.size == sum(path.stat().st_size for path in written.page.parent.rglob("*.*"))
-
-
-def test_what_is_there_is_not_computed_again_and_what_is_damaged_is(
-    written, trunk, tmp_path, monkeypatch
-):
-    shutil.copytree(written.page.parent, tmp_path / "page")
-    again = write_static(grid(trunk), tmp_path / "page", unit="cm", overwrite=True)
-    assert (again.designs, again.computed) == (2, 0)
-    before = files_of(again)
-    damaged = next((tmp_path / "page" / "designs").iterdir())
-    damaged.write_text(damaged.read_text().replace("A", "B", 1))
-    calls = []
-
-    def counted(arm):
-        calls.append(arm)
-        return reachable_set(arm, accuracy=0.03)
-
-    monkeypatch.setattr(static, "reachable_set", counted)
-    mended = write_static(grid(trunk), tmp_path / "page", unit="cm", overwrite=True)
-    assert len(calls) == mended.computed == 1
-    assert files_of(mended).keys() == before.keys()
-    notes = tmp_path / "page" / "designs" / "mine.js"
-    notes.write_text("// of mine")
-    one = grid(trunk, revolutions=(108.0,))
-    fewer = write_static(one, tmp_path / "page", unit="cm", overwrite=True)
-    notes.unlink()
-    assert fewer.computed == 0
-    assert len(files_of(fewer)) == 1  # designs that the page no longer has are gone
 
 
 def test_files_of_others_stay_and_are_refused_where_they_are_in_the_way(trunk, tmp_path, capsys):

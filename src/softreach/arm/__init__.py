@@ -13,7 +13,7 @@ from softreach.arm.actuators import (
     SectorActuator,
     Tendon,
 )
-from softreach.arm.actuators.ring_integrals import RingIntegrals
+from softreach.arm.actuators.sector import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
 from softreach.arm.body import RestShape

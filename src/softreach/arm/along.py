@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.number import series_faults, stations
 from softreach.arm.part import Part
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault
 from softreach.support.lazy import lazy
-
-__all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic", "values_along"]
-
-Array = NDArray[np.float64]
 
 _INTERPOLATIONS = ("cubic", "linear")
 
@@ -103,11 +100,10 @@ class Samples(AlongArm):
         return monotone_cubic(self.stations_over_length, self.values)
 
     def _faults(self) -> list[Fault]:
-        faults = super()._faults()
-        if not isinstance(self.interpolation, str) or self.interpolation not in _INTERPOLATIONS:
-            allowed = f"must be one of {', '.join(_INTERPOLATIONS)}"
-            faults.append(Fault("interpolation", self.interpolation, allowed))
-        return faults
+        if isinstance(self.interpolation, str) and self.interpolation in _INTERPOLATIONS:
+            return super()._faults()
+        allowed = f"must be one of {', '.join(_INTERPOLATIONS)}"
+        return [*super()._faults(), Fault("interpolation", self.interpolation, allowed)]
 
 
 def values_along(value: float | AlongArm, x: ArrayLike) -> Array:

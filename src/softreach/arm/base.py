@@ -8,17 +8,14 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.number import as_numbers, number
 from softreach.arm.part import Part
-from softreach.support.arrays import read_only
+from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault
 from softreach.support.lazy import lazy
 
-__all__ = ["POINTS", "UPRIGHT", "Base", "rotation_matrices"]
-
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
 
@@ -119,17 +116,11 @@ class Base(Part):
 
 
 def _as_rotation(points: Any) -> Array | str:
-    """The matrix, or what is allowed instead."""
     if isinstance(points, str):
         return np.array(POINTS[points]) if points in POINTS else _ALLOWED
     numbers = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)
-    if not np.isfinite(numbers).all():
-        return _ALLOWED
-    if numbers.shape == (3,):
-        return _of_vector(numbers)
-    if numbers.shape == (4,):
-        return _of_quaternion(numbers)
-    return _of_matrix(numbers) if numbers.shape == (3, 3) else _ALLOWED
+    read = {(3,): _of_vector, (4,): _of_quaternion, (3, 3): _of_matrix}.get(numbers.shape)
+    return read(numbers) if read and np.isfinite(numbers).all() else _ALLOWED
 
 
 def _of_matrix(matrix: Array) -> Array | str:

@@ -14,23 +14,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
-
-__all__ = [
-    "Extreme",
-    "bending_at",
-    "bending_stations",
-    "has_exact_bending",
-    "largest_bending",
-    "sharpest_bending",
-    "smallest_bending",
-]
-
-Array = NDArray[np.float64]
+from softreach.support.arrays import Array, Mask
 
 _STATIONS = 101
 _PER_TURN = 24  # stations for each turn of one bundle relative to another
@@ -120,7 +109,7 @@ def _reached(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array, tuple
     mean, half = 0.5 * (low + high), 0.5 * (high - low)
     plane, rates = table.curvature[:, :2] @ inputs, table.extension @ inputs
     center, halves = plane @ mean, np.swapaxes(plane * half, 1, 2)
-    if table.growth is table.extension:
+    if not table.has_forces:
         vertices = _vertices(center, halves)
         return center, halves, (vertices, np.roll(vertices, -1, axis=1))
     moving = np.flatnonzero(half)
@@ -145,7 +134,7 @@ def _vertices(center: Array, halves: Array) -> Array:
     return center[:, None] + np.concatenate([side, -side], axis=1)
 
 
-def _holds_origin(center: Array, halves: Array) -> NDArray[np.bool_]:
+def _holds_origin(center: Array, halves: Array) -> Mask:
     """Zonogons that hold the origin: no line along an edge or across the center separates them.
 
     The last is what remains to be asked where all edges are parallel or of no length.
@@ -158,7 +147,6 @@ def _holds_origin(center: Array, halves: Array) -> NDArray[np.bool_]:
 
 
 def _distance_to_edges(start: Array, end: Array) -> Array:
-    """Distance of the origin to the nearest segment, shape (station,)."""
     edges = end - start
     square = (edges**2).sum(axis=-1)
     along = -(start * edges).sum(axis=-1)
@@ -214,7 +202,6 @@ def bending_stations(arm: Manipulator) -> Array:
 
 
 def _turns(arm: Manipulator) -> float:
-    """Turns about the axis that some bundle makes relative to another."""
     center = arm.outline(np.linspace(0.0, arm.length, _STATIONS)).center
     relative = np.abs(np.diff(center - center[:, :1], axis=0)).sum(axis=0)
     return float(relative.max(initial=0.0)) / (2 * np.pi)

@@ -1,7 +1,8 @@
 """The body of an arm: what bends, and what acts in it and on it, wherever it is clamped.
 
 A body knows where it is not smooth, how stiff it is and what its bundles are; its tables and
-tensions follow from it alone. A `Manipulator` is a body with a base, drives and markers.
+tensions follow from it alone, and so do its mass and Λ, which says how much loads bend it. A
+`Manipulator` is a body with a base, drives and markers.
 """
 
 from __future__ import annotations
@@ -13,30 +14,26 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN, Actuator, Outline, Resultants
-from softreach.arm.along import AlongArm, Samples
-from softreach.arm.loads import Loads
+from softreach.arm.along import Samples, values_along
+from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.number import number
 from softreach.arm.part import Part, faults_under
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section, Stiffness, name_faults
 from softreach.arm.stations import Located, RigidPiece, Stations, placed
-from softreach.support.arrays import as_stations, read_only
+from softreach.support.arrays import Array, as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
-__all__ = [
-    "STRAIGHT",
-    "Body",
-    "RestShape",
-    "RestStrains",
-    "kind_faults",
-    "kinds_in_a_sequence",
-    "named_actuators",
-]
+VERIFIED_LOAD_NUMBER = 12.0
+"""Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
+
+# Exact for the square of a cubic, which is the mass of a piece of any profile.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,13 +66,7 @@ class RestShape(Part):
     def curvature(self, x: Array) -> Array:
         """û [1/m] at x = Z/L, shape (station, 3)."""
         each = (self.curvature_x, self.curvature_y, self.twist)
-        return np.stack([a(x) if isinstance(a, AlongArm) else np.full(len(x), a) for a in each], 1)
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Z/L inside (0, 1) where it is not smooth."""
-        each = (self.curvature_x, self.curvature_y, self.twist)
-        return tuple(x for a in each if isinstance(a, AlongArm) for x in a.breaks)
+        return np.stack([values_along(value, x) for value in each], axis=1)
 
 
 STRAIGHT = RestShape()
@@ -95,7 +86,6 @@ class RestStrains(Actuator):
     shape: RestShape
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
-        del profile, section
         return Resultants(np.zeros((len(z), 1)), np.zeros((len(z), 3, 1)))
 
     def curvature(self, profile: Profile, z: Array) -> Array:
@@ -103,7 +93,6 @@ class RestStrains(Actuator):
         return self.shape.curvature(z / profile.length)
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        del section
         zero = np.zeros((len(z), 1))
         return Outline(
             center=zero,
@@ -114,11 +103,9 @@ class RestStrains(Actuator):
             acts=self.acts(profile, z),
         )
 
-    def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        return tuple(profile.length * x for x in self.shape.breaks)
-
-
-Array = NDArray[np.float64]
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return self.shape.breaks
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -284,7 +271,7 @@ class Body:
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
     @property
-    def bundle_courses(self) -> tuple[str, ...]:
+    def fiber_directions(self) -> tuple[str, ...]:
         """Direction of contraction within each bundle; see `Actuator.fiber_direction`."""
         return tuple(actuator.fiber_direction for actuator in self.bundle_actuators)
 
@@ -292,14 +279,14 @@ class Body:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)
         each = [part.outline(self.profile, self.section, stations) for part in self.actuators]
-        each = each or [Outline.empty(len(stations))]
+        nothing = np.empty((len(stations), 0))
         return Outline(
-            center=np.concatenate([part.center for part in each], axis=1),
-            extent=np.concatenate([part.extent for part in each]),
-            inner_ratio=np.concatenate([part.inner_ratio for part in each], axis=1),
-            outer_ratio=np.concatenate([part.outer_ratio for part in each], axis=1),
+            center=np.concatenate([nothing, *(part.center for part in each)], axis=1),
+            extent=np.concatenate([np.empty(0), *(part.extent for part in each)]),
+            inner_ratio=np.concatenate([nothing, *(part.inner_ratio for part in each)], axis=1),
+            outer_ratio=np.concatenate([nothing, *(part.outer_ratio for part in each)], axis=1),
             shape=tuple(shape for part in each for shape in part.shape),
-            acts=np.concatenate([part.acts for part in each], axis=1),
+            acts=np.concatenate([nothing.astype(bool), *(part.acts for part in each)], axis=1),
         )
 
 
@@ -355,3 +342,53 @@ def named_actuators(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
         name = next(name for name in names if name not in taken)
         taken.add(name)
         yield actuator.replace(name=name)
+
+
+def mass(arm: Body) -> float:
+    """Mass of the arm [kg].
+
+    Raises:
+        InvalidDesign: A layer without a density.
+    """
+    inside = (arm.length * x for x in arm.section.breaks)
+    ends = np.array(sorted({0.0, *arm.profile.breakpoints, *inside, arm.length}))
+    half = 0.5 * np.diff(ends)[:, None]
+    z = ends[:-1, None] + half * (1.0 + _NODES)
+    per_length = arm.section.mass_per_length_at(arm.profile, z)
+    return float(np.sum(half * _WEIGHTS * per_length))
+
+
+def load_number(arm: Body) -> float:
+    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-], theory (79).
+
+    Without loads, w is the weight per length at the base under g = 9.81 m/s², and P is 0: Λ is
+    ρ g L³/(E R2²) for a solid arm of one material, and an upright cylinder buckles under its own
+    weight at 1.96. With loads, w is the weight under their gravity and the force per length beside
+    it, P the sum of all other forces, payload included, and of all moments over L. Sizes are added
+    whatever their directions, so that Λ bounds what bends the arm.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
+    """
+    if faults := load_number_faults(arm):
+        raise InvalidDesign(faults)
+    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
+    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
+    stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
+    return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
+
+
+def is_overloaded(arm: Body) -> bool:
+    """The load number is above what was verified, by more than rounding.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
+    """
+    return load_number(arm) > VERIFIED_LOAD_NUMBER * (1 + 1e-9)
+
+
+def load_number_faults(arm: Body) -> list[Fault]:
+    """Faults that keep the load number from being known."""
+    faults = arm.section.modulus_faults("where weight counts")
+    weighs = arm.loads is None or any(arm.loads.gravity)
+    return faults + (arm.section.density_faults("where weight counts") if weighs else [])

@@ -17,7 +17,7 @@ from softreach.arm.actuators import (
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material, named_material
 from softreach.arm.number import fields_of
-from softreach.arm.profile import LinearTaper
+from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section
 from softreach.support.arguments import as_instance, as_integer, as_number
 
@@ -31,8 +31,6 @@ __all__ = [
     "three_chamber_arm",
     "three_tendon_robot",
 ]
-
-_PAPER_EXTENT = math.radians(48)
 
 
 def minimal_trunk(
@@ -67,20 +65,13 @@ def minimal_trunk(
     matter = named_material(material) if isinstance(material, str) else material
     if matter is not None:
         as_instance("material", matter, Material, "a Material, its name, or None")
-    helices = (
-        FiberArchitecture(
-            name="left", revolution=-revolution, offset=math.radians(66), extent=_PAPER_EXTENT
-        ),
-        FiberArchitecture(
-            name="right", revolution=revolution, offset=math.radians(114), extent=_PAPER_EXTENT
-        ),
-    )
+    left = _fiber("left", 66, revolution=-revolution)
+    right = _fiber("right", 114, revolution=revolution)
     profile = LinearTaper(length=length, outer_radius=length / 16, taper=taper)
     if tip_radius is not None:
         profile = profile.replace(tip_radius=tip_radius)
     ring = Ring(inner_ratio=radius_ratio, material=Material() if matter is None else matter)
-    actuators = (*helices, _longitudinal(270))
-    return Manipulator(profile=profile, section=Section(rings=(ring,)), actuators=actuators)
+    return _arm(profile, (left, right, _fiber("longitudinal", 270, helical_angle=0.0)), ring)
 
 
 def redundant_trunk(
@@ -104,13 +95,24 @@ def redundant_trunk(
             incompressible one whose Young's modulus cancels.
     """
     arm = minimal_trunk(revolution, taper, length=length, material=material)
-    pair = (_longitudinal(246, "longitudinal 1"), _longitudinal(294, "longitudinal 2"))
+    pair = (
+        _fiber("longitudinal 1", 246, helical_angle=0.0),
+        _fiber("longitudinal 2", 294, helical_angle=0.0),
+    )
     return arm.replace(actuators=(*arm.actuators[:2], *pair))
 
 
-def _longitudinal(offset_deg: float, name: str = "longitudinal") -> FiberArchitecture:
-    offset = math.radians(offset_deg)
-    return FiberArchitecture(name=name, helical_angle=0.0, offset=offset, extent=_PAPER_EXTENT)
+def _fiber(name: str, offset_deg: float, **winding: Any) -> FiberArchitecture:
+    return FiberArchitecture(
+        name=name, offset=math.radians(offset_deg), extent=math.radians(48), **winding
+    )
+
+
+def _arm(
+    profile: Profile, actuators: tuple[Actuator, ...], *rings: Ring, core: Material | None = None
+) -> Manipulator:
+    section = Section(rings=rings, core=core)
+    return Manipulator(profile=profile, section=section, actuators=actuators)
 
 
 _LCE_LENGTH = 0.09  # m
@@ -138,21 +140,19 @@ def lce_arm() -> Manipulator:
     rings = tuple(
         Ring(inner_ratio=5 / 6, material=matter, name=name) for name, _, _ in _LCE_FAMILIES
     )
-    return Manipulator(
-        profile=LinearTaper(length=_LCE_LENGTH, outer_radius=_LCE_LENGTH / 20),
-        section=Section(rings=rings, core=core),
-        actuators=tuple(
-            FiberArchitecture(
-                name=name,
-                ring=name,
-                revolution=math.radians(revolution),
-                offset=math.radians(offset),
-                extent=_LCE_EXTENT,
-                activation_bounds=(-5.0, 0.0),
-            )
-            for name, revolution, offset in _LCE_FAMILIES
-        ),
+    profile = LinearTaper(length=_LCE_LENGTH, outer_radius=_LCE_LENGTH / 20)
+    actuators = tuple(
+        FiberArchitecture(
+            name=name,
+            ring=name,
+            revolution=math.radians(revolution),
+            offset=math.radians(offset),
+            extent=_LCE_EXTENT,
+            activation_bounds=(-5.0, 0.0),
+        )
+        for name, revolution, offset in _LCE_FAMILIES
     )
+    return _arm(profile, actuators, *rings, core=core)
 
 
 def filament() -> Manipulator:
@@ -168,11 +168,8 @@ def filament() -> Manipulator:
         extent=math.radians(30),
         activation_bounds=((-2.4, 0.0), (-2.0, 0.0), (-2.7, 0.0)),
     )
-    return Manipulator(
-        profile=LinearTaper(length=1.0, outer_radius=1 / 16),
-        section=Section(rings=(Ring(inner_ratio=0.6, material=matter, name="fibers"),)),
-        actuators=(sectors,),
-    )
+    ring = Ring(inner_ratio=0.6, material=matter, name="fibers")
+    return _arm(LinearTaper(length=1.0, outer_radius=1 / 16), (sectors,), ring)
 
 
 def three_tendon_robot(*, segments: int = 1) -> Manipulator:
@@ -202,7 +199,8 @@ def three_tendon_robot(*, segments: int = 1) -> Manipulator:
         )
         for place, name in enumerate(names)
     )
-    return _backbone(0.2 * segments, 0.0007, named_material("nitinol_backbone"), tendons)
+    wire = Ring(inner_ratio=0.0, material=named_material("nitinol_backbone"), name="backbone")
+    return _arm(LinearTaper(length=0.2 * segments, outer_radius=0.0007), tendons, wire)
 
 
 def helical_tendon_robot() -> Manipulator:
@@ -220,18 +218,8 @@ def helical_tendon_robot() -> Manipulator:
         revolution=2 * math.pi,
         activation_bounds=(0.0, 15.0),
     )
-    return _backbone(0.5, 0.001, steel, (tendons,))
-
-
-def _backbone(
-    length: float, radius: float, matter: Material, tendons: tuple[Tendon, ...]
-) -> Manipulator:
-    wire = Ring(inner_ratio=0.0, material=matter, name="backbone")
-    return Manipulator(
-        profile=LinearTaper(length=length, outer_radius=radius),
-        section=Section(rings=(wire,)),
-        actuators=tendons,
-    )
+    wire = Ring(inner_ratio=0.0, material=steel, name="backbone")
+    return _arm(LinearTaper(length=0.5, outer_radius=0.001), (tendons,), wire)
 
 
 def three_chamber_arm() -> Manipulator:
@@ -252,11 +240,7 @@ def three_chamber_arm() -> Manipulator:
         offset=math.pi / 2,
         activation_bounds=(0.0, 100e3),
     )
-    return Manipulator(
-        profile=LinearTaper(length=0.15, outer_radius=0.0125),
-        section=Section(rings=(silicone,)),
-        actuators=(chambers,),
-    )
+    return _arm(LinearTaper(length=0.15, outer_radius=0.0125), (chambers,), silicone)
 
 
 _TRUNK_LENGTH, _TRUNK_BASE, _TRUNK_TIP = 1.8, 0.18, 0.05  # m
@@ -288,15 +272,11 @@ def elephant_trunk() -> Manipulator:
         for name, inner, outer in _TRUNK_RINGS
     )
     taper = math.atan((_TRUNK_BASE - _TRUNK_TIP) / _TRUNK_LENGTH)
-    return Manipulator(
-        profile=LinearTaper(length=_TRUNK_LENGTH, outer_radius=_TRUNK_BASE, taper=taper),
-        section=Section(rings=rings),
-        actuators=tuple(_muscles()),
-    )
+    profile = LinearTaper(length=_TRUNK_LENGTH, outer_radius=_TRUNK_BASE, taper=taper)
+    return _arm(profile, tuple(_muscles()), *rings)
 
 
 def _muscles() -> Iterator[Actuator]:
-    """Each group on the right and, mirrored at x = 0, on the left."""
     for group, ring, (start, end), angle in _TRUNK_GROUPS:
         middle = (start + end) / 2
         for side, offset, hand in (("right", middle, 1), ("left", (180.0 - middle) % 360.0, -1)):

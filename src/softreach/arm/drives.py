@@ -8,44 +8,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.arm.number import MOST, Number, is_path_name, number
+from softreach.arm.number import MOST, NamedFloats, Number, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import as_given, plain
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidInput, Range
 
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["BundleNumbers", "Drive", "drive_faults"]
-
-Array = NDArray[np.float64]
-
 _FINITE = Range(-MOST, MOST)
 
 
-class BundleNumbers(Mapping[str, float]):
+class BundleNumbers(NamedFloats):
     """Numbers of bundles by the bundles' names; frozen."""
-
-    def __init__(self, numbers: Mapping[str, float] = {}) -> None:
-        self._numbers = {str(name): float(value) for name, value in numbers.items()}
-
-    def __getitem__(self, name: str) -> float:
-        return self._numbers[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._numbers)
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._numbers.items()))
-
-    def __repr__(self) -> str:
-        return repr(self._numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +98,7 @@ class Drive(Part):
     def effective(self, u: Array) -> tuple[Array, Array]:
         """dz(u) [unit], and its derivative [-], both of the shape of u."""
         beyond = np.abs(u) - self.dead_zone
-        acts = beyond > 0.0 if self.dead_zone else np.ones(u.shape, bool)
+        acts = (beyond > 0.0) | (self.dead_zone == 0.0)
         return np.where(acts, np.sign(u) * beyond, 0.0), acts.astype(float)
 
     @property
@@ -133,11 +111,10 @@ class Drive(Part):
             **{f"gains[{name}]": ("g", f"gain of {name}") for name in self.gains},
             **{f"offsets[{name}]": ("o", f"offset of {name}") for name in self.offsets},
         }
-        own = {
+        return {
             name: Number(field=name, symbol=symbol, meaning=meaning, allowed=_FINITE)
             for name, (symbol, meaning) in declared.items()
-        }
-        return own | super().numbers
+        } | super().numbers
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
         """NaN for a gain that its bundles do not share."""
@@ -154,8 +131,8 @@ class Drive(Part):
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, or with numbers by the names in `numbers`."""
         own = [name for name in self.numbers if name != "dead_zone" and name in changes]
-        named = {name: changes.pop(name) for name in own}  # the size of all gains before one
-        for field, value in named.items():
+        for field in own:  # the size of all gains before one
+            value = changes.pop(field)
             if field == "gain":
                 gains = changes.get("gains", self.gains).items()
                 changes["gains"] = {name: math.copysign(value, gain) for name, gain in gains}

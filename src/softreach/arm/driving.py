@@ -17,21 +17,9 @@ from softreach.arm.body import STRAIGHT, RestStrains
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import ends_over, range_of_extension, strain_stations, tables
 from softreach.arm.tensions import LengthLaw, Tensions
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
-
-__all__ = [
-    "Driving",
-    "Lengths",
-    "body_of",
-    "cube_corners",
-    "extension_range",
-    "inner_arm",
-    "pilot",
-    "without_dead_zones",
-]
-
-Array = NDArray[np.float64]
 
 _MOST_CORNERS = 1024
 _INSIDE = 256
@@ -85,22 +73,22 @@ class Driving:
     @lazy
     def is_affine(self) -> bool:
         """True if γ(x) has no kinks."""
+        return not (self.has_length_tendons or self._has_kinked_drives)
+
+    @lazy
+    def _has_kinked_drives(self) -> bool:
         is_cut = self._pulls & (self._reached()[:, 0] < 0.0)
-        has_dead_zones = any(drive.dead_zone for drive in self.driven.drives)
-        return not (self.has_length_tendons or has_dead_zones or is_cut.any())
+        return any(drive.dead_zone for drive in self.driven.drives) or bool(is_cut.any())
 
     @lazy
     def is_smooth(self) -> bool:
         """True if γ(x) has no kinks within the bounds: is affine, or all lengths stay taut."""
-        is_cut, law = self._pulls & (self._reached()[:, 0] < 0.0), self.law
-        if is_cut.any() or any(drive.dead_zone for drive in self.driven.drives):
-            return False
-        if not self.has_length_tendons:
-            return True
-        if self.arm.loads is not None or law.has_growth:
+        if self._has_kinked_drives or not self.has_length_tendons:
+            return not self._has_kinked_drives
+        if self.arm.loads is not None or self.law.changes_rest_length:
             return False
         low, high = self.driven.input_bounds.T
-        tensions = law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))
+        tensions = self.law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))
         return bool(tensions.is_taut.all())
 
     @lazy
@@ -155,8 +143,7 @@ class Driving:
         return offsets
 
     @lazy
-    def _pulls(self) -> NDArray[np.bool_]:
-        """Bundles that drives cannot push: tendons driven by tension, shape (inner bundle,)."""
+    def _pulls(self) -> Mask:
         pulls = np.zeros(self.law.arm.bundles, bool)
         for k, actuator in enumerate(self.arm.bundle_actuators):
             by_tension = isinstance(actuator, Tendon) and not isinstance(actuator, LengthTendon)
@@ -213,10 +200,9 @@ def without_dead_zones(arm: Manipulator) -> Manipulator:
     """The arm with inputs that begin beyond the dead zones of its drives: it goes as far."""
     if not any(drive.dead_zone for drive in arm.drives):
         return arm
-    drives = []
-    for drive in arm.drives:
-        low, high = drive.effective(np.array(drive.bounds))[0].tolist()
-        drives.append(drive.replace(bounds=(low, high), dead_zone=0.0))
+    ends = [tuple(drive.effective(np.array(drive.bounds))[0].tolist()) for drive in arm.drives]
+    pairs = zip(arm.drives, ends, strict=True)
+    drives = (drive.replace(bounds=bounds, dead_zone=0.0) for drive, bounds in pairs)
     return arm.replace(drives=tuple(drives))
 
 
@@ -277,11 +263,7 @@ def body_of(arm: Manipulator) -> Manipulator:
         name = "rest shape"
         while name in arm.bundle_names:
             name += "'"
-        held = RestStrains(
-            name=name,
-            shape=arm.rest,
-            activation_bounds=(1.0, 1.0),
-        )
+        held = RestStrains(name=name, shape=arm.rest, activation_bounds=(1.0, 1.0))
         actuators = arm.actuators if arm.rest.is_straight else (*arm.actuators, held)
         known = vars(arm)["_body"] = arm.replace(drives=(), actuators=actuators, rest=STRAIGHT)
     return known

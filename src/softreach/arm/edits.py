@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -19,23 +19,8 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import named_material
-from softreach.arm.section import Ring
+from softreach.arm.section import Ring, Section
 from softreach.support.errors import InvalidInput
-
-__all__ = [
-    "ACTUATOR_KINDS",
-    "ring_label",
-    "with_actuator",
-    "with_actuator_name",
-    "with_actuator_ring",
-    "with_core",
-    "with_material",
-    "with_ring",
-    "with_ring_material",
-    "with_ring_name",
-    "without_actuator",
-    "without_ring",
-]
 
 ACTUATOR_KINDS = ("fiber", "oblique muscle", "radial muscle", "tendon", "chamber")
 
@@ -104,12 +89,8 @@ def with_actuator_ring(arm: Manipulator, name: str, ring: int) -> Manipulator:
 
 
 def _with_changed(arm: Manipulator, name: str, /, **changes: Any) -> Manipulator:
-    return arm.replace(
-        actuators=tuple(
-            actuator.replace(**changes) if actuator.name == name else actuator
-            for actuator in arm.actuators
-        )
-    )
+    parts = (part.replace(**changes) if part.name == name else part for part in arm.actuators)
+    return arm.replace(actuators=tuple(parts))
 
 
 def with_ring(arm: Manipulator) -> Manipulator:
@@ -120,7 +101,7 @@ def with_ring(arm: Manipulator) -> Manipulator:
     section = arm.section
     first = min(section.rings, key=lambda ring: ring.inner_ratio)
     room = section.inner_ratio - section.bore_ratio
-    low, high = (section.inner_ratio - 0.5 * room, section.inner_ratio)
+    low, high = section.inner_ratio - 0.5 * room, section.inner_ratio
     if room <= 0:
         low, high = first.inner_ratio, 0.5 * (first.inner_ratio + first.outer_ratio)
     name = _new_name("ring", [ring.name for ring in section.rings])
@@ -147,9 +128,14 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
         hint = f"move or remove {', '.join(inside)} first"
         raise InvalidInput("rings", ring_label(arm, index), "without actuators to be removed", hint)
     kept = tuple(ring for k, ring in enumerate(rings) if k != index)
-    section = arm.section.replace(rings=kept)
-    shifted = tuple(_shifted(actuator, arm, kept) for actuator in arm.actuators)
-    return arm.replace(section=section, actuators=shifted)
+
+    def counted_again(part: Actuator) -> Actuator:
+        if not isinstance(part, SectorActuator) or isinstance(part.ring, str):
+            return part
+        return part.replace(ring=part.ring - (part.ring > index))
+
+    actuators = tuple(map(counted_again, arm.actuators))
+    return arm.replace(section=arm.section.replace(rings=kept), actuators=actuators)
 
 
 def with_ring_name(arm: Manipulator, index: int, name: str) -> Manipulator:
@@ -158,15 +144,12 @@ def with_ring_name(arm: Manipulator, index: int, name: str) -> Manipulator:
     Raises:
         InvalidDesign: Another ring has this name.
     """
-    rings = _with(arm, index, lambda ring: ring.replace(name=name))
-    old = arm.section.rings[index].name
+    old, section = arm.section.rings[index].name, _with_changed_ring(arm, index, name=name)
     moved = tuple(
-        actuator.replace(ring=index)
-        if isinstance(actuator, SectorActuator) and actuator.ring == old
-        else actuator
-        for actuator in arm.actuators
+        part.replace(ring=index) if isinstance(part, SectorActuator) and part.ring == old else part
+        for part in arm.actuators
     )
-    return arm.replace(section=arm.section.replace(rings=rings), actuators=moved)
+    return arm.replace(section=section, actuators=moved)
 
 
 def with_ring_material(arm: Manipulator, index: int, material: str) -> Manipulator:
@@ -175,9 +158,13 @@ def with_ring_material(arm: Manipulator, index: int, material: str) -> Manipulat
     Raises:
         InvalidDesign: Different materials, of which one has no Young's modulus.
     """
-    matter = named_material(material)
-    rings = _with(arm, index, lambda ring: ring.replace(material=matter))
-    return arm.replace(section=arm.section.replace(rings=rings))
+    return arm.replace(section=_with_changed_ring(arm, index, material=named_material(material)))
+
+
+def _with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Section:
+    rings = [*arm.section.rings]
+    rings[index] = rings[index].replace(**changes)
+    return arm.section.replace(rings=tuple(rings))
 
 
 def with_material(arm: Manipulator, material: str) -> Manipulator:
@@ -211,16 +198,3 @@ def _new_name(kind: str, taken: Iterable[str]) -> str:
     known = set(taken)
     names = (f"{kind} {number}" for number in itertools.count(1))
     return next(name for name in names if name not in known)
-
-
-def _shifted(actuator: Actuator, arm: Manipulator, kept: tuple[Ring, ...]) -> Actuator:
-    """The actuator in the same ring, whose index may be another now."""
-    if not isinstance(actuator, SectorActuator) or isinstance(actuator.ring, str):
-        return actuator
-    home = arm.section.ring(actuator.ring)
-    return actuator.replace(ring=next(k for k, ring in enumerate(kept) if ring is home))
-
-
-def _with(arm: Manipulator, index: int, change: Callable[[Ring], Ring]) -> tuple[Ring, ...]:
-    rings = arm.section.rings
-    return tuple(change(ring) if k == index else ring for k, ring in enumerate(rings))

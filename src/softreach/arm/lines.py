@@ -1,23 +1,30 @@
-"""Lengths of the lines along which bundles run, and tensions of those driven by length."""
+"""Lines along which bundles run: their lengths, and how far they leave the straight arm's.
+
+The linear law lets tendons pull along their lines in the straight arm; how far tips are off by that
+is known from the bent ones.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softreach.arm.actuators import Tendon
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import quadrature, tables
 from softreach.support.arguments import as_number
-from softreach.support.arrays import as_rows
+from softreach.support.arrays import Array, as_rows
 from softreach.support.errors import Range
-
-__all__ = ["lengths_of_strains", "limit_shortening", "line_lengths", "line_strains", "places"]
-
-Array = NDArray[np.float64]
 
 _STEP = 1e-5  # of a piece, for derivatives along the arm
 _HALVINGS = 52
+
+_SECTIONS = 64
+_REPETITIONS = 40  # of a fixed point, whose first step is off by about a tenth of its change
+_SETTLED = 1e-5  # of an angle over L, in a step
+_SAMPLES = 256
+_NOTED = 1e-3  # L
 
 
 def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
@@ -42,7 +49,7 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     gamma, body = Driving(arm).activations(gamma), body_of(arm)
     table = tables(body, quadrature(body)[0])
     zeta = 1.0 + gamma @ table.extension.T
-    eta = zeta if table.growth is table.extension else 1.0 + gamma @ table.growth.T
+    eta = 1.0 + gamma @ table.rest_length_factor.T if table.has_forces else zeta
     turn = eta[..., None] * np.einsum("nb,scb->nsc", gamma, table.curvature)
 
     return lengths_of_strains(arm, turn, zeta)
@@ -61,8 +68,8 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
     """
     z, weights, half = quadrature(body_of(arm))
     step = _STEP * half
-    place = places(arm, z)
-    along = (places(arm, z + step) - places(arm, z - step)) / (2.0 * step[:, None])
+    place = _places(arm, z)
+    along = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
     (x, y), (dx, dy) = place, along
     one, two, three = (turn[..., k, None] for k in range(3))
     speed = np.sqrt(
@@ -103,15 +110,78 @@ def limit_shortening(arm: Manipulator, most: float) -> Manipulator:
 
 
 def _strains_at(arm: Manipulator, ends: Array) -> Array:
-    """Change of length of each bundle's line at activations of its own [-], shape (bundle, 2)."""
     arm, count = arm.replace(drives=()), arm.bundles
     alone = np.concatenate([np.zeros((1, count)), np.diag(ends[:, 0]), np.diag(ends[:, 1])])
     lengths = line_lengths(arm, alone)
     return (lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0).T
 
 
-def places(arm: Manipulator, z: Array) -> Array:
+def _places(arm: Manipulator, z: Array) -> Array:
     """Middle of each bundle in the sections [m], shape (2, station, bundle)."""
     outline = arm.outline(z)
     middle = outline.middle_ratio * arm.profile.radius(z)[:, None]
     return middle * np.stack([np.cos(outline.center), np.sin(outline.center)])
+
+
+def law_warning(arm: Manipulator) -> str:
+    """One line where the `pull_error` exceeds 0.1 % of L; else empty."""
+    error = pull_error(arm)
+    if error <= _NOTED * arm.length:
+        return ""
+    return (
+        f"tips are off by up to about {1e3 * error:.2g} mm ({error / arm.length:.2g} L) within the "
+        "bounds: tendons pull along their bent lines, and the linear law takes the straight ones; "
+        "narrow the bounds, or take tendons that wind less"
+    )
+
+
+def pull_error(arm: Manipulator) -> float:
+    """Largest distance of tips from those of tendons that pull along their bent lines [m].
+
+    Without loads (54) is an equation for the curvature of each section alone. It is solved by
+    repetition from the linear law (52), for inputs at the ends and the middle of their bounds.
+    """
+    body = body_of(arm)
+    pulls = np.array([isinstance(each, Tendon) for each in body.bundle_actuators], bool)
+    if not pulls.any():
+        return 0.0
+    step = arm.length / _SECTIONS
+    z = np.linspace(0.5 * step, arm.length - 0.5 * step, _SECTIONS)
+    table, acts = tables(body, z), body.outline(z).acts[:, pulls, None]
+    places = _places(body, z)
+    slopes = np.gradient(places, step, axis=1, edge_order=2)
+    (x, y), (dx, dy) = places[..., pulls], slopes[..., pulls]
+    stiffness = body.stiffness_at(z)
+    resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
+    shares = np.rint(2.0 * np.random.default_rng(0).random((_SAMPLES, arm.inputs))) / 2.0
+    low, high = arm.input_bounds.T
+    gamma = Driving(arm).activations(np.unique(low + shares * (high - low), axis=0))
+    zeta, eta = 1.0 + gamma @ table.extension.T, 1.0 + gamma @ table.rest_length_factor.T
+
+    def moments(omega: Array, zeta: Array) -> Array:
+        one, two, three = (omega[..., k, None] for k in range(3))
+        along = np.stack([dx - three * y, dy + three * x, zeta[..., None] + one * y - two * x])
+        t1, t2, t3 = along / np.linalg.norm(along, axis=0)
+        moment = np.stack([-y * t3, x * t3, y * t1 - x * t2], axis=-1)
+        return np.einsum("nb,nsbk->nsk", gamma[:, pulls], np.where(acts, moment, 0.0))
+
+    linear = np.einsum("nb,skb->nsk", gamma, table.curvature)
+    rest, bent = moments(0.0 * linear, 1.0 + 0.0 * zeta), linear
+    for _ in range(_REPETITIONS):
+        before, bent = bent, linear + (moments(eta[..., None] * bent, zeta) - rest) / resistance
+        if np.abs(bent - before).max() * arm.length < _SETTLED:
+            break
+    tips = [_tips(eta[..., None] * each * step, zeta * step) for each in (linear, bent)]
+    return float(np.linalg.norm(tips[1] - tips[0], axis=1).max())
+
+
+def _tips(turns: Array, lengths: Array) -> Array:
+    """Tips [m] of arms whose pieces turn by turns, shape (n, piece, 3), and have these lengths."""
+    from scipy.spatial.transform import Rotation
+
+    tip, frame = np.zeros((len(turns), 3)), Rotation.identity(len(turns))
+    for turn, length in zip(np.swapaxes(turns, 0, 1), lengths.T, strict=True):
+        half = Rotation.from_rotvec(turn / 2.0)
+        tip += length[:, None] * (frame * half).as_matrix()[..., 2]
+        frame = frame * half * half
+    return tip

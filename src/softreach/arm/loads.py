@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["GRAVITIES", "GRAVITY", "Loads", "PointLoad"]
-
 Triple = tuple[float, float, float]
 
 GRAVITY = 9.81

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from os import PathLike
-from typing import Any, Self, TypeVar
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
-from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence
+from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence, mass
 from softreach.arm.drives import Drive, drive_faults
-from softreach.arm.load_number import scale_warnings
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section, name_faults
@@ -30,19 +30,15 @@ from softreach.support.arguments import (
     as_text,
     plain,
 )
-from softreach.support.arrays import read_only
+from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.text import write_text
 from softreach.support.lazy import lazy
 from softreach.support.units import UNITS, LengthUnit, as_unit, handy_unit
 
-Made = TypeVar("Made")
-
-__all__ = ["Manipulator", "a_manipulator"]
-
-Array = NDArray[np.float64]
-
 _NAMES = 6  # of bundles that `repr` lists
+_LONG, _WIDE = 10.0, 1.0  # m, length and outer radius from which mm may be meant
+_SLENDER = 5.0  # least L/R2(0) of a slender arm
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -166,21 +162,21 @@ class Manipulator(Body):
             faults.append(Fault("inner_radius", inner, allowed))
         elif allowed.admits(outer) and inner >= outer:
             faults.append(Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m"))
-        cone = {"length": length, "outer_radius": outer_radius, "taper": taper}
-        profile = _part_or_faults(faults, LinearTaper, **cone, tip_radius=tip_radius)
-        matter = {
-            "young_modulus": young_modulus,
-            "poisson_ratio": poisson_ratio,
-            "density": density,
-        }
-        material = _part_or_faults(faults, Material, **matter)
+        radii = {"outer_radius": outer_radius, "tip_radius": tip_radius}
+        profile = partial(LinearTaper, length=length, taper=taper, **radii)
+        matter = {"poisson_ratio": poisson_ratio, "density": density}
+        material = partial(Material, young_modulus=young_modulus, **matter)
+        for part in (profile, material):
+            try:
+                part()
+            except InvalidDesign as error:
+                faults += error.faults
         if activation_bounds is not None:
             faults += bounds_faults(activation_bounds, bundles)
-        if faults or profile is None or material is None:
+        if faults:
             raise InvalidDesign(faults)
-        ring = Ring(inner_ratio=inner_radius / outer_radius, material=material)
-        section = Section(rings=(ring,))
-        arm = cls(profile=profile, section=section, actuators=tuple(actuators))
+        section = Section(rings=(Ring(inner_ratio=inner / outer, material=material()),))
+        arm = cls(profile=profile(), section=section, actuators=tuple(actuators))
         return arm if activation_bounds is None else arm.with_bounds(activation_bounds)
 
     def with_bounds(self, activation_bounds: ArrayLike) -> Self:
@@ -223,13 +219,20 @@ class Manipulator(Body):
         """
         count = as_integer("count", count, 1, 1000)
         keep_extent = as_flag("keep_extent", keep_extent)
-        index = self._fiber_index(fiber)
-        original = self.actuators[index]
-        assert isinstance(original, SectorActuator)
-        parts = original.split(count, keep_extent=keep_extent)
-        return self.replace(
-            actuators=(*self.actuators[:index], *parts, *self.actuators[index + 1 :])
+        index, original = self._sector(fiber)
+        if original.bundles != 1:
+            hint = "its bundles are independent already"
+            raise InvalidInput(f"{original.name}.bundles", original.bundles, "1 to be split", hint)
+        if count == 1:
+            return self
+        extent = original.extent if keep_extent else original.extent / count
+        places = (original.offset + (k - (count - 1) / 2) * extent for k in range(count))
+        parts = (
+            original.replace(name=f"{original.name} {k}", offset=place, extent=extent)
+            for k, place in enumerate(places, start=1)
         )
+        others = self.actuators[:index], self.actuators[index + 1 :]
+        return self.replace(actuators=(*others[0], *parts, *others[1]))
 
     @classmethod
     def from_toml(cls, text: str, source: str = "design") -> Self:
@@ -307,19 +310,19 @@ class Manipulator(Body):
 
         They are what is called the activations of the arm in all results.
         """
-        return len(self.drives) + len(self.undriven)
+        return len(self.input_names)
 
     @lazy
     def input_names(self) -> tuple[str, ...]:
         """A name for each input."""
-        names = self.bundle_names
-        return (*(drive.name for drive in self.drives), *(names[k] for k in self.undriven))
+        alone = (self.bundle_names[k] for k in self.undriven)
+        return (*(drive.name for drive in self.drives), *alone)
 
     @lazy
     def input_units(self) -> tuple[str, ...]:
         """The unit of each input."""
-        units = self.bundle_units
-        return (*(drive.unit for drive in self.drives), *(units[k] for k in self.undriven))
+        alone = (self.bundle_units[k] for k in self.undriven)
+        return (*(drive.unit for drive in self.drives), *alone)
 
     @lazy
     def input_bounds(self) -> Array:
@@ -350,21 +353,15 @@ class Manipulator(Body):
 
         return arm_card(self, self.base)
 
-    def _fiber_index(self, fiber: str | int) -> int:
-        names = {
-            k: actuator.name
-            for k, actuator in enumerate(self.actuators)
-            if isinstance(actuator, SectorActuator)
-        }
-        key = plain(fiber)
-        if isinstance(key, int) and not isinstance(key, bool) and key in names:
-            return key
-        for index, name in names.items():
-            if isinstance(key, str) and name == key:
-                return index
-        listed = ", ".join(f"{k} ({name})" for k, name in names.items())
+    def _sector(self, which: str | int) -> tuple[int, SectorActuator]:
+        key, sectors = plain(which), [*enumerate(self.actuators)]
+        sectors = [(k, each) for k, each in sectors if isinstance(each, SectorActuator)]
+        for k, each in sectors:
+            if type(key) in (int, str) and key in (k, each.name):
+                return k, each
+        listed = ", ".join(f"{k} ({each.name})" for k, each in sectors)
         allowed = f"the name or index of one architecture: {listed}"
-        raise InvalidInput("fiber", as_given(fiber), allowed)
+        raise InvalidInput("fiber", as_given(which), allowed)
 
 
 def a_manipulator(name: str, value: object) -> Manipulator:
@@ -372,9 +369,23 @@ def a_manipulator(name: str, value: object) -> Manipulator:
     return as_instance(name, value, Manipulator, "a Manipulator")
 
 
-def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Made | None:
-    try:
-        return kind(**values)
-    except InvalidDesign as error:
-        faults += error.faults
-        return None
+def scale_warnings(arm: Manipulator) -> tuple[str, ...]:
+    """One line for a length that looks like one in mm, and one for an arm that is not slender."""
+    length, radius = arm.length, float(arm.profile.radius(0.0))
+    warnings: list[str] = []
+    if length >= _LONG:
+        known = not arm.section.density_faults("")
+        heavy = f" and weighs {mass(arm):.3g} kg" if known else ""
+        warnings.append(
+            f"the arm is {length:g} m long{heavy}; if that is meant in mm: lengths are in m, "
+            f"{length:g} mm are {length / 1e3:g}"
+        )
+    if (slenderness := length / radius) < _SLENDER:
+        meant = f"lengths are in m, {radius:g} mm are {radius / 1e3:g}"
+        cause = f"if that is meant in mm: {meant}" if radius >= _WIDE else "is it a diameter?"
+        warnings.append(
+            f"the arm is {slenderness:.3g} times as long as its outer radius at the base, "
+            f"{radius:g} m, and the theory is one of slender arms, {_SLENDER:g} times or more; "
+            f"{cause}"
+        )
+    return tuple(warnings)

@@ -16,17 +16,6 @@ from softreach.arm.part import Part
 from softreach.support.arguments import as_text
 from softreach.support.errors import Fault, InvalidInput
 
-__all__ = [
-    "LIBRARY_HINT",
-    "Material",
-    "MaterialRecord",
-    "as_material",
-    "material_faults",
-    "material_names",
-    "material_record",
-    "named_material",
-]
-
 LIBRARY_HINT = (
     "the page Materials of the guide lists them, and so does arm.material.material_names()"
 )
@@ -44,9 +33,7 @@ class Material(Part):
         InvalidDesign: A field is out of its range.
     """
 
-    young_modulus: float | None = number(
-        "E", "Pa", "Young's modulus", low=0.0, open_low=True, default=None
-    )
+    young_modulus: float | None = number("E", "Pa", "Young's modulus", above=0.0, default=None)
     """E, Young's modulus [Pa]; None where it cancels."""
     poisson_ratio: float = number("ν", "", "Poisson's ratio", low=0.0, high=0.5, default=0.5)
     """ν, Poisson's ratio [-]."""
@@ -64,7 +51,7 @@ class Material(Part):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class MaterialRecord:
     """A material of the library and where its numbers come from."""
 
@@ -92,10 +79,9 @@ def material_record(name: str) -> MaterialRecord:
     Raises:
         InvalidInput: No material has this name.
     """
-    library = _library()
-    if name not in library:
-        allowed = "a material of the library"
-        raise InvalidInput("material", name, allowed, _hint(name, tuple(library)))
+    if name not in (library := _library()):
+        hint = _hint(name, tuple(library))
+        raise InvalidInput("material", name, "a material of the library", hint)
     return library[name]
 
 
@@ -142,9 +128,7 @@ def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
         name=name,
     )
     sources = MappingProxyType(row["sources"])
-    return MaterialRecord(
-        material=material, modulus=row["modulus"], sources=sources, note=row["note"]
-    )
+    return MaterialRecord(material, row["modulus"], sources, row["note"])
 
 
 def _hint(name: object, names: tuple[str, ...]) -> str:

@@ -10,9 +10,10 @@ softreach, fields of type `float`, `int` or `tuple[float, ...]` are numbers too,
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass
 from functools import cache
 from types import MappingProxyType
@@ -23,23 +24,6 @@ import numpy as np
 from softreach.support.arguments import plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import Fault, InvalidInput, Range
-
-__all__ = [
-    "MOST",
-    "Number",
-    "Shape",
-    "Station",
-    "alternatives",
-    "as_numbers",
-    "default_of",
-    "fields_of",
-    "is_path_name",
-    "number",
-    "own_fields",
-    "series_faults",
-    "stations",
-    "unit_suffix",
-]
 
 Shape = Literal["single", "along", "triple", "series", "stations", "several"]
 """One number, a function along the arm alone, a vector, several along the arm, their places, or
@@ -66,7 +50,9 @@ _SENSE: Mapping[str, tuple[float, float]] = {
 MOST = 1e15
 """The largest size of numbers of an arm in other units, and of activations."""
 
-_PLAIN = re.compile(r"(float|int)(\|None)?|tuple\[float(,(float|\.\.\.))*\]")
+_PLAIN = re.compile(
+    r"(?:typing\.Optional\[)?(float|int)(\|None|\])?|tuple\[float(,(float|\.\.\.))*\]"
+)
 """Types of fields that are numbers without a declaration, blanks left out."""
 
 _SUFFIXES = {
@@ -111,6 +97,28 @@ class Station(float):
 
     def __hash__(self) -> int:
         return hash((self.name, float(self)))
+
+
+class NamedFloats(Mapping[str, float]):
+    """Numbers by name; frozen."""
+
+    def __init__(self, numbers: Mapping[str, float] = {}) -> None:
+        self._numbers = {str(name): float(value) for name, value in numbers.items()}
+
+    def __getitem__(self, name: str) -> float:
+        return self._numbers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._numbers.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,20 +172,8 @@ class Number:
         """Everything wrong with a value by itself, but for what `series_faults` judges."""
         if self.shape == "stations" or (value is None and self.optional) or self._is_name(value):
             return []
-        if self.shape == "series":
-            each = as_numbers(value)
-            elements = enumerate(each.ravel().tolist() if each.ndim else ())
-            return self._refused((k, each) for k, each in elements if math.isfinite(each))
-        if self.shape == "several":
-            elements = as_numbers(value)
-            if elements.ndim != 1 or elements.shape != np.shape(value):  # pyright: ignore
-                return [Fault(self.field, value, "must be a sequence of numbers")]
-            return self._refused(enumerate(elements.tolist()))
-        if self.shape == "triple":
-            triple = as_numbers(value).tolist()
-            if not isinstance(triple, list) or len(triple) != 3 or not np.isfinite(triple).all():
-                return [Fault(self.field, value, "must be three finite numbers")]
-            return self._refused(enumerate(triple))
+        if self.shape in ("series", "several", "triple"):
+            return self._faults_of_several(value)
         if self.along is not None and isinstance(value, self.along):
             return self._refused((None, each) for each in value.values)  # pyright: ignore
         if self._is_pair(value):
@@ -187,6 +183,16 @@ class Number:
         if self.shape == "single" and limits is None:
             return []
         return [Fault(self.field, single, self._allowed_instead_of(single, limits))]
+
+    def _faults_of_several(self, value: Any) -> list[Fault]:
+        each = as_numbers(value)
+        if self.shape == "triple" and not (each.shape == (3,) and np.isfinite(each).all()):
+            return [Fault(self.field, value, "must be three finite numbers")]
+        if self.shape == "several" and not (each.ndim == 1 and each.shape == np.shape(value)):
+            return [Fault(self.field, value, "must be a sequence of numbers")]
+        elements = enumerate(each.ravel().tolist() if each.ndim else ())
+        judged = self.shape == "several"  # of a series the others are judged with its stations
+        return self._refused((k, x) for k, x in elements if judged or math.isfinite(x))
 
     def elements(self, value: Any) -> dict[str, Number]:
         """Numbers in a series or a function along the arm; the ends of stations stay."""
@@ -247,9 +253,7 @@ class Number:
 
 def stations(meaning: str) -> Any:
     """Field of a dataclass that holds the places Z/L of a series; those between the ends vary."""
-    return number(
-        "Z/L", "", meaning, low=0.0, high=1.0, open_low=True, open_high=True, shape="stations"
-    )
+    return number("Z/L", "", meaning, above=0.0, below=1.0, shape="stations")
 
 
 def number(
@@ -259,16 +263,11 @@ def number(
     *,
     low: float = -math.inf,
     high: float = math.inf,
-    open_low: bool = False,
-    open_high: bool = False,
+    above: float = -math.inf,
+    below: float = math.inf,
     integer: bool = False,
-    shape: Shape = "single",
-    along: type | None = None,
-    named: bool = False,
-    pair: bool = False,
-    instead_of: str = "",
-    hint: str = "",
     default: Any = MISSING,
+    **options: Any,
 ) -> Any:
     """Field of a dataclass that is a number of a design.
 
@@ -278,30 +277,15 @@ def number(
         meaning: Meaning in a few words.
         low: Least value.
         high: Largest value.
-        open_low: Exclude `low` itself.
-        open_high: Exclude `high` itself.
+        above: Largest value that is too small.
+        below: Least value that is too large.
         integer: It counts something.
-        shape: A single number, a function along the arm, a triple, a series, its stations, or
-            several numbers.
-        along: Class of functions along the arm that may take its place.
-        named: The name of a station may take its place.
-        pair: Two values, where the part begins and where it ends, may take its place.
-        instead_of: Field that says the same in another way.
-        hint: Ends the sentence "give exactly one of ...".
         default: Default of the field; without one it is required, None makes it optional.
+        options: Other fields of `Number`, such as `shape`.
     """
-    allowed = Range(low, high, unit, open_low, open_high, integer)
-    declared = Number(
-        symbol=symbol,
-        meaning=meaning,
-        allowed=allowed,
-        shape=shape,
-        along=along,
-        named=named,
-        pair=pair,
-        instead_of=instead_of,
-        hint=hint,
-    )
+    ends = max(low, above), min(high, below)
+    allowed = Range(*ends, unit, above > -math.inf, below < math.inf, integer)
+    declared = Number(symbol=symbol, meaning=meaning, allowed=allowed, **options)
     return dataclasses.field(default=default, metadata={"number": declared})
 
 
@@ -382,17 +366,11 @@ def as_numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 def _own_fields(owner: type) -> list[dataclasses.Field[Any]]:
     declared: dict[str, dataclasses.Field[Any]] = vars(owner).get("__dataclass_fields__", {})
-    inherited = [getattr(base, "__dataclass_fields__", {}) for base in owner.__bases__]
-    return [
-        field
-        for name, field in declared.items()
-        if not any(fields.get(name) is field for fields in inherited)
-    ]
+    return [declared[name] for name in inspect.get_annotations(owner) if name in declared]
 
 
 def _plain_number(owner: type, field: dataclasses.Field[Any]) -> Number | None:
-    """The number that a field outside softreach is by its type, if it is one."""
-    typed = field.type if isinstance(field.type, str) else _type_text(field.type)
+    typed = field.type.__name__ if isinstance(field.type, type) else str(field.type)
     plain = _PLAIN.fullmatch(typed.replace(" ", ""))
     if plain is None or not field.init:
         return None
@@ -407,8 +385,3 @@ def _plain_number(owner: type, field: dataclasses.Field[Any]) -> Number | None:
 
 def _is_ours(owner: type) -> bool:
     return owner.__module__.partition(".")[0] == "softreach"
-
-
-def _type_text(kind: Any) -> str:
-    optional = re.sub(r"typing\.Optional\[(\w+)\]", r"\1 | None", str(kind))
-    return kind.__name__ if isinstance(kind, type) and str(kind).startswith("<class") else optional

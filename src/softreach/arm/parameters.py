@@ -1,14 +1,8 @@
 """Design parameters: the numbers of an arm that a sweep, a slider or an optimizer varies.
 
-Each is called by its path. Those of the whole arm have plain names: `taper`, `length`,
-`revolution`. Those of a part begin with the part: `profile.radii[1]`, `rings[0].inner_ratio`,
-`rings[0].material.young_modulus`, `core.density`, and an actuator's own with its name:
-`left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`. Counting starts at 0; a ring that
-has a name may be called by it: `rings[skin].inner_ratio`. What several parts share, such as
-`lower`, has a value where theirs are equal; it can be set in any case, which makes them equal.
-
-Parts say themselves what numbers they have (`Part.numbers`), what values (`values_of`), and make
-changed copies (`replace`). A parameter is an address among them, or a rule for several of them.
+Parts say what numbers they have (`Part.numbers`), what values (`values_of`), and make changed
+copies (`replace`). A parameter is a number of a part, one that several parts share, or one that
+numbers of several parts follow by a law of its own.
 """
 
 from __future__ import annotations
@@ -68,6 +62,10 @@ class Parameter:
     """Its declaration."""
     places: tuple[Address, ...] = ()
     """The numbers of parts that it is."""
+    read: Callable[[Manipulator], tuple[float, ...]] | None = None
+    """Law by which its values follow from an arm; by default they are those at its places."""
+    write: Callable[[Manipulator, Rule], dict[Address, float]] | None = None
+    """Law by which numbers of parts follow it; by default those at its places have its value."""
 
     @property
     def unit(self) -> str:
@@ -118,10 +116,14 @@ class Parameter:
 
     def values(self, arm: Manipulator) -> tuple[float, ...]:
         """Its value in each part that shares it, and of each bundle that a bound is of [unit]."""
+        if self.read is not None:
+            return self.read(arm)
         return tuple(value for place in self.places for value in _values(arm, place))
 
     def edits(self, arm: Manipulator, new: Rule) -> dict[Address, float]:
         """New values of numbers of parts by which each of its values becomes new(value)."""
+        if self.write is not None:
+            return self.write(arm, new)
         edits: dict[Address, float] = {}
         for part, called in self.places:
             values = [new(value) for value in _values(arm, (part, called))]
@@ -137,35 +139,18 @@ def _values(arm: Manipulator, place: Address) -> tuple[float, ...]:
     return parts(arm)[part].values_of(called, arm.profile, arm.section)
 
 
-@dataclass(frozen=True, kw_only=True)
-class DerivedParameter(Parameter):
-    """A number that numbers of parts follow by a law of its own."""
-
-    read: Callable[[Manipulator], tuple[float, ...]]
-    write: Callable[[Manipulator, Rule], dict[Address, float]]
-
-    def values(self, arm: Manipulator) -> tuple[float, ...]:
-        return self.read(arm)
-
-    def edits(self, arm: Manipulator, new: Rule) -> dict[Address, float]:
-        return self.write(arm, new)
-
-
-# Laws of derived parameters.
-
-
-def _taper(arm: Manipulator) -> tuple[float, ...]:
-    return (float(getattr(arm.profile, "taper")),)  # noqa: B009
+# Laws of parameters that are no numbers of parts.
 
 
 def _tapered(arm: Manipulator, new: Rule) -> dict[Address, float]:
     """Revolutions stay, and helical angles follow, but for those given along the arm."""
-    winding = {
+    revolutions = {
         (("actuators", fiber.name), "revolution"): fiber.revolution_on(arm.profile, arm.section)
         for fiber in arm.fibers
         if fiber.helical_angle and not isinstance(fiber.helical_angle, AlongArm)
     }
-    return {(("profile",), "taper"): new(_taper(arm)[0]), **winding}
+    taper = ("profile",), "taper"
+    return {taper: new(_values(arm, taper)[0]), **revolutions}
 
 
 def _outer_radius(arm: Manipulator) -> tuple[float, ...]:
@@ -180,25 +165,26 @@ def _scaled(arm: Manipulator, new: Rule) -> dict[Address, float]:
     return {(("profile",), f"radii[{k}]"): radius for k, radius in enumerate(scaled)}
 
 
-def _turns(arm: Manipulator) -> dict[Address, float]:
-    """Ω of all that winds by a single number other than 0 [rad]."""
-    turns: dict[Address, float] = {}
+def _revolutions(arm: Manipulator) -> dict[Address, float]:
+    """Ω of all that is helical by a single number other than 0 [rad]."""
+    found: dict[Address, float] = {}
     for actuator in arm.actuators:
         numbers = fields_of(type(actuator))
         along = any(isinstance(getattr(actuator, field), AlongArm) for field in numbers)
         if not along and "revolution" in numbers and numbers["revolution"].unit == "rad":
-            (turn,) = actuator.values_of("revolution", arm.profile, arm.section)
-            turns |= {(("actuators", actuator.name), "revolution"): turn} if turn else {}
-    return turns
+            place = ("actuators", actuator.name), "revolution"
+            found |= {place: turn} if (turn := _values(arm, place)[0]) else {}
+    return found
 
 
-def _revolution(arm: Manipulator) -> tuple[float, ...]:
-    return tuple(map(abs, _turns(arm).values())) or (0.0,)
+def _sizes_of_revolutions(arm: Manipulator) -> tuple[float, ...]:
+    return tuple(map(abs, _revolutions(arm).values())) or (0.0,)
 
 
-def _wound(arm: Manipulator, new: Rule) -> dict[Address, float]:
+def _revolved(arm: Manipulator, new: Rule) -> dict[Address, float]:
     """Each keeps its sense."""
-    return {place: math.copysign(new(abs(turn)), turn) for place, turn in _turns(arm).items()}
+    turns = _revolutions(arm).items()
+    return {place: math.copysign(new(abs(turn)), turn) for place, turn in turns}
 
 
 # The list.
@@ -206,23 +192,21 @@ def _wound(arm: Manipulator, new: Rule) -> dict[Address, float]:
 
 def parts(arm: Manipulator) -> dict[PartKey, Any]:
     """Every part that has numbers, by its key."""
-    keyed: dict[PartKey, Any] = {("profile",): arm.profile, ("section",): arm.section}
-    if arm.loads is not None:
-        keyed["loads",] = arm.loads
-    if not arm.base.is_identity:
-        keyed["base",] = arm.base
-    if not arm.rest.is_straight:
-        keyed["rest",] = arm.rest
-    if arm.stations:
-        keyed["stations",] = arm.stations
+    section = arm.section
+    keyed: dict[PartKey, Any] = {("profile",): arm.profile, ("section",): section}
+    given = {
+        "loads": arm.loads is not None,
+        "base": not arm.base.is_identity,
+        "rest": not arm.rest.is_straight,
+        "stations": bool(arm.stations),
+    }
+    keyed |= {(name,): getattr(arm, name) for name, is_given in given.items() if is_given}
     keyed |= {("rigid_pieces", k): piece for k, piece in enumerate(arm.rigid_pieces)}
     keyed |= {("markers", marker.name): marker for marker in arm.markers}
-    for k, ring in enumerate(arm.section.rings):
+    for k, ring in enumerate(section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
-    if arm.section.core is not None:
-        keyed["core",] = arm.section.core
-    if arm.section.measured is not None:
-        keyed["measured",] = arm.section.measured
+    inside = {("core",): section.core, ("measured",): section.measured}
+    keyed |= {key: part for key, part in inside.items() if part is not None}
     keyed |= {("drives", drive.name): drive for drive in arm.drives}
     return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
 
@@ -265,10 +249,11 @@ def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Para
     if any(called == "revolution" and one.unit == "rad" for (_, called), one in own.items()):
         meaning = "revolution of all that is helical, each in its own sense"
         number = dataclasses.replace(fields_of(FiberArchitecture)["revolution"], meaning=meaning)
-        yield DerivedParameter(name="revolution", number=number, read=_revolution, write=_wound)
+        laws = {"read": _sizes_of_revolutions, "write": _revolved}
+        yield Parameter(name="revolution", number=number, **laws)
     if number := alone.pop("taper", None):
-        of = ((("profile",), "taper"),)
-        yield DerivedParameter(name="taper", number=number, places=of, read=_taper, write=_tapered)
+        places = ((("profile",), "taper"),)
+        yield Parameter(name="taper", number=number, places=places, write=_tapered)
     ratios = _places(own, "inner_ratio", "rings")
     if len({value for place in ratios for value in _values(arm, place)}) == 1:
         ratio = fields_of(Ring)["inner_ratio"]
@@ -276,13 +261,11 @@ def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Para
         yield Parameter(name="radius_ratio", number=number, places=ratios)
     if "outer_radius" not in alone and isinstance(getattr(arm.profile, "radii", None), tuple):
         number = fields_of(LinearTaper)["outer_radius"]
-        yield DerivedParameter(
-            name="outer_radius", number=number, read=_outer_radius, write=_scaled
-        )
+        yield Parameter(name="outer_radius", number=number, read=_outer_radius, write=_scaled)
     yield from (each for each in own.values() if each.name in alone)
-    ratio, matter = fields_of(Material)["poisson_ratio"], ("rings", "core")
-    places = _places(own, "poisson_ratio", *matter)
-    yield Parameter(name="poisson_ratio", number=ratio, places=places)
+    places = _places(own, "poisson_ratio", "rings", "core")
+    number = fields_of(Material)["poisson_ratio"]
+    yield Parameter(name="poisson_ratio", number=number, places=places)
     for called in ("extent", "lower", "upper"):
         shared = _places(own, called, "actuators")
         if len({own[place].unit for place in shared}) == 1:
@@ -311,8 +294,7 @@ def find_parameter(arm: Manipulator, name: str) -> Parameter:
 
     Args:
         arm: Whose it is.
-        name: As `parameters` has it; a ring may be called by its name too, as in
-            `rings[skin].inner_ratio`.
+        name: As `parameters` has it, or with the name of a ring: `rings[skin].inner_ratio`.
 
     Raises:
         InvalidInput: The arm has no such parameter.
@@ -344,13 +326,11 @@ def find_parameters(
 
 
 class _Edit(NamedTuple):
-    """A new value of a number of a part, and who asked for it."""
+    """A new value of a number of a part, and the parameter with its value that led to it."""
 
     value: float
     name: str
-    """The parameter."""
     asked: float
-    """Value of the parameter."""
     own: bool
     """It is a parameter of the part itself."""
 
@@ -381,14 +361,13 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
 def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipulator:
     """As `changed`, with parameters that were found before, those of the whole arm first."""
     asked = {each: plain(value) for each, value in values.items()}
-    for each, value in asked.items():
-        if each.whole and isinstance(value, float) and value.is_integer():
-            asked[each] = int(value)
-    if faults := [
-        Fault(each.name, value, limits)
+    asked |= {
+        each: int(value)
         for each, value in asked.items()
-        if (limits := each.number.refusal(value))
-    ]:
+        if each.whole and isinstance(value, float) and value.is_integer()
+    }
+    judged = [(each, value, each.number.refusal(value)) for each, value in asked.items()]
+    if faults := [Fault(each.name, value, limits) for each, value, limits in judged if limits]:
         raise InvalidDesign(faults)
     edits: _Edits = {}
     for each, value in asked.items():
@@ -397,12 +376,12 @@ def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipula
 
 
 def shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
-    """The design with one parameter grown, in each part from the part's own value.
+    """The design with an amount added to one parameter, in each part to the part's own value.
 
     Args:
         arm: The design to start from.
         parameter: One of its parameters.
-        amount: By how much it grows [its unit].
+        amount: What is added [its unit].
 
     Raises:
         InvalidDesign: No such arm can exist.
@@ -451,7 +430,6 @@ def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
 def _assembled(
     arm: Manipulator, new: Mapping[PartKey, Any], inside: Mapping[str, float]
 ) -> Manipulator:
-    """Of the section, other numbers than those of its parts are `inside`."""
     rings = tuple(
         new["rings", k].replace(material=new["rings", k, "material"])
         for k in range(len(arm.section.rings))
@@ -459,23 +437,17 @@ def _assembled(
     own = {name: new[name,] for name in ("core", "measured") if (name,) in new}
     section = arm.section.replace(rings=rings, **own, **inside)
     alone = ("profile", "loads", "base", "rest", "stations")
-    kinds = ("rigid_pieces", "markers", "drives", "actuators")
-    several: dict[str, list[Any]] = {kind: [] for kind in kinds}
-    for key, part in new.items():
-        if key[0] in several:
-            several[str(key[0])].append(part)
-    changes = {name: new[name,] for name in alone if (name,) in new}
-    return arm.replace(
-        section=section, **changes, **{name: tuple(each) for name, each in several.items()}
-    )
+    changes = {name: new[name,] for name in alone if (name,) in new} | {
+        kind: tuple(part for key, part in new.items() if key[0] == kind)
+        for kind in ("rigid_pieces", "markers", "drives", "actuators")
+    }
+    return arm.replace(section=section, **changes)
 
 
 def _as_asked(fault: Fault, edits: _Edits) -> Fault:
-    """A fault of a part or of the arm under the parameters that asked for it."""
-    paths = fault.path.split(", ")
     by = [
         edit
-        for path in paths
+        for path in fault.path.split(", ")
         for key, numbers in edits.items()
         for called, edit in numbers.items()
         if path in _paths(key, called)
@@ -483,8 +455,7 @@ def _as_asked(fault: Fault, edits: _Edits) -> Fault:
     names = dict.fromkeys(edit.name for edit in by)
     if not names:
         return fault
-    value = by[0].asked if len(names) == 1 else fault.value
-    return Fault(", ".join(names), value, fault.allowed)
+    return Fault(", ".join(names), by[0].asked if len(names) == 1 else fault.value, fault.allowed)
 
 
 def _paths(key: PartKey, called: str) -> tuple[str, ...]:
@@ -523,7 +494,6 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
 
 
 def _shortened(names: Iterable[str]) -> list[str]:
-    """The names, of a series its first and its last number."""
     places: dict[str, list[str]] = {}
     for name in names:
         element = _ELEMENT.match(name)
@@ -531,8 +501,8 @@ def _shortened(names: Iterable[str]) -> list[str]:
         places.setdefault(base, []).append(place)
     texts: list[str] = []
     for base, each in places.items():
-        alone = [base] if "" in each else []
         several = [place for place in each if place]
+        alone = [base] if "" in each else []
         ends = [f"{base}{several[0]} to {several[-1]}"] if len(several) > 1 else []
         texts += [*alone, *(ends or [base + place for place in several])]
     return texts

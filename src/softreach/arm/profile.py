@@ -18,13 +18,9 @@ from softreach.arm.along import monotone_cubic
 from softreach.arm.number import number, series_faults, stations
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, Range
 from softreach.support.lazy import lazy
-
-__all__ = ["LinearTaper", "PiecewiseTaper", "Profile", "SampledTaper"]
-
-Array = NDArray[np.float64]
 
 # Enough for machine precision while a radius changes by less than tenfold between two stations.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
@@ -42,7 +38,7 @@ class Profile(Part, ABC):
     these are not smooth.
     """
 
-    length: float = number("L", "m", "length before activation", low=0.0, open_low=True)
+    length: float = number("L", "m", "length before activation", above=0.0)
     """L, from base to tip before activation [m]."""
 
     def __post_init__(self) -> None:
@@ -107,12 +103,10 @@ class Profile(Part, ABC):
 
     @lazy
     def _knots(self) -> Array:
-        """Base, breakpoints and tip [m]."""
         return np.array([0.0, *self.breakpoints, self.length])
 
     @lazy
     def _slender_knots(self) -> Array:
-        """S at the knots [-]."""
         gaps = self._slender_gap(np.arange(len(self._knots) - 1), np.diff(self._knots))
         return np.concatenate([[0.0], np.cumsum(gaps)])
 
@@ -151,17 +145,10 @@ class LinearTaper(Profile):
     """
 
     taper: float = number(
-        "φ",
-        "rad",
-        "taper angle",
-        low=-math.pi / 2,
-        high=math.pi / 2,
-        open_low=True,
-        open_high=True,
-        default=0.0,
+        "φ", "rad", "taper angle", above=-math.pi / 2, below=math.pi / 2, default=0.0
     )
     """φ, taper angle [rad]; negative widens toward the tip."""
-    outer_radius: float = number("R2(0)", "m", "outer radius at the base", low=0.0, open_low=True)
+    outer_radius: float = number("R2(0)", "m", "outer radius at the base", above=0.0)
     """R2(0), outer radius at the base [m]."""
 
     def __init__(
@@ -223,7 +210,6 @@ class LinearTaper(Profile):
 
 
 def _taper_to(tip_radius: Any, length: Any, outer_radius: Any, taper: Any) -> float:
-    """φ [rad] by which a cone ends with a radius; 0 if the cone is wrong anyway."""
     positive = Range(0.0, unit="m", open_low=True)
     if not positive.admits(tip_radius):
         raise InvalidDesign([Fault("tip_radius", tip_radius, positive)])
@@ -239,7 +225,7 @@ class _RadiiAtStations(Profile):
     stations_over_length: tuple[float, ...] = stations("station of a radius")
     """Z/L of the radii [-], from 0 to 1, rising."""
     radii: tuple[float, ...] = number(
-        "R2", "m", "outer radius at a station", shape="series", low=0.0, open_low=True
+        "R2", "m", "outer radius at a station", shape="series", above=0.0
     )
     """R2 at these stations before activation [m]."""
 

@@ -10,21 +10,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.along import AlongArm, values_along
 from softreach.arm.material import Material, as_material, material_faults
 from softreach.arm.number import is_path_name, number
 from softreach.arm.part import Part
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
-
-__all__ = ["Layer", "Measured", "Ring", "Section", "Stiffness", "name_faults"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,15 +35,15 @@ class Measured(Part):
     """
 
     axial_stiffness: float | AlongArm | None = number(
-        "K0", "N", "axial stiffness", low=0.0, open_low=True, along=AlongArm, default=None
+        "K0", "N", "axial stiffness", above=0.0, along=AlongArm, default=None
     )
     """K0 [N]."""
     bending_stiffness: float | AlongArm | None = number(
-        "K1", "N m²", "bending stiffness", low=0.0, open_low=True, along=AlongArm, default=None
+        "K1", "N m²", "bending stiffness", above=0.0, along=AlongArm, default=None
     )
     """K1 = K2 [N m²]."""
     torsion_stiffness: float | AlongArm | None = number(
-        "K3", "N m²", "torsional stiffness", low=0.0, open_low=True, along=AlongArm, default=None
+        "K3", "N m²", "torsional stiffness", above=0.0, along=AlongArm, default=None
     )
     """K3 [N m²]."""
     mass_per_length: float | AlongArm | None = number(
@@ -59,12 +56,6 @@ class Measured(Part):
         """K0, K1 and K3, each None where it was not measured."""
         return self.axial_stiffness, self.bending_stiffness, self.torsion_stiffness
 
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Z/L inside (0, 1) where one of them is not smooth."""
-        values = (*self.stiffnesses, self.mass_per_length)
-        return tuple(x for value in values if isinstance(value, AlongArm) for x in value.breaks)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Ring(Part):
@@ -74,12 +65,10 @@ class Ring(Part):
         InvalidDesign: No ring is left between the ratios.
     """
 
-    inner_ratio: float = number(
-        "R1/R2", "", "inner radius over R2", low=0.0, high=1.0, open_high=True
-    )
+    inner_ratio: float = number("R1/R2", "", "inner radius over R2", low=0.0, below=1.0)
     """R1/R2, inner radius of the ring over the outer radius of the arm [-]."""
     outer_ratio: float = number(
-        "R/R2", "", "outer radius over R2", low=0.0, high=1.0, open_low=True, default=1.0
+        "R/R2", "", "outer radius over R2", above=0.0, high=1.0, default=1.0
     )
     """Outer radius of the ring over the outer radius of the arm [-]."""
     material: Material = field(default_factory=Material)
@@ -151,7 +140,7 @@ class Section(Part):
     core: Material | None = None
     """Material inside, or the name of one of the library; None for that of the innermost ring."""
     bore_ratio: float = number(
-        "R0/R2", "", "radius of the bore over R2", low=0.0, high=1.0, open_high=True, default=0.0
+        "R0/R2", "", "radius of the bore over R2", low=0.0, below=1.0, default=0.0
     )
     """Radius of the hole along the axis over R2 [-]; 0 for a solid core."""
     measured: Measured | None = None
@@ -186,11 +175,7 @@ class Section(Part):
         return [] if same else self.modulus_faults("where materials differ")
 
     def ring(self, which: int | str) -> Ring:
-        """A ring by its index or name.
-
-        Raises:
-            InvalidDesign: There is none.
-        """
+        """A ring by its index or name; raises as `ring_index`."""
         return self.rings[self.ring_index(which)]
 
     def ring_index(self, which: int | str) -> int:
@@ -266,8 +251,7 @@ class Section(Part):
             radius: R2 [m].
         """
         outer = np.asarray(radius, float)
-        area = np.pi * self._sum(_modulus, 2)
-        inertia = np.pi / 4 * self._sum(_modulus, 4)
+        area, inertia = np.pi * self._sum(_modulus, 2), np.pi / 4 * self._sum(_modulus, 4)
         shear = self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
         polar = np.pi / 4 * shear
         return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)
@@ -360,7 +344,6 @@ def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
 
 
 def _allowed_name(name: str, path: str) -> str:
-    """Requirement that the name of an actuator or a ring breaks; "" for a good one."""
     if not is_path_name(name):
         return "must be one line without dots and brackets, and without spaces around it"
     if path == "actuators" and name in _RESERVED:

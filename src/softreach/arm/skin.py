@@ -6,7 +6,7 @@ lumens tubes of their radius. They are cut where they begin and end to act.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self, TypeAlias
 
@@ -19,25 +19,13 @@ from softreach.arm.stations import Marker
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
 
 if TYPE_CHECKING:
     import xarray as xr
 
-
-__all__ = [
-    "Centerline",
-    "arm_card",
-    "arm_surface",
-    "bundle_curves",
-    "bundle_skins",
-    "bundle_surfaces",
-    "inside",
-    "marker_points",
-]
-
-Array = NDArray[np.float64]
 
 _LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
@@ -74,10 +62,8 @@ class Centerline:
             return shape
         if not (least := float(shape["extension"].min())) > 0.0:
             hint = "ask for the configuration of activations within the bounds of the design"
-            extension = f"with extension ζ = {least:.4g}"
-            raise InvalidInput(
-                "configuration", extension, "of an arm that has a length, ζ > 0", hint
-            )
+            given, allowed = f"with extension ζ = {least:.4g}", "of an arm that has a length, ζ > 0"
+            raise InvalidInput("configuration", given, allowed, hint)
         if "sample" in shape.dims:
             count = shape.sizes["sample"]
             hint = "choose one with configuration.isel(sample=0)"
@@ -139,11 +125,6 @@ class _Span:
     arm_radius: Array
     """R2 [m], shape (station,)."""
 
-    @property
-    def middle(self) -> Array:
-        """Half between inner and outer radius [m], shape (station,)."""
-        return 0.5 * (self.inner_ratio + self.outer_ratio) * self.arm_radius
-
     def points(self, angles: Array, radius: Array) -> Array:
         """At polar angles (station, across) and radii (station,), shape (station, across, 3)."""
         d1, d2 = self.directors[:, None, 0], self.directors[:, None, 1]
@@ -151,9 +132,8 @@ class _Span:
         return self.position[:, None] + radius[:, None, None] * spokes
 
     def curve(self) -> Array:
-        """Its middle, for a sector on the outside of the ring, shape (station, 3)."""
-        sector = self.shape == "sector"
-        radius = self.outer_ratio * self.arm_radius if sector else self.middle
+        """The middle of a line or a lumen, shape (station, 3)."""
+        radius = 0.5 * (self.inner_ratio + self.outer_ratio) * self.arm_radius
         return self.points(self.center[:, None], radius)[:, 0]
 
     def band(self, lift: float, step: float) -> Array:
@@ -177,26 +157,6 @@ def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
     line = _drawn_line(arm, shape)
     d1, d2 = line.directors[:, 0], line.directors[:, 1]
     return tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
-
-
-def bundle_curves(arm: Body, shape: Shape) -> Array:
-    """The middle of every bundle, also where it does not act: r + R (cos a d1 + sin a d2).
-
-    Args:
-        arm: The design; a = arm.outline(Z).center. R is the distance of lines and lumens from the
-            axis, and the outer radius of the ring that a sector is in.
-        shape: As for `arm_surface`.
-
-    Returns:
-        Points [m], shape (bundles, stations, 3).
-
-    Raises:
-        InvalidInput: Several configurations.
-    """
-    line = Centerline.of(shape)
-    every = np.ones((len(line.z) - 1, arm.bundles), bool)
-    spans = [next(parts) for parts in _spans(arm, line, every)]
-    return np.stack([span.curve() for span in spans])
 
 
 def bundle_skins(
@@ -282,36 +242,28 @@ def arm_card(arm: Body, base: Base) -> str:
     """HTML with a small picture of the unactivated arm above its numbers, for notebooks."""
     line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS), base)
     body = arm_surface(arm, line)
-    bundles = bundle_skins(arm, line, lift=0.01, step=_CARD_STEP)
-    skins = (
-        Skin(bundle.vertices, bundle.faces, bundle_color(k)) for k, bundle in enumerate(bundles)
-    )
-    body_card = Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
-    return html_card(repr(arm), body_card, *skins)
+    bundles = enumerate(bundle_skins(arm, line, lift=0.01, step=_CARD_STEP))
+    skins = (Skin(each.vertices, each.faces, bundle_color(k)) for k, each in bundles)
+    body_skin = Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
+    return html_card(repr(arm), body_skin, *skins)
 
 
 def _drawn_line(arm: Body, shape: Shape) -> Centerline:
-    """With stations where the radius has kinks and where bundles begin and end."""
     return Centerline.of(shape).with_stations(arm.breakpoints)
 
 
 def _skins(arm: Body, line: Centerline, sector: Callable[[_Span], Surface]) -> list[Surface]:
-    middle = 0.5 * (line.z[1:] + line.z[:-1])
     width = _LINE * arm.length
     make = {"sector": sector, "line": lambda span: _line_tube(span, width), "lumen": _lumen}
-    return [
-        joined([make[span.shape](span) for span in spans])
-        for spans in _spans(arm, line, arm.outline(middle).acts)
-    ]
+    return [joined([make[span.shape](span) for span in spans]) for spans in _spans(arm, line)]
 
 
-def _spans(arm: Body, line: Centerline, acts: NDArray[np.bool_]) -> Iterator[Iterator[_Span]]:
-    """The spans of each bundle; `acts` tells of each piece between stations."""
+def _spans(arm: Body, line: Centerline) -> list[list[_Span]]:
     outline, radius = arm.outline(line.z), arm.profile.radius(line.z)
-
-    def of(k: int) -> Iterator[_Span]:
-        for part in _runs(acts[:, k]):
-            yield _Span(
+    acts = arm.outline(0.5 * (line.z[1:] + line.z[:-1])).acts
+    return [
+        [
+            _Span(
                 shape=outline.shape[k],
                 extent=float(outline.extent[k]),
                 position=line.position[part],
@@ -321,11 +273,13 @@ def _spans(arm: Body, line: Centerline, acts: NDArray[np.bool_]) -> Iterator[Ite
                 outer_ratio=outline.outer_ratio[part, k],
                 arm_radius=radius[part],
             )
+            for part in _runs(acts[:, k])
+        ]
+        for k in range(arm.bundles)
+    ]
 
-    yield from (of(k) for k in range(arm.bundles))
 
-
-def _runs(acts: NDArray[np.bool_]) -> list[slice]:
+def _runs(acts: Mask) -> list[slice]:
     """Stations from the start to the end of each run of pieces that act."""
     change = np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))
     pairs = zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True)
@@ -333,7 +287,6 @@ def _runs(acts: NDArray[np.bool_]) -> list[slice]:
 
 
 def _line_tube(span: _Span, radius: float) -> Surface:
-    """A thin tube, round across its own direction."""
     curve = span.curve()
     along = _unit(np.gradient(curve, axis=0))
     spoke = span.points(span.center[:, None], np.ones(len(curve)))[:, 0] - span.position
@@ -343,13 +296,11 @@ def _line_tube(span: _Span, radius: float) -> Surface:
 
 def _lumen(span: _Span) -> Surface:
     radius = 0.5 * (span.outer_ratio - span.inner_ratio) * span.arm_radius
-    return tube_surface(
-        span.curve(), span.directors[:, 0], span.directors[:, 1], radius, _LUMEN_SIDES
-    )
+    d1, d2 = span.directors[:, 0], span.directors[:, 1]
+    return tube_surface(span.curve(), d1, d2, radius, _LUMEN_SIDES)
 
 
 def _across(vector: Array, along: Array) -> Array:
-    """Vectors without their part along unit vectors."""
     return vector - np.sum(vector * along, axis=1, keepdims=True) * along
 
 

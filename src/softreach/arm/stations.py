@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from softreach.arm.number import Number, Station, fields_of, is_path_name, number
+from softreach.arm.number import NamedFloats, Number, Station, fields_of, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-__all__ = ["PLACE", "Located", "Marker", "RigidPiece", "Span", "Stations", "placed"]
-
 Triple = tuple[float, float, float]
 
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
 """Declaration of the place of a named station."""
 
+_PLACE: dict[str, Any] = {"low": 0.0, "named": True}
+
 _SHORTEST = 1e-9  # of L, of a part between two places: below it, places round to one another
 
 
-class Stations(Mapping[str, float]):
+class Stations(NamedFloats):
     """Z [m] of stations by name; frozen.
 
     Raises:
@@ -47,7 +47,7 @@ class Stations(Mapping[str, float]):
                 faults.append(Fault(name, z, PLACE.allowed))
         if faults:
             raise InvalidDesign(faults)
-        self._places = {str(name): float(z) for name, z in pairs.items()}
+        super().__init__(pairs)
 
     @property
     def numbers(self) -> dict[str, Number]:
@@ -56,27 +56,14 @@ class Stations(Mapping[str, float]):
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
         """Z [m]."""
-        del profile, section
         return (self[name],)
 
     def replace(self, **places: float) -> Stations:
         """Those with some in other places."""
-        return Stations(self._places | places)
-
-    def __getitem__(self, name: str) -> float:
-        return self._places[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._places.items()))
+        return Stations({**self, **places})
 
     def __repr__(self) -> str:
-        return f"Stations({self._places})"
+        return f"Stations({super().__repr__()})"
 
 
 class Located(Part):
@@ -131,32 +118,17 @@ class Span(Located):
     """
 
     start_over_length: float = number(
-        "Z0/L", "", "where it begins", low=0.0, high=1.0, open_high=True, default=0.0
+        "Z0/L", "", "where it begins", low=0.0, below=1.0, default=0.0
     )
     """Z0/L, where along the arm it begins [-]."""
-    end_over_length: float = number(
-        "Z1/L", "", "where it ends", low=0.0, high=1.0, open_low=True, default=1.0
-    )
+    end_over_length: float = number("Z1/L", "", "where it ends", above=0.0, high=1.0, default=1.0)
     """Z1/L, where it ends [-]."""
     start: float | str | None = number(
-        "Z0",
-        "m",
-        "where it begins",
-        low=0.0,
-        named=True,
-        instead_of="start_over_length",
-        default=None,
+        "Z0", "m", "where it begins", instead_of="start_over_length", default=None, **_PLACE
     )
     """Z0 [m], or the name of a station of the arm, in place of `start_over_length`."""
     end: float | str | None = number(
-        "Z1",
-        "m",
-        "where it ends",
-        low=0.0,
-        open_low=True,
-        named=True,
-        instead_of="end_over_length",
-        default=None,
+        "Z1", "m", "where it ends", above=0.0, instead_of="end_over_length", default=None, **_PLACE
     )
     """Z1 [m], or the name of a station of the arm, in place of `end_over_length`."""
 
@@ -166,9 +138,8 @@ class Span(Located):
 
     def span_over_length(self, length: float) -> tuple[float, float]:
         """The same over L [-]."""
-        return self.station_over_length_at("start", length), self.station_over_length_at(
-            "end", length
-        )
+        start, end = (self.station_over_length_at(field, length) for field in ("start", "end"))
+        return start, end
 
     def place_faults(self, length: float) -> list[Fault]:
         """Faults of ends that an arm of a length [m] does not have."""
@@ -219,13 +190,7 @@ class Marker(Located):
     )
     """Z/L of its section [-]."""
     station: float | str | None = number(
-        "Z",
-        "m",
-        "where its section is",
-        low=0.0,
-        named=True,
-        instead_of="station_over_length",
-        default=None,
+        "Z", "m", "where its section is", instead_of="station_over_length", default=None, **_PLACE
     )
     """Z [m], or the name of a station of the arm, in place of `station_over_length`."""
     offset: Triple = number(
@@ -253,21 +218,17 @@ def placed(part: Made, stations: Mapping[str, float]) -> Made:
         for field, place in given.items()
         if isinstance(place, str | Station)
     }
-    if faults := [
-        Fault(field, name, _allowed(name, stations))
-        for field, name in names.items()
-        if name not in stations
-    ]:
-        raise InvalidDesign(faults)
-    if not names:
-        return part
-    return part.replace(**{field: Station(name, stations[name]) for field, name in names.items()})
+    unknown = {field: name for field, name in names.items() if name not in stations}
+    if unknown:
+        faults = (Fault(field, name, _allowed(name, stations)) for field, name in unknown.items())
+        raise InvalidDesign([*faults])
+    places = {field: Station(name, stations[name]) for field, name in names.items()}
+    return part.replace(**places) if places else part
 
 
 def _allowed(name: str, stations: Mapping[str, float]) -> str:
     if not stations:
         return "must be Z in m: the arm has no stations by name"
     hint = did_you_mean(name, stations)
-    return f"must be Z in m or a station of the arm: {', '.join(stations)}" + (
-        f"; {hint}" if hint else ""
-    )
+    known = f"must be Z in m or a station of the arm: {', '.join(stations)}"
+    return f"{known}; {hint}" if hint else known

@@ -11,31 +11,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.body import Body, RestStrains
 from softreach.arm.number import fields_of
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
-
-__all__ = [
-    "Compliance",
-    "Tables",
-    "both_sides",
-    "check_extension",
-    "compliance",
-    "ends_over",
-    "jumps",
-    "quadrature",
-    "strain_stations",
-    "tables",
-]
-
-Array = NDArray[np.float64]
 
 _STATIONS = 101
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -53,9 +38,14 @@ class Tables:
     """z = dζ/dγ [-], shape (station, bundle)."""
     curvature: Array
     """U = du/dγ [1/m], per length of η, in the directors, shape (station, 3, bundle)."""
-    growth: Array
+    rest_length_factor: Array
     """dη/dγ [-]: z of bundles that change the length of matter at rest, 0 of those that are forces;
     shape (station, bundle). Of fibers and muscles alone it is `extension` itself."""
+
+    @property
+    def has_forces(self) -> bool:
+        """True if some bundles are forces, so that η is not ζ."""
+        return self.rest_length_factor is not self.extension
 
 
 def tables(arm: Body, stations: ArrayLike) -> Tables:
@@ -81,8 +71,8 @@ def tables(arm: Body, stations: ArrayLike) -> Tables:
         if isinstance(actuator, RestStrains):
             curvature[..., k] = actuator.curvature(arm.profile, z)
     is_force = [actuator.is_force for actuator in arm.bundle_actuators]
-    growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
-    return Tables(z, extension, curvature, growth)
+    resting = np.where(is_force, 0.0, extension) if any(is_force) else extension
+    return Tables(z, extension, curvature, resting)
 
 
 def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
@@ -99,27 +89,19 @@ def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
     return Resultants(np.where(acts, load.force, 0.0), np.where(acts[:, None], load.moment, 0.0))
 
 
-class Compliance(NamedTuple):
-    """Compliance of sections, one value for each station."""
+def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
+    """1/K0 [1/N], 1/K1 = 1/K2 and 1/K3 [1/(N m²)] at stations Z [m]; 0 in rigid pieces.
 
-    axial: Array
-    """1/K0 [1/N]."""
-    bending: Array
-    """1/K1 = 1/K2 [1/(N m²)]."""
-    torsion: Array
-    """1/K3 [1/(N m²)]."""
-
-
-def compliance(arm: Body, stations: ArrayLike) -> Compliance:
-    """1/K0, 1/K1 and 1/K3 at stations Z [m]; 0 in rigid pieces.
+    Returns:
+        One value for each station, shape (station,) each.
 
     Raises:
         InvalidDesign: A material without Young's modulus.
     """
     if faults := arm.section.modulus_faults("where loads act"):
         raise InvalidDesign(faults)
-    stiffness = arm.stiffness_at(stations)
-    return Compliance(*(1.0 / value for value in stiffness))
+    axial, bending, torsion = arm.stiffness_at(stations)
+    return 1.0 / axial, 1.0 / bending, 1.0 / torsion
 
 
 @lru_cache(maxsize=64)
@@ -141,12 +123,12 @@ def check_extension(arm: Body) -> None:
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
-    for rates, of in ((table.extension, ""), (table.growth, " of matter itself, without forces")):
+    matter = table.rest_length_factor, " of matter itself, without forces"
+    for rates, of in ((table.extension, ""), matter):
         smallest, _ = range_of_extension(arm, rates)
         if smallest <= 0:
-            allowed = (
-                f"reaches extension ζ = {smallest:.4g}{of}; must keep ζ > 0: narrow the bounds"
-            )
+            kept = "must keep ζ > 0: narrow the bounds"
+            allowed = f"reaches extension ζ = {smallest:.4g}{of}; {kept}"
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
 
 
@@ -196,7 +178,7 @@ def jumps(arm: Body) -> tuple[float, ...]:
     sides = np.concatenate([breaks, np.nextafter(breaks, 0.0)])
     table, stiffness = tables(arm, sides), arm.stiffness_at(sides)
     jumping = np.zeros(len(breaks), bool)
-    for values in (table.extension, table.growth, table.curvature, *stiffness):
+    for values in (table.extension, table.rest_length_factor, table.curvature, *stiffness):
         after, before = np.reshape(values, (2, len(breaks), -1))
         largest = np.abs(values).max(initial=0.0)
         jumping |= (np.abs(after - before) > _JUMP * largest).any(axis=1)

@@ -19,11 +19,8 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import LengthTendon
 from softreach.arm.body import Body, RestStrains
 from softreach.arm.tables import quadrature, tables
+from softreach.support.arrays import Array, Mask
 from softreach.support.lazy import lazy
-
-__all__ = ["LengthLaw", "Tensions"]
-
-Array = NDArray[np.float64]
 
 
 class Tensions(NamedTuple):
@@ -31,7 +28,7 @@ class Tensions(NamedTuple):
 
     tension: Array
     """τ >= 0 [N], shape (n, tendon)."""
-    is_taut: NDArray[np.bool_]
+    is_taut: Mask
     """Tendons whose tension follows the displacements, shape (n, tendon)."""
 
 
@@ -68,13 +65,12 @@ class LengthLaw:
         return [tendon for tendon in each if isinstance(tendon, LengthTendon)]
 
     @property
-    def has_growth(self) -> bool:
+    def changes_rest_length(self) -> bool:
         """True if bundles change the length of matter, so that s is not linear in γ."""
         return len(self._growing) > 0
 
     @lazy
     def _growing(self) -> NDArray[np.intp]:
-        """Bundles that change the length of matter at rest."""
         return np.flatnonzero([not each.is_force for each in self.arm.bundle_actuators])
 
     def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:
@@ -103,8 +99,8 @@ class LengthLaw:
         table = tables(self.arm, z)
         bent = np.einsum("sct,scb->stb", moment, table.curvature)
         axial = np.einsum("st,sb->tb", force, table.extension)
-        growth = table.growth[:, self._growing]
-        return axial + bent.sum(axis=0), np.einsum("stb,sg->tbg", bent, growth)
+        eta = table.rest_length_factor[:, self._growing]
+        return axial + bent.sum(axis=0), np.einsum("stb,sg->tbg", bent, eta)
 
     def shortening(self, inner: Array) -> Array:
         """s of the path of each tendon [m] at activations with tensions, shape (n, tendon)."""
@@ -175,7 +171,7 @@ class LengthLaw:
         inner[:, self.columns] = tension
         return inner
 
-    def slopes(self, inner: Array, is_taut: NDArray[np.bool_], of_strains: Array) -> Array:
+    def slopes(self, inner: Array, is_taut: Mask, of_strains: Array) -> Array:
         """∂(activations with tensions)/∂(activations with displacements), on the taut tendons.
 
         Args:

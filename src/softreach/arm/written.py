@@ -15,8 +15,6 @@ from softreach.arm.number import unit_suffix
 from softreach.arm.parameters import Parameter, parameters_by_every_name
 from softreach.support.quantity import read_quantity, unit_names
 
-__all__ = ["Written", "from_written", "with_suffix", "written_name"]
-
 
 def written_name(name: str, unit: str) -> str:
     """A name with its unit: `taper_deg`, `rings[0].material.young_modulus_pa`, `radii_m[1]`."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.atlas.command import Command, check_names
+from softreach.atlas.command import Command
 from softreach.atlas.executor import ExecutorLike, an_executor, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
@@ -110,50 +110,42 @@ def build_atlas(
             sparse for the radius.
     """
     as_instance("space", space, DesignSpace, "a DesignSpace")
-    store, chosen, tol = a_store("store", store), chosen_metrics(metrics), check_tol(tol)
-    alpha_over_length = as_number("alpha_over_length", alpha_over_length, POSITIVE)
-    accuracy, shard = as_number("accuracy", accuracy, ACCURACIES), _shard_of("shard", shard)
-    keep_clouds, durable = as_flag("keep_clouds", keep_clouds), as_flag("durable", durable)
-    executor = an_executor("executor", executor)
+    store, (first, count) = a_store("store", store), _shard_of("shard", shard)
+    durable, executor = as_flag("durable", durable), an_executor("executor", executor)
     progress = None if progress is None else as_function("progress", progress)
-    check_names(chosen, space)
-    numbers = range(shard[0], space.size, shard[1])
     check_sampler(sampler, n, 0, seed)
     check_memory("n", n, _SAMPLE_MEMORY * n)
-    with bar("looking at all designs", space.size) as shown:
-        space.survey(shown)
     command = Command(
         space=space,
         n=n,
         seed=seed,
         sampler=sampler,
-        tol=tol,
-        alpha_over_length=alpha_over_length,
-        accuracy=accuracy,
-        metrics=chosen,
-        keep_clouds=keep_clouds,
+        tol=check_tol(tol),
+        alpha_over_length=as_number("alpha_over_length", alpha_over_length, POSITIVE),
+        accuracy=as_number("accuracy", accuracy, ACCURACIES),
+        metrics=chosen_metrics(metrics),
+        keep_clouds=as_flag("keep_clouds", keep_clouds),
     )
-    indices = np.array(numbers)
     if space.gaps:
         _warn_of_gaps(space)
     atlas = AtlasStore.begin(store, command, durable=durable)
+    indices = np.arange(first, space.size, count)
     content = contents(atlas, tips_of=indices.tolist())
     if content.damage:
         warn(f"{content.damage}; what is damaged is computed again")
     ended = np.isin(content.status[indices], (DONE, GAP, UNSTABLE))
-    _run(atlas, indices[~ended], executor, progress)
+    _run(atlas, indices[~ended].tolist(), executor, progress)
     built = open_atlas(store)
     _warn_of_metrics(built)
     return built
 
 
-def _shard_of(name: str, value: object) -> tuple[int, int]:
-    if isinstance(value, tuple | list) and len(value) == 2:
-        first, count = map(plain, value)
-        if {type(first), type(count)} == {int} and 0 <= first < count:
-            return first, count
-        raise InvalidInput(name, "/".join(map(str, (first, count))), "i/k with 0 <= i < k")
-    raise InvalidInput(name, as_given(value), "(i, k) with 0 <= i < k")
+def _shard_of(name: str, value: Any) -> tuple[int, int]:
+    pair = tuple(map(plain, value)) if isinstance(value, tuple | list) else ()
+    if len(pair) == 2 and {*map(type, pair)} == {int} and 0 <= pair[0] < pair[1]:
+        return pair
+    shown = "/".join(map(str, pair)) if len(pair) == 2 else as_given(value)
+    raise InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
 
 
 def _warn_of_gaps(space: DesignSpace) -> None:
@@ -179,14 +171,10 @@ def _warn_of_metrics(built: xr.Dataset) -> None:
 
 
 def _run(
-    atlas: AtlasStore,
-    indices: np.ndarray,
-    executor: ExecutorLike,
-    progress: Progress | None,
+    atlas: AtlasStore, indices: list[int], executor: ExecutorLike, progress: Progress | None
 ) -> None:
     failures: dict[int, str] = {}
     lock = Lock()
-
     with bar("computing designs", len(indices)) as shown:
 
         def on_outcome(outcome: tuple[int, str]) -> None:
@@ -196,7 +184,7 @@ def _run(
                     failures[index] = failure
                 (progress or shown)(1)
 
-        run_designs(atlas, indices.tolist(), executor, on_outcome)
+        run_designs(atlas, indices, executor, on_outcome)
     if failures:
         index, message = next(iter(failures.items()))
         warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")

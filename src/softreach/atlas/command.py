@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from importlib.metadata import version
 from typing import Any, Self
 
 import numpy as np
 
-from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import known_metric
 from softreach.atlas.space import DesignSpace
@@ -18,7 +17,7 @@ from softreach.cloud.curvature import QUANTILES
 from softreach.sampling import check_sampler
 from softreach.support.errors import InvalidInput, counted
 
-__all__ = ["ATLAS_VERSION", "Command", "check_names"]
+__all__ = ["ATLAS_VERSION", "Command"]
 
 ATLAS_VERSION = 5
 """Version of the layout of a store."""
@@ -37,7 +36,8 @@ class Command:
     """Everything that decides the numbers of an atlas, and nothing else.
 
     Raises:
-        InvalidInput: An argument out of range, or a space without a single valid design.
+        InvalidInput: A metric of a name that the atlas uses itself, a space without a single valid
+            design, or lengths of designs that are too far apart to keep clouds.
     """
 
     space: DesignSpace
@@ -59,7 +59,6 @@ class Command:
     atlas_version: int = ATLAS_VERSION
 
     def __post_init__(self) -> None:
-        check_names(self.metrics, self.space)
         for fault in _faults(self):
             raise fault
         check_sampler(self.sampler, self.n, self.space.bundles, self.seed)
@@ -78,10 +77,6 @@ class Command:
     def profile_sizes(self) -> dict[str, int]:
         """Number of stations and quantiles of a profile."""
         return {"station": len(self.stations), "quantile": len(self.quantiles)}
-
-    def design(self, index: int) -> Manipulator:
-        """The design with this number."""
-        return self.space.design(index)
 
     def to_json(self) -> str:
         """The command as text, from which `from_json` makes an equal one."""
@@ -107,26 +102,25 @@ class Command:
 
     def differences(self, other: Command) -> list[str]:
         """Differences between this command and another, one line each."""
-        metrics = _metric_differences(self.metrics, other.metrics)
-        return [*_differences(_flat(self), _flat(other)), *metrics]
-
-
-def check_names(metrics: Iterable[Metric], space: DesignSpace) -> None:
-    """Refuse metrics of the names that an atlas of these designs uses itself.
-
-    Raises:
-        InvalidInput: There is one.
-    """
-    taken = _RESERVED | {*space.names}
-    for name in (metric.name for metric in metrics if metric.name in taken):
-        raise InvalidInput("name of a metric", name, "a name that the atlas does not use itself")
+        own, its = ({m.name: m.to_dict() for m in each.metrics} for each in (self, other))
+        lines = [*_differences(_flat(self), _flat(other))]
+        for here, there, place in (
+            (its, own, "there and not here"),
+            (own, its, "here and not there"),
+        ):
+            if only := [name for name in here if name not in there]:
+                lines.append(f"metrics: {', '.join(only)} {place}")
+        for name in own.keys() & its.keys():
+            lines += (f"metric {name}, {line}" for line in _differences(own[name], its[name]))
+        return lines
 
 
 def _faults(command: Command) -> Iterator[InvalidInput]:
     space = command.space
-    if not 0 < command.alpha_over_length < np.inf:
-        value, allowed = command.alpha_over_length, "a radius > 0 over the length of each design"
-        yield InvalidInput("alpha_over_length", value, allowed)
+    for metric in command.metrics:
+        if metric.name in _RESERVED or metric.name in space.names:
+            allowed = "a name that the atlas does not use itself"
+            yield InvalidInput("name of a metric", metric.name, allowed)
     if not space.bundles:
         why = next(iter(space.gaps.values()))
         designs = counted(space.size, "design")
@@ -146,13 +140,9 @@ def _recorded(values: Mapping[str, Any]) -> Metric:
 
 def _flat(command: Command) -> dict[str, Any]:
     values = {f.name: getattr(command, f.name) for f in fields(command)}
-    del values["space"], values["metrics"]
-    space = command.space
-    return values | {
-        "layout": space.layout,
-        "design": space.base.to_toml(),
-        **dict(space.parameters),
-    }
+    space, _ = values.pop("space"), values.pop("metrics")
+    design = {"layout": space.layout, "design": space.base.to_toml()}
+    return values | design | dict(space.parameters)
 
 
 def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[str]:
@@ -162,16 +152,6 @@ def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator
             yield f"{name}: {_shown(other, own)} there, {_shown(own, other)} here"
 
 
-def _metric_differences(mine: tuple[Metric, ...], theirs: tuple[Metric, ...]) -> Iterator[str]:
-    own, other = ({m.name: m.to_dict() for m in metrics} for metrics in (mine, theirs))
-    if only := [name for name in other if name not in own]:
-        yield f"metrics: {', '.join(only)} there and not here"
-    if only := [name for name in own if name not in other]:
-        yield f"metrics: {', '.join(only)} here and not there"
-    for name in own.keys() & other.keys():
-        yield from (f"metric {name}, {line}" for line in _differences(own[name], other[name]))
-
-
 def _shown(value: Any, other: Any) -> str:
     """A setting in a few words, chosen so that it differs visibly from the other one."""
     if value is None:
@@ -179,8 +159,6 @@ def _shown(value: Any, other: Any) -> str:
     if isinstance(value, tuple) and len(value) > 4:
         return f"{len(value)} values from {value[0]:.6g} to {value[-1]:.6g}"
     if isinstance(value, str) and "\n" in value:
-        others = str(other).splitlines()
-        return (
-            "; ".join(line for line in value.splitlines() if line and line not in others) or "less"
-        )
+        own = [line for line in value.splitlines() if line and line not in str(other).splitlines()]
+        return "; ".join(own) or "less"
     return repr(value)

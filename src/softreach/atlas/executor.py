@@ -19,12 +19,14 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, islice
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from softreach.atlas.command import Command
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import UNSTABLE, AtlasStore, Result
@@ -46,15 +48,8 @@ Outcome = tuple[int, str]
 OnOutcome = Callable[[Outcome], None]
 
 
-class DaskClient(Protocol):
-    """Method of a `dask.distributed.Client` that is used."""
-
-    def get_executor(self, **options: Any) -> Executor:
-        """Its tasks as futures."""
-        ...
-
-
-ExecutorLike = Executor | DaskClient | None
+ExecutorLike = Any
+"""None, an `Executor`, or a `dask.distributed.Client`, which has a method `get_executor`."""
 
 _opened: dict[str, AtlasStore] = {}
 
@@ -67,60 +62,49 @@ def an_executor(name: str, value: Any) -> Any:
     """
     if value is None or isinstance(value, Executor) or hasattr(value, "get_executor"):
         return value
-    allowed = "a concurrent.futures executor, or a Dask client"
-    raise InvalidInput(name, as_given(value), allowed)
+    raise InvalidInput(name, as_given(value), "a concurrent.futures executor, or a Dask client")
 
 
 def run_designs(
-    store: AtlasStore,
-    indices: Sequence[int],
-    executor: ExecutorLike,
-    on_outcome: OnOutcome,
+    store: AtlasStore, indices: Sequence[int], executor: ExecutorLike, on_outcome: OnOutcome
 ) -> None:
-    """Compute designs and store them.
-
-    Args:
-        store: Where they go.
-        indices: Which designs.
-        executor: None for the threads of this process; else what runs the designs, one a task.
-        on_outcome: Called with each outcome as it comes.
+    """Compute and store designs, one a task; each outcome is reported as it comes.
 
     Raises:
         InvalidInput: A metric that worker processes cannot get.
         StoreFailed: The store cannot be written.
-        SoftreachError: A worker died, and with it the executor.
+        NotPossible: A worker died, and with it the executor.
     """
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
         metrics = store.command.metrics
         begun = (begin_design(store, metrics, index) for index in indices)
-        tasks = (partial(_report, task, on_outcome) for task in begun)
+        tasks = (partial(lambda task: on_outcome(task()), task) for task in begun)
         # Threads start with the second task: with one before all they get the first design at once.
         parallel.run(chain([lambda: None], tasks))
         return
     if isinstance(executor, ProcessPoolExecutor):
-        for metric in store.command.metrics:
-            try:
-                pickle.dumps(metric.compute)
-            except Exception:
-                raise InvalidInput(
-                    f"compute of metric {metric.name}",
-                    metric.compute,
-                    "a function of a module where worker processes compute it",
-                    "lambdas and functions inside of functions cannot be sent to them",
-                ) from None
+        _check_pickled(store.command.metrics)
     pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
     _run_in_pool(pool, store, indices, on_outcome)
 
 
-def _report(task: Callable[[], Outcome], on_outcome: OnOutcome) -> None:
-    on_outcome(task())
+def _check_pickled(metrics: Sequence[Metric]) -> None:
+    for metric in metrics:
+        try:
+            pickle.dumps(metric.compute)
+        except Exception:
+            allowed = "a function of a module where worker processes compute it"
+            hint = "lambdas and functions inside of functions cannot be sent to them"
+            name = f"compute of metric {metric.name}"
+            raise InvalidInput(name, metric.compute, allowed, hint) from None
 
 
 def _run_in_pool(
     pool: Executor, store: AtlasStore, indices: Sequence[int], on_outcome: OnOutcome
 ) -> None:
-    remote, waiting = _Remote(store), iter(indices)
+    remote = _Remote(store.command, store.location, store.opened.durable, store)
+    waiting = iter(indices)
     pending: dict[Future[Outcome], int] = {}
     try:
         while True:
@@ -152,39 +136,41 @@ def _outcome(future: Future[Outcome], store: AtlasStore, index: int) -> Outcome:
         return index, message
 
 
+@dataclass(frozen=True)
 class _Remote:
-    """Task as it travels to a worker elsewhere that computes designs of a store.
+    """A store as it travels to a worker elsewhere, where designs are read and written.
 
-    The worker reads the activations from the store and writes its results there. The command
-    travels along, as the functions of metrics are in no store; unpickling it imports the modules
-    that these and the kinds of the design's parts are in.
+    The command travels along, as the functions of metrics are in no store; unpickling it imports
+    the modules that these and the kinds of the design's parts are in.
     """
 
-    def __init__(self, store: AtlasStore) -> None:
-        self.command, self._location = store.command, store.location
-        self._durable = store.opened.durable
-        self._store: AtlasStore | None = store
-        self._token, self._origin = secrets.token_hex(8), (socket.gethostname(), os.getpid())
+    command: Command
+    location: Any
+    durable: bool
+    here: AtlasStore | None
+    """The store itself, in the process that opened it."""
+    token: str = field(default_factory=lambda: secrets.token_hex(8))
+    origin: tuple[str, int] = field(default_factory=lambda: (socket.gethostname(), os.getpid()))
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_store": None}
+        return self.__dict__ | {"here": None}
 
     def store(self) -> AtlasStore:
         """The store, opened once per process, which uses one thread by default."""
         from zarr.storage import MemoryStore
 
-        if self._store is not None:
-            return self._store
-        if (socket.gethostname(), os.getpid()) != self._origin:
+        if self.here is not None:
+            return self.here
+        if (socket.gethostname(), os.getpid()) != self.origin:
             os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
-            if isinstance(self._location, dict | MemoryStore):
-                raise StoreFailed(
+            if isinstance(self.location, dict | MemoryStore):
+                raise NotPossible(
                     "the store is in the memory of another process; use a path or a URL"
                 )
-        if self._token not in _opened:
+        if self.token not in _opened:
             _opened.clear()
-            _opened[self._token] = AtlasStore.open(self._location, durable=self._durable)
-        return _opened[self._token]
+            _opened[self.token] = AtlasStore.open(self.location, durable=self.durable)
+        return _opened[self.token]
 
 
 def _run_remotely(remote: _Remote, index: int) -> Outcome:
@@ -203,7 +189,7 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
     thread. A failure of the design is stored and returned, one of the store is raised.
     """
     try:
-        arm = store.command.design(index)
+        arm = store.command.space.design(index)
         found = Intermediates(arm, store.cube, store.command, metrics)
         threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
         values = _values(store, threaded, found)  # none but NaN where nothing is stable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -43,7 +43,7 @@ class Settings(NamedTuple):
     """Of these."""
 
 
-class Intermediates(Mapping[Need, Any]):
+class Intermediates:
     """Need -> its value for one design, computed at first use.
 
     Args:
@@ -62,23 +62,15 @@ class Intermediates(Mapping[Need, Any]):
         metrics: Sequence[Metric] = (),
         sets: Callable[[], Any] | None = None,
     ) -> None:
-        self.arm, self.cube, self.command = arm, cube, command
+        self.arm, self.cube, self.command, self.known_set = arm, cube, command, sets
         self.needs = frozenset(need for metric in metrics for need in metric.needs)
-        self.known_set = sets
         self._cache: dict[Need, Any] = {}
 
     @classmethod
     def of_one(
         cls, arm: Manipulator, samples: int, accuracy: float, sets: Callable[[], Any]
     ) -> Self:
-        """Of a single design, with a radius of alpha shapes that its samples allow.
-
-        Args:
-            arm: The design.
-            samples: Number of samples, a power of two.
-            accuracy: Relative error of volumes of reachable sets.
-            sets: Source of the reachable set.
-        """
+        """Of one design, with a radius of alpha shapes that its samples, a power of 2, allow."""
         cube = sample_cube("sobol", samples, max(arm.inputs, 1))
         alpha = _SPACINGS / float(np.cbrt(samples))
         return cls(arm, cube, Settings(_TOL, accuracy, alpha), sets=sets)
@@ -109,16 +101,9 @@ class Intermediates(Mapping[Need, Any]):
             self._cache[need] = _COMPUTE[need](self)
         return self._cache[need]
 
-    def __iter__(self) -> Iterator[Need]:
-        return iter(_COMPUTE)
-
-    def __len__(self) -> int:
-        return len(_COMPUTE)
-
-    def forget(self, *needs: Need) -> None:
-        """Free the memory of results that are no longer needed."""
-        for need in needs:
-            self._cache.pop(need, None)
+    def forget(self, need: Need) -> None:
+        """Free the memory of a result that is no longer needed."""
+        self._cache.pop(need, None)
 
 
 def activations_of(rod: TipMap, cube: Array) -> Array:

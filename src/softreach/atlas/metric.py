@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -32,6 +32,12 @@ class Need(Enum):
     CONVEX_VOLUME = "volume of the convex hull of the tips [m³]"
     REACHABLE_SET = "the exact ReachableSet; it is computed with all threads"
     STRAIN_STATISTICS = "dataset of bending, torsion and extension, as of curvature_statistics"
+
+
+class SupportsNeeds(Protocol):
+    """Source of what metrics need, such as a dictionary."""
+
+    def __getitem__(self, need: Need, /) -> Any: ...
 
 
 class MetricFailed(SoftreachError):
@@ -75,7 +81,7 @@ class Metric:
         if self.over not in ((), PROFILE):
             raise InvalidInput(f"over of metric {self.name}", self.over, f"() or {PROFILE}")
 
-    def value(self, found: Mapping[Need, Any], sizes: Mapping[str, int]) -> Array:
+    def value(self, found: SupportsNeeds, sizes: Mapping[str, int]) -> Array:
         """The metric of one design, shape () or that of a profile.
 
         Args:

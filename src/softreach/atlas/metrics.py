@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from softreach.atlas.metric import PROFILE, Metric, Need
 from softreach.cloud.curvature import QUANTITIES
@@ -56,9 +58,9 @@ def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
 def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
     if isinstance(choice, Metric):
         return (choice,)
-    if isinstance(choice, str) and choice in METRIC_GROUPS:
-        return METRIC_GROUPS[choice]
     if isinstance(choice, str):
+        if choice in METRIC_GROUPS:
+            return METRIC_GROUPS[choice]
         if choice in (known := _imported_metrics()):
             return (known[choice],)
         if choice in plugins.declared(plugins.METRICS):
@@ -79,12 +81,9 @@ def own_metrics() -> dict[str, Metric]:
 
 
 def _imported_metrics() -> dict[str, Metric]:
-    return {
-        metric.name: metric
-        for module in plugins.imported()
-        for metric in vars(module).values()
-        if isinstance(metric, Metric) and _KNOWN.get(metric.name) != metric
-    }
+    known = (value for module in plugins.imported() for value in vars(module).values())
+    metrics = (value for value in known if isinstance(value, Metric))
+    return {m.name: m for m in metrics if _KNOWN.get(m.name) != m}
 
 
 def _declared_metric(name: str) -> Metric:
@@ -94,12 +93,8 @@ def _declared_metric(name: str) -> Metric:
     raise InvalidInput(f"entry point {name}", entry.value, "a Metric")
 
 
-def _lowest(axis: int, tips: Array) -> float:
-    return tips[:, axis].min()
-
-
-def _highest(axis: int, tips: Array) -> float:
-    return tips[:, axis].max()
+def _extreme(find: Callable[[Array], float], axis: int, tips: Array) -> float:
+    return find(tips[:, axis])
 
 
 def _reach_radius(tips: Array) -> float:
@@ -129,17 +124,13 @@ def _spacing(shape: AlphaComplex, alpha: float, tips: Array) -> float:
     return math.cbrt(_alpha_volume(shape, alpha) / len(tips))
 
 
+def _fold_volume(reached: ReachableSet) -> float:
+    return getattr(reached, "fold_volume", 0.0)  # of sheets and curves
+
+
 def _multiplicity(reached: ReachableSet) -> Mapping[int, float]:
     """Volume by number of activations; none where there is no volume."""
-    from softreach.workspace import ReachableSolid
-
-    return reached.multiplicity if isinstance(reached, ReachableSolid) else {}
-
-
-def _fold_volume(reached: ReachableSet) -> float:
-    from softreach.workspace import ReachableSolid
-
-    return reached.fold_volume if isinstance(reached, ReachableSolid) else 0.0
+    return getattr(reached, "multiplicity", {})
 
 
 def _mean_multiplicity(reached: ReachableSet) -> float:
@@ -160,7 +151,7 @@ def _quantiles(name: str, statistics: xr.Dataset) -> Array:
 _TIPS, _BASE_TIPS = (Need.TIPS,), (Need.BASE_TIPS,)
 _SET, _ALPHA = (Need.REACHABLE_SET,), (Need.ALPHA_COMPLEX, Need.ALPHA)
 _FINITE = "the design has other than three bundles"
-_ENDS = (("min", "lower", _lowest), ("max", "upper", _highest))
+_ENDS = (("min", "lower", np.min), ("max", "upper", np.max))
 
 _COLUMNS = ("name", "unit", "meaning", "compute", "needs", "nan_if", "over")
 
@@ -168,10 +159,10 @@ _COLUMNS = ("name", "unit", "meaning", "compute", "needs", "nan_if", "over")
 _ROWS: dict[str, list[tuple[Any, ...]]] = {
     "extent": [
         *((f"{axis}_{end}", "m", f"{word} end of the cloud's bounding box along {axis}",
-           partial(compute, k), _TIPS)
-          for k, axis in enumerate("xyz") for end, word, compute in _ENDS),
+           partial(_extreme, find, k), _TIPS)
+          for k, axis in enumerate("xyz") for end, word, find in _ENDS),
         ("reach_height", "m", "largest height of a tip above the base plane",
-         partial(_highest, 2), _BASE_TIPS),
+         partial(_extreme, np.max, 2), _BASE_TIPS),
         ("reach_radius", "m", "largest distance of a tip from the base axis",
          _reach_radius, _BASE_TIPS),
     ],

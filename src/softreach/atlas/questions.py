@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,19 +14,16 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import PER_DESIGN
-from softreach.atlas.reading import EXPLAINED, a_store, an_atlas, command_of, contents, opened_atlas
-from softreach.atlas.store import DAMAGED, DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE, AtlasStore
+from softreach.atlas.reading import EXPLAINED, a_store, command_of, contents, opened_atlas
+from softreach.atlas.store import DAMAGED, KNOWN, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
     as_flag,
-    as_given,
     as_integer,
-    as_mapping,
     as_names,
     as_number,
     as_text,
-    plain,
 )
 from softreach.support.errors import InvalidInput, did_you_mean
 from softreach.support.quantity import columns, numbers_in
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
 
 _QUICK = 3e8  # bytes of tips
 _MOST_MESSAGES = 10
-Interval = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,12 +83,11 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
 
     if isinstance(atlas, xr.Dataset):
         opened = opened_atlas(atlas)
-        status = opened["status"].values.ravel()
-        explained = np.isin(status, (*EXPLAINED, DAMAGED))
-        numbers = opened["number"].values.ravel()[explained].tolist()
-        texts = opened["message"].values.ravel()[explained].tolist() if explained.any() else []
-        return _counted(status, dict(zip(numbers, map(str, texts), strict=True)), False)
-    store = AtlasStore.open(an_atlas("atlas", atlas), "r")
+        names = ("status", "number", "message")
+        status, numbers, texts = (opened[name].values.ravel() for name in names)
+        explained = np.flatnonzero(np.isin(status, (*EXPLAINED, DAMAGED)))
+        return _counted(status, {int(numbers[k]): str(texts[k]) for k in explained}, False)
+    store = AtlasStore.open(a_store("atlas", atlas), "r")
     command = store.command
     at_hand = isinstance(store.location, str) and "://" not in store.location
     is_small = at_hand and 12.0 * command.n * command.space.size <= _QUICK
@@ -125,7 +121,7 @@ def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
         InvalidDesign: The place is a gap.
     """
     opened = opened_atlas(atlas, metrics=False)
-    return command_of(opened).design(int(_nearest(opened[["number"]], at)["number"]))
+    return command_of(opened).space.design(int(_nearest(opened[["number"]], at)["number"]))
 
 
 def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
@@ -147,7 +143,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     row = _nearest(opened[kept], at)
     if (status := int(row["status"])) not in KNOWN:
         raise InvalidInput("design", at, "done", f"its status is {status}")
-    arm = command.design(int(row["number"]))
+    arm = command.space.design(int(row["number"]))
     rod = as_tip_map(arm, command.tol)
     activation = activations_of(rod, opened["unit_activation"].values)
     drawn: Any = {"seed": command.seed, "sampler": command.sampler, "tol": command.tol}
@@ -166,7 +162,7 @@ def best_designs(
     metric: str,
     *,
     smallest: bool = False,
-    where: Mapping[str, Interval] | Iterable[str] | None = None,
+    where: str | Sequence[str] = (),
     count: int = 1,
 ) -> xr.Dataset:
     """The designs with the largest or smallest metric among those that meet the constraints.
@@ -175,9 +171,8 @@ def best_designs(
         atlas: A store, or a dataset from `open_atlas`.
         metric: What to compare.
         smallest: Whether smaller values are better.
-        where: Metric or parameter -> (lowest, highest) allowed; None leaves an end open. Or texts
-            like `unreachability<=0.4`; parameters are called by their names, or with the units
-            of the command line, as in `taper_deg<=1`.
+        where: Constraints that all hold, such as `unreachability<=0.4`; parameters are called by
+            their names, or with the units of the command line, as in `taper_deg<=1`.
         count: How many designs at most.
 
     Returns:
@@ -188,14 +183,14 @@ def best_designs(
     """
     metric, smallest = as_text("metric", metric), as_flag("smallest", smallest)
     count, opened = as_integer("count", count, 1), opened_atlas(atlas)
-    limits = _limits(where, opened)
+    limits = list(_limits(as_names("where", where), opened))
     dims = opened["status"].dims
     numbers = [name for name in opened.data_vars if opened[name].dims == dims]
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
     along = [x for x, c in opened.variables.items() if len(c.dims) == 1 and c.dims[0] in dims]
     stacked = opened[[*numbers, *map(str, along)]].stack(rank=dims, create_index=False)
     allowed = np.isfinite(stacked[metric].values)
-    for name, (low, high) in limits:
+    for name, low, high in limits:
         _check_known(name, [str(known) for known in stacked.variables])
         values = stacked[name].values
         allowed &= (values >= low) & (values <= high)
@@ -203,48 +198,25 @@ def best_designs(
     return stacked.isel(rank=order[allowed[order]][:count])
 
 
-def _limits(
-    where: Mapping[str, Interval] | Iterable[str] | None, atlas: xr.Dataset
-) -> list[tuple[str, tuple[float, float]]]:
-    if where is None:
-        return []
-    if isinstance(where, Mapping):
-        pairs = list(as_mapping("where", where, _interval).items())
-    else:
-        pairs = [_constraint(text) for text in as_names("where", where)]
+def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, float, float]]:
+    """Variable, lowest and highest value allowed, in SI units."""
     written = {
         written_name(str(name), unit): (str(name), unit)
         for name, values in atlas.variables.items()
         if (unit := values.attrs.get("units", "1"))
     }
-    limits: list[tuple[str, tuple[float, float]]] = []
-    for text, (low, high) in pairs:
+    for text, low, high in map(_constraint, where):
         name, unit = written.get(text, (text, "1"))
-        limits.append((name, (from_written(low, unit), from_written(high, unit))))
-    return limits
+        yield name, from_written(low, unit), from_written(high, unit)
 
 
-def _interval(name: str, value: object) -> tuple[float, float]:
-    if isinstance(value, tuple | list) and len(value) == 2:
-        ends = [
-            open_end if end is None or plain(end) == open_end else as_number(name, end)
-            for end, open_end in zip(value, (-math.inf, math.inf), strict=True)
-        ]
-        return ends[0], ends[1]
-    raise InvalidInput(name, as_given(value), "(lowest, highest), of which one may be None")
-
-
-def _constraint(text: str) -> tuple[str, tuple[float, float]]:
+def _constraint(text: str) -> tuple[str, float, float]:
     """`taper_deg<=1` -> its name, and the numbers between which it is."""
-    for sign in ("<=", ">=", "<", ">"):
-        name, separator, number = text.partition(sign)
-        if separator:
-            break
-    values = numbers_in(number, 1)
-    if values is None:
-        allowed = "a name, <= or >=, and a finite number"
-        raise InvalidInput("where", text or "''", allowed)
-    return name.strip(), (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)
+    name, sign, number = (*re.split("([<>]=?)", text, maxsplit=1), "", "")[:3]
+    if (values := numbers_in(number, 1)) is None:
+        raise InvalidInput("where", text or "''", "a name, <= or >=, and a finite number")
+    low, high = (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)
+    return name.strip(), low, high
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
@@ -256,18 +228,10 @@ def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
 
 
 def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
-    counts = np.bincount(status, minlength=DAMAGED + 1).tolist()
-    return AtlasStatus(
-        designs=status.size,
-        done=counts[DONE],
-        failed=counts[FAILED],
-        gaps=counts[GAP],
-        unstable=counts[UNSTABLE],
-        damaged=counts[DAMAGED],
-        todo=counts[TODO],
-        tips_verified=tips_verified,
-        messages=messages,
-    )
+    names = ("todo", "done", "failed", "gaps", "unstable", "damaged")  # in the order of the status
+    counts = dict(zip(names, np.bincount(status, minlength=len(names)).tolist(), strict=True))
+    verified = {"tips_verified": tips_verified, "messages": messages}
+    return AtlasStatus(designs=status.size, **counts, **verified)
 
 
 def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +14,8 @@ from softreach.atlas.command import Command
 from softreach.atlas.layout import PER_DESIGN, array_plans
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
-from softreach.support.arguments import as_dataset, as_given, as_path, as_text
-from softreach.support.arrays import Array
+from softreach.schema import stored_names
+from softreach.support.arguments import as_dataset, as_given, as_instance, as_path, as_text
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.stores import ARRAYS, DIGEST, READING, Chunk, storage_errors
 
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 EXPLAINED = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
 
+_A_STORE = "a path, a URL or a Zarr store"
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 
@@ -70,56 +70,58 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     Raises:
         DamagedStore: What describes an array is damaged, so that no design can be read.
     """
-    reader = _Reader(store)
-    status = reader.read("status").ravel()
-    store.watch.required = _required(store, status)
-    names = ("metrics", "curvature") if store.command.profiles else ("metrics",)
-    tables = {name: reader.table(name, status) for name in names if metrics}
-    for index in tips_of if store.command.keep_clouds else ():
-        if status[index] in KNOWN:
-            reader.read("tip", store.command.space.place(index))
-    texts = {
-        index: str(reader.read("message", store.command.space.place(index)).item())
-        for index in np.flatnonzero(np.isin(status, EXPLAINED)).tolist()
+    damaged: dict[int, str] = {}
+
+    def read(name: str, place: Any = ...) -> NDArray[Any]:
+        array = store.array(name)
+        with store.watch.noting() as noted:
+            values = np.array(array[place])
+        for chunk, error in noted.items():
+            damaged.setdefault(store.number(chunk), str(error))
+        return values
+
+    place_of, command = store.command.space.place, store.command
+    status = read("status").ravel()
+    known, explained = np.isin(status, KNOWN), np.isin(status, EXPLAINED)
+    store.watch.required = lambda chunk: _is_required(store, chunk, known, explained)
+    names = ("metrics", "curvature") if command.profiles else ("metrics",)
+    tables = {
+        name: read(name) if known.any() else np.full(store.array(name).shape, np.nan)
+        for name in names
+        if metrics
     }
-    status[[*reader.damaged]] = DAMAGED
-    messages = dict(sorted((texts | reader.damaged).items()))
-    return Contents(status=status, messages=messages, tables=tables)
+    for index in tips_of if command.keep_clouds else ():
+        if known[index]:
+            read("tip", place_of(index))
+    explained_ones = np.flatnonzero(explained).tolist()
+    texts = {index: str(read("message", place_of(index)).item()) for index in explained_ones}
+    status[[*damaged]] = DAMAGED
+    return Contents(status=status, messages=dict(sorted((texts | damaged).items())), tables=tables)
 
 
-def a_store(name: str, value: object) -> Any:
+def _is_required(
+    store: AtlasStore, chunk: Chunk, known: NDArray[np.bool_], explained: NDArray[np.bool_]
+) -> bool:
+    if chunk.array not in PER_DESIGN:
+        return True
+    of_designs = explained if chunk.array == "message" else known
+    return chunk.array != "status" and bool(of_designs[store.number(chunk)])
+
+
+def a_store(name: str, value: Any) -> Any:
     """A place where an atlas may be.
 
     Raises:
         InvalidInput: Neither text nor a path nor a Zarr store.
     """
+    from zarr.abc.store import Store
+    from zarr.storage import StorePath
+
     if isinstance(value, str | os.PathLike):
         return as_path(name, value)
-    for module, kind in (("zarr.abc.store", "Store"), ("zarr.storage", "StorePath")):
-        # who has a store has imported it
-        if module in sys.modules and isinstance(value, getattr(sys.modules[module], kind)):
-            return value
     if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):
         return value  # a store in memory
-    raise InvalidInput(name, as_given(value), "a path, a URL or a Zarr store")
-
-
-def an_atlas(name: str, value: Any) -> Any:
-    """A store, or a dataset from `open_atlas` or a part of one.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    allowed = "a store, or a dataset from open_atlas"
-    xarray = sys.modules.get("xarray")
-    if xarray is not None and isinstance(value, xarray.Dataset):
-        if "command" in value.attrs and "status" in value:
-            return value
-        raise InvalidInput(name, "another Dataset", allowed)
-    try:
-        return a_store(name, value)
-    except InvalidInput:
-        raise InvalidInput(name, as_given(value), allowed) from None
+    return as_instance(name, value, (Store, StorePath), _A_STORE)
 
 
 def open_atlas(store: StoreLike) -> xr.Dataset:
@@ -133,9 +135,9 @@ def open_atlas(store: StoreLike) -> xr.Dataset:
 
     Returns:
         Dataset over the parameters of a grid [SI units], or over `design`: the metrics (see their
-        attributes), quantiles of curvature, `status`, `message`, `unit_activation`, and `tip` [m]
-        if clouds were kept; as coordinates the parameters, the `length` [m] and the `number` of
-        each design.
+        attributes), quantiles of curvature, `status`, `unit_activation`, and `tip` [m] if clouds
+        were kept; as coordinates the parameters, the `length` [m], and the `number` of each design
+        with the `message` that says why it has no metrics.
 
     Raises:
         InvalidInput: There is no atlas.
@@ -155,12 +157,19 @@ def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
         metrics: Whether the metrics are asked for; reading all of a large store takes time.
 
     Raises:
-        InvalidInput: Another dataset, or no atlas.
+        InvalidInput: Another dataset, anything else, or no atlas.
     """
     import xarray as xr
 
-    atlas = an_atlas("atlas", atlas)
-    return atlas if isinstance(atlas, xr.Dataset) else _opened(atlas, metrics=metrics)
+    if isinstance(atlas, xr.Dataset) and "command" in atlas.attrs and "status" in atlas:
+        return atlas
+    try:
+        return _opened(a_store("atlas", atlas), metrics=metrics)
+    except InvalidInput as error:
+        if error.allowed != _A_STORE:
+            raise
+        given = "another Dataset" if isinstance(atlas, xr.Dataset) else as_given(atlas)
+        raise InvalidInput("atlas", given, "a store, or a dataset from open_atlas") from None
 
 
 def command_of(atlas: xr.Dataset) -> Command:
@@ -189,82 +198,51 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     return relative.assign_attrs({**values.attrs, "units": "1"})
 
 
-class _Reader:
-    def __init__(self, store: AtlasStore) -> None:
-        self._store = store
-        self.damaged: dict[int, str] = {}
-        """Damage of each: number -> message."""
-
-    def read(self, name: str, place: Any = ...) -> NDArray[Any]:
-        array = self._store.array(name)
-        with self._store.watch.noting() as noted:
-            values = np.array(array[place])
-        for chunk, error in noted.items():
-            self.damaged.setdefault(self._store.number(chunk), str(error))
-        return values
-
-    def table(self, name: str, status: NDArray[np.uint8]) -> Array:
-        if np.isin(status, KNOWN).any():
-            return self.read(name)
-        return np.full(self._store.array(name).shape, np.nan)
-
-
-def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    known, explained = np.isin(status, KNOWN), np.isin(status, EXPLAINED)
-
-    def required(chunk: Chunk) -> bool:
-        if chunk.array not in PER_DESIGN:
-            return True
-        of_designs = explained if chunk.array == "message" else known
-        return chunk.array != "status" and bool(of_designs[store.number(chunk)])
-
-    return required
-
-
-def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
+def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
     import xarray as xr
 
-    atlas = AtlasStore.open(store, "r")
-    content = contents(atlas, metrics=metrics)
+    store = AtlasStore.open(location, "r")
+    content, space = contents(store, metrics=metrics), store.command.space
     if content.damage:
         then = "left out; the command that built the atlas computes again what is damaged"
         warn(f"{content.damage} ({then})")
-    with storage_errors(f"{atlas.location} cannot be read"):
-        raw = xr.open_zarr(atlas.opened.place, drop_variables=_READ_HERE, **READING)
-        coordinates = _coordinates(atlas, raw)
+    with storage_errors(f"{store.location} cannot be read"):
+        raw = xr.open_zarr(store.opened.place, drop_variables=_READ_HERE, **READING)
+        coordinates: dict[str, Any] = {
+            "length": ((), space.base.length, {"units": "m"}),
+            **{name: raw[name] for name in space.names},
+        }
     for variable in (raw, *raw.variables.values()):
         for name in (ARRAYS, DIGEST, OF):
             variable.attrs.pop(name, None)
-    variables = _variables(atlas, content) | (_metrics(atlas.command, content) if metrics else {})
-    opened = raw.assign(variables).assign_coords(coordinates)
-    opened.encoding["source"] = str(atlas.location)
+    numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
+    coordinates["number"] = space.dims, numbers, {"long_name": "number of the design"}
+    opened = raw.assign(_variables(store, content)).assign_coords(coordinates)
+    opened = stored_names(opened).set_coords("message")
+    opened.encoding["source"] = str(store.location)
     return opened
 
 
 def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
-    space = store.command.space
-    texts = np.full(space.size, "", dtype=np.dtypes.StringDType())
+    """Status, messages, and the metrics that were read."""
+    command, shape, dims = store.command, store.command.space.shape, store.command.space.dims
+    texts = np.full(command.space.size, "", dtype=object)
     for index, message in content.messages.items():
         texts[index] = message
-    values = {"status": content.status, "message": texts}
-    plans = {plan.name: plan for plan in array_plans(store.command)}
-    return {
-        name: (space.dims, column.reshape(space.shape), plans[name].attrs)
-        for name, column in values.items()
+    plans = {plan.name: plan.attrs for plan in array_plans(command)}
+    variables: dict[str, Any] = {
+        "status": (dims, content.status.reshape(shape), plans["status"]),
+        "message": (dims, texts.reshape(shape), plans["message"]),
     }
-
-
-def _metrics(command: Command, contents: Contents) -> dict[str, Any]:
-    dims, table = command.space.dims, contents.tables["metrics"]
-    done = np.isin(contents.status, KNOWN).reshape(command.space.shape)
-    variables = {
-        metric.name: (dims, np.where(done, table[..., k], np.nan), _attributes(command, metric))
-        for k, metric in enumerate(command.numbers)
-    }
-    for k, metric in enumerate(command.profiles):
-        profiles = contents.tables["curvature"][..., k, :, :]
-        values = np.where(done[..., None, None], profiles, np.nan)
-        variables[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
+    done = np.isin(content.status, KNOWN).reshape(shape)
+    if (table := content.tables.get("metrics")) is not None:
+        for k, metric in enumerate(command.numbers):
+            values = np.where(done, table[..., k], np.nan)
+            variables[metric.name] = dims, values, _attributes(command, metric)
+    if (table := content.tables.get("curvature")) is not None:
+        for k, metric in enumerate(command.profiles):
+            values = np.where(done[..., None, None], table[..., k, :, :], np.nan)
+            variables[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
     return variables
 
 
@@ -273,13 +251,3 @@ def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
     if Need.ALPHA in metric.needs:
         attrs["alpha_over_length"] = command.alpha_over_length
     return attrs
-
-
-def _coordinates(store: AtlasStore, raw: xr.Dataset) -> dict[str, Any]:
-    space = store.command.space
-    numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
-    return {
-        "length": ((), space.base.length, {"units": "m"}),
-        **{name: raw[name] for name in space.names},
-        "number": (space.dims, numbers, {"long_name": "number of the design"}),
-    }

@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, changed, find_parameter, find_parameters, parameters
 from softreach.arm.tables import check_extension
+from softreach.sampling import sample_cube
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite
 from softreach.support.errors import InvalidDesign, InvalidInput, counted
-from softreach.support.progress import Progress, silent
+from softreach.support.progress import bar
 
 __all__ = ["DesignSpace", "column"]
 
@@ -39,13 +40,15 @@ def column(name: str, values: ArrayLike) -> tuple[float, ...]:
     return tuple(np.atleast_1d(array if array.dtype.kind in "iu" else floats).tolist())
 
 
-class _Extent(NamedTuple):
+class _Survey(NamedTuple):
+    """What is known of a space once each of its designs has been made."""
+
+    gaps: dict[int, str]
+    """Combinations that no arm can have: number -> why not."""
     bundles: int
-    """The largest number of bundles; 0 if there is no design."""
-    shortest: float
-    """Length of the shortest design [m]."""
-    longest: float
-    """Length of the longest design [m]."""
+    """The largest number of bundles of any design; 0 if there is no design."""
+    length_range: tuple[float, float]
+    """Length of the shortest and of the longest design [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +68,8 @@ class DesignSpace:
     """Name and values [SI units] of every parameter."""
     layout: Layout = "grid"
     """Every combination (grid), or the values taken together, one of each (list)."""
-    known: _Extent | None = field(default=None, repr=False, compare=False)
-    """Extent that a store tells, so that reading it makes no design."""
+    known: _Survey | None = field(default=None, repr=False, compare=False)
+    """What a store says of the designs but its gaps, so that reading it makes none."""
 
     def __post_init__(self) -> None:
         a_manipulator("base", self.base)
@@ -109,12 +112,17 @@ class DesignSpace:
             seed: Of the sampler.
             **ranges: Parameter -> lower and upper end [SI units].
         """
+        from scipy.stats import qmc
+
         a_manipulator("base", base)
         as_one_of("method", method, ("sobol", "latin"))
         count, seed = as_integer("count", count, 1, _MOST), as_integer("seed", seed)
         if not ranges:
             return cls(base=base, parameters=())
-        cube = _spread(count, len(ranges), method, seed)
+        if method == "sobol":
+            cube = sample_cube("sobol", count, len(ranges), seed)
+        else:
+            cube = qmc.LatinHypercube(len(ranges), rng=np.random.default_rng(seed)).random(count)
         ends = np.array([_ends(name, ends) for name, ends in ranges.items()])
         points = ends[:, 0] + cube * np.diff(ends, axis=1)[:, 0]
         if counts := [k for k, name in enumerate(ranges) if find_parameter(base, name).whole]:
@@ -150,10 +158,6 @@ class DesignSpace:
         """Number of designs, gaps included."""
         return math.prod(self.shape)
 
-    def units(self) -> dict[str, str]:
-        """Unit of each parameter."""
-        return {name: parameter.unit for name, parameter in self.varied().items()}
-
     def varied(self) -> dict[str, Parameter]:
         """Varied parameters, by name."""
         return find_parameters(self.base, self.names)
@@ -187,21 +191,29 @@ class DesignSpace:
     @property
     def bundles(self) -> int:
         """The largest number of bundles of any design; 0 if there is no design."""
-        return self._extent.bundles
+        return (self.known or self._survey).bundles
 
     @property
     def length_range(self) -> tuple[float, float]:
         """Length of the shortest and of the longest design [m]."""
-        return self._extent.shortest, self._extent.longest
+        return (self.known or self._survey).length_range
 
-    def survey(self, progress: Progress = silent) -> None:
-        """Make each design once, which takes about 2 ms each; what is asked later is known then.
-
-        Args:
-            progress: Called with the number of designs made since its last call.
-        """
-        if "_survey" not in self.__dict__:
-            self.__dict__["_survey"] = _surveyed(self, progress)
+    @cached_property
+    def _survey(self) -> _Survey:
+        """Each design is made once, which takes about 2 ms."""
+        gaps: dict[int, str] = {}
+        sizes: list[tuple[int, float]] = []
+        with bar("looking at all designs", self.size) as shown:
+            for index in range(self.size):
+                try:
+                    arm = self.design(index)
+                except InvalidDesign as error:
+                    gaps[index] = "; ".join(str(error).splitlines())
+                else:
+                    sizes.append((arm.inputs, arm.length))
+                shown(1)
+        bundles, lengths = zip(*sizes, strict=True) if sizes else ((0,), (math.nan,))
+        return _Survey(gaps, max(bundles), (min(lengths), max(lengths)))
 
     def to_dict(self) -> dict[str, Any]:
         """The space in plain values, from which `from_dict` makes an equal one."""
@@ -210,47 +222,17 @@ class DesignSpace:
             "design": self.base.to_toml(),
             "layout": self.layout,
             "parameters": parameters,
-            "extent": [*self._extent],
+            "extent": [self.bundles, *self.length_range],
         }
 
     @classmethod
     def from_dict(cls, space: Mapping[str, Any]) -> Self:
         """The space that `to_dict` described."""
         base = Manipulator.from_toml(space["design"], source="the base design")
-        bundles, shortest, longest = space["extent"]
-        known = _Extent(int(bundles), float(shortest), float(longest)) if bundles else None
+        bundles, *lengths = space["extent"]
+        known = _Survey({}, bundles, (lengths[0], lengths[1])) if bundles else None
         parameters = _plain(space["parameters"])
         return cls(base=base, parameters=parameters, layout=space["layout"], known=known)
-
-    @cached_property
-    def _survey(self) -> _Survey:
-        return _surveyed(self, silent)
-
-    @property
-    def _extent(self) -> _Extent:
-        return self.known or self._survey.extent
-
-
-class _Survey(NamedTuple):
-    """Gaps and extent of a space, known once each of its designs has been made."""
-
-    gaps: dict[int, str]
-    extent: _Extent
-
-
-def _surveyed(space: DesignSpace, progress: Progress) -> _Survey:
-    gaps: dict[int, str] = {}
-    sizes: set[tuple[int, float]] = set()
-    for index in range(space.size):
-        try:
-            arm = space.design(index)
-        except InvalidDesign as error:
-            gaps[index] = "; ".join(str(error).splitlines())
-        else:
-            sizes.add((arm.inputs, arm.length))
-        progress(1)
-    bundles, lengths = zip(*sizes, strict=True) if sizes else ((0,), (math.nan,))
-    return _Survey(gaps, _Extent(max(bundles), min(lengths), max(lengths)))
 
 
 def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...]], ...]:
@@ -285,13 +267,3 @@ def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
     if space.size > _MOST:
         allowed, hint = f"{_MOST:,} at most", "take fewer values, or build several atlases"
         yield InvalidInput("designs", f"{space.size:,}", allowed, hint)
-
-
-def _spread(count: int, dim: int, method: str, seed: int) -> np.ndarray:
-    from scipy.stats import qmc
-
-    from softreach.sampling import sample_cube
-
-    if method == "sobol":
-        return sample_cube("sobol", count, dim, seed)
-    return qmc.LatinHypercube(dim, rng=np.random.default_rng(seed)).random(count)

@@ -22,7 +22,8 @@ __all__ = ["flat_keys", "parse_parameter", "parse_space"]
 _KEYS = ("design", "layout", "designs", "seed", "parameters")
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 _MOST = 100_000  # values of one parameter
-_LAYOUTS = ("grid", "list", "sobol", "latin")
+_SAMPLERS = ("sobol", "latin")
+_LAYOUTS = ("grid", "list", *_SAMPLERS)
 
 
 def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignSpace:
@@ -56,16 +57,24 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
         if key not in _KEYS:
             raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
     base = design_from(str(document.get("design", "minimal_trunk")))
-    table = document.get("parameters", {})
+    table, layout = document.get("parameters", {}), document.get("layout", "grid")
     if not isinstance(table, dict):
         raise InvalidInput("parameters", table, "a table of parameters and their values")
+    if layout not in _LAYOUTS:
+        raise InvalidInput("layout", layout, f"one of {', '.join(_LAYOUTS)}")
     values: dict[str, list[float]] = {}
     for key, value in flat_keys(table):
         name, numbers = parse_parameter(base, key, value)
         if name in values:
             raise InvalidInput(key, value, "given once")
+        if layout in _SAMPLERS and len(numbers) != 2:
+            raise InvalidInput(name, numbers, f"two ends, [lower, upper], for {layout}")
         values[name] = numbers
-    return _space(base, values, document)
+    if layout not in _SAMPLERS:
+        return (DesignSpace.grid if layout == "grid" else DesignSpace.listed)(base, **values)
+    ranges = {name: (low, high) for name, (low, high) in values.items()}
+    count, seed = document.get("designs", 64), document.get("seed", 0)
+    return DesignSpace.sampled(base, count, method=layout, seed=seed, **ranges)
 
 
 def flat_keys(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -91,7 +100,8 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
     parameter = names.by_key[key]
     try:
         if key in names.written:
-            return parameter.name, [from_written(x, parameter.unit) for x in _numbers(key, value)]
+            numbers = _read(value, _number) if isinstance(value, str) else column(key, value)
+            return parameter.name, [from_written(x, parameter.unit) for x in numbers]
         return parameter.name, _read(value, partial(names.number, key))
     except (InvalidInput, ValueError):
         kind = "numbers" if key in names.written else names.allowed(key)
@@ -99,29 +109,14 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
         raise InvalidInput(key, value, allowed) from None
 
 
-def _space(
-    base: Manipulator, values: Mapping[str, list[float]], document: Mapping[str, Any]
-) -> DesignSpace:
-    layout = document.get("layout", "grid")
-    if layout not in _LAYOUTS:
-        raise InvalidInput("layout", layout, f"one of {', '.join(_LAYOUTS)}")
-    if layout in ("grid", "list"):
-        return (DesignSpace.grid if layout == "grid" else DesignSpace.listed)(base, **values)
-    for name, ends in values.items():
-        if len(ends) != 2:
-            raise InvalidInput(name, ends, f"two ends, [lower, upper], for {layout}")
-    ranges = {name: (ends[0], ends[1]) for name, ends in values.items()}
-    count, seed = document.get("designs", 64), document.get("seed", 0)
-    return DesignSpace.sampled(base, count, method=layout, seed=seed, **ranges)
-
-
-def _numbers(key: str, value: Any) -> list[float]:
-    return _read(value, _number) if isinstance(value, str) else [*column(key, value)]
-
-
 def _read(value: Any, read: Callable[[Any], float]) -> list[float]:
     if isinstance(value, str) and ":" in value:
-        return _range(value, read)
+        start, stop, count = value.split(":")
+        number = read_whole_number(count)
+        if not 0 < number <= _MOST:
+            raise ValueError(value)
+        values = np.linspace(read(start), read(stop), number)
+        return [float(f"{value:.15g}") for value in values]  # 1.8 and not 1.8000000000000003
     each = value.split(",") if isinstance(value, str) else value
     return [read(one) for one in (each if isinstance(each, list) else [each])]
 
@@ -129,13 +124,3 @@ def _read(value: Any, read: Callable[[Any], float]) -> list[float]:
 def _number(text: str) -> float:
     number = read_number(text)
     return read_whole_number(text) if _INTEGER.fullmatch(text.strip()) else number
-
-
-def _range(text: str, read: Callable[[Any], float]) -> list[float]:
-    start, stop, count = text.split(":")
-    number = read_whole_number(count)
-    if not 0 < number <= _MOST:
-        raise ValueError(text)
-    values = np.linspace(read(start), read(stop), number)
-    # 1.8 and not 1.8000000000000003
-    return [float(f"{value:.15g}") for value in values]

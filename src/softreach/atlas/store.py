@@ -80,6 +80,7 @@ class AtlasStore:
     location: StoreLike
     command: Command
     opened: Opened = field(repr=False)
+    _arrays: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def begin(cls, location: StoreLike, command: Command, *, durable: bool = False) -> Self:
@@ -105,14 +106,11 @@ class AtlasStore:
             if opened is None:
                 _write_root(location, command, durable)
                 opened = opened_store(location, "atlas", "r+", durable=durable)
-        text = None if opened is None else opened.group.attrs.get("command")
-        if opened is None or not isinstance(text, str):
-            allowed = "a new folder, or an atlas; it holds something else"
-            raise InvalidInput("store", location, allowed)
-        if differences := command.differences(Command.from_json(text)):
+        stored = _command_of(opened, location, "a new folder, or an atlas; it holds something else")
+        if differences := command.differences(stored):
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
-        opened.watch.required = _is_shared
+        assert opened is not None
         store = cls(location, command, opened)  # this command has all functions
         with writing(location), opened.watch.noting():  # what is damaged counts as missing
             _complete(store)
@@ -122,12 +120,7 @@ class AtlasStore:
     def open(
         cls, location: StoreLike, mode: Literal["r", "r+"] = "r+", *, durable: bool = False
     ) -> Self:
-        """Open an atlas.
-
-        Args:
-            location: Where it is.
-            mode: "r" for a place that cannot be written to.
-            durable: Whether a power cut may lose nothing that is written.
+        """Open an atlas, in mode "r" at a place that cannot be written to.
 
         Raises:
             InvalidInput: There is none, or of another version.
@@ -135,13 +128,11 @@ class AtlasStore:
         """
         location = absolute(location)
         opened = opened_store(location, "atlas", mode, durable=durable)
-        text = None if opened is None else opened.group.attrs.get("command")
-        if opened is None or not isinstance(text, str):
-            hint = f"it does not exist, or has no {ROOT}" if opened is None else "this is no atlas"
-            raise InvalidInput("store", location, "an atlas written by build_atlas", hint)
-        opened.watch.required = _is_shared
+        why = f"it does not exist, or has no {ROOT}" if opened is None else "this is no atlas"
+        command = _command_of(opened, location, f"an atlas written by build_atlas; {why}")
+        assert opened is not None
         opened.check_arrays()
-        return cls(location, Command.from_json(text), opened)
+        return cls(location, command, opened)
 
     @property
     def watch(self) -> Watch:
@@ -160,10 +151,6 @@ class AtlasStore:
             array: Any = self.opened.group[name]
             self._arrays[name] = array.with_config(config)
         return self._arrays[name]
-
-    @cached_property
-    def _arrays(self) -> dict[str, Any]:
-        return {}
 
     def status(self) -> NDArray[np.uint8]:
         """The status of every design, TODO to DAMAGED, in C order, shape (designs,)."""
@@ -227,8 +214,13 @@ def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     return np.where(np.isnan(steps), MISSING, steps).astype(np.int32)
 
 
-def _is_shared(chunk: Chunk) -> bool:
-    return chunk.array not in PER_DESIGN
+def _command_of(opened: Opened | None, location: StoreLike, allowed: str) -> Command:
+    """Command of a store, of which what all designs share must be there from now on."""
+    text = None if opened is None else opened.group.attrs.get("command")
+    if opened is None or not isinstance(text, str):
+        raise InvalidInput("store", location, allowed)
+    opened.watch.required = lambda chunk: chunk.array not in PER_DESIGN
+    return Command.from_json(text)
 
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
@@ -285,7 +277,7 @@ def _attributes(command: Command) -> dict[str, Any]:
     return {
         "title": "reachability cloud atlas",
         "design": command.space.base.to_toml(),
-        CUBE_DIGEST: digest(drawn_cube(command)),
+        CUBE_DIGEST: drawn_cube(command)[1],
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),
         ARRAYS: {p.name: sha256(memory[f"{p.name}/{ROOT}"].to_bytes()) for p in plans},
@@ -306,7 +298,12 @@ def _complete(store: AtlasStore) -> None:
             continue
         with suppress(ContainsArrayError):  # begun by another task, or only its values are lost
             _described(store.opened.group, plan, store.command)
-        data = _drawn(store) if plan.name == CUBE else plan.data
+        data = plan.data
+        if plan.name == CUBE:
+            data, drawn = drawn_cube(store.command)
+            if drawn != store.opened.group.attrs[CUBE_DIGEST]:
+                other = "this machine draws other activations than the one that began it"
+                raise StoreFailed(f"{store.location}: {other}")
         if data is not None:
             store.array(plan.name)[...] = data
     gaps = store.command.space.gaps
@@ -329,20 +326,7 @@ def _described(group: Group, plan: Plan, command: Command) -> None:
     )
 
 
-def _drawn(store: AtlasStore) -> Array:
-    cube = drawn_cube(store.command)
-    if digest(cube) != store.opened.group.attrs[CUBE_DIGEST]:
-        raise StoreFailed(
-            f"{store.location}: this machine draws other activations than the one that began it"
-        )
-    return cube
-
-
-def drawn_cube(command: Command) -> Array:
-    """The activations that the command draws on this machine."""
-    return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
-
-
-def digest(cube: Array) -> str:
-    """SHA-256 of activations."""
-    return sha256(np.ascontiguousarray(cube).tobytes())
+def drawn_cube(command: Command) -> tuple[Array, str]:
+    """The activations that the command draws on this machine, and their SHA-256."""
+    cube = sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
+    return cube, sha256(np.ascontiguousarray(cube).tobytes())

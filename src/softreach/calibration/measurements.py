@@ -11,6 +11,7 @@ import lzma
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_text
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import (
     InvalidInput,
     NotPossible,
@@ -148,34 +149,22 @@ def read_measurements(
     starts_of = {} if markers is None else as_mapping("markers", markers, as_text)
     run, order = (None if x is None else as_text(n, x) for n, x in (("run", run), ("order", order)))
     table, source = _table(data)
-    if not len(table):
-        raise InvalidInput("data", source, "a table with at least one row")
-    if len(table) > _MOST_ROWS:
-        raise InvalidInput("data", f"{len(table):,} rows", f"at most {_MOST_ROWS:,}")
-    columns = [str(name) for name in table.columns]
-    _refuse_repeated(columns)
-    table = table.set_axis(columns, axis=1)
+    columns = list(table.columns)
     run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
-    triples = _triples(columns, {run, order})
+    triples = _triples([name for name in columns if name not in (run, order)])
     chosen = _chosen_markers(arm, triples, starts_of)
     taken = {run, order, *(name for triple in triples.values() for name in triple)}
-    plain = [name for name in columns if name not in taken]
-    sources = _input_columns(arm, plain, columns_of)
+    sources = _input_columns(arm, [name for name in columns if name not in taken], columns_of)
     values = _inputs(table, sources, arm.input_units)
-    each = [[_numbers(table, x) * _unit(x)[2] for x in triples[at]] for at in chosen.values()]
-    places = np.moveaxis(np.array(each), 2, 0)
-    seen = np.asarray(np.isfinite(places).all(axis=2))
-    if not seen.any():
-        raise NotPossible("no marker was seen in any sample: its columns hold no number")
-    places[~seen] = np.nan
-    if lost := [name for name, own in zip(chosen, seen.T, strict=True) if not own.any()]:
+    places = _places(table, {name: triples[start] for name, start in chosen.items()})
+    seen = np.asarray(np.isfinite(places).any(axis=(0, 2)))
+    if lost := [name for name, own in zip(chosen, seen, strict=True) if not own]:
         warn(f"markers that were never seen are left out: {', '.join(lost)}")
-        places = places[:, seen.any(axis=0)]
-        chosen = {name: start for name, start in chosen.items() if name not in lost}
+        places, chosen = places[:, seen], {k: x for k, x in chosen.items() if k not in lost}
     _refuse_far(arm, places, [triples[start] for start in chosen.values()])
     _refuse_inputs(arm, values, sources)
-    labels = np.full(len(table), "all") if run is None else table[run].astype(str).to_numpy(str)
-    run_names, runs = np.unique(labels, return_inverse=True)
+    every = np.full(len(table), "all") if run is None else table[run].to_numpy(object)
+    run_names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
         inputs=values,
@@ -184,18 +173,22 @@ def read_measurements(
         marker_names=tuple(chosen),
         runs=runs,
         run_names=tuple(run_names.tolist()),
-        order=_order(table, run, order),
+        order=_order(table, begins[runs], order),
         rows=np.arange(len(values)),
         source=source,
         digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
     )
 
 
-def _refuse_repeated(columns: list[str]) -> None:
-    for name in columns:  # the second of which pandas calls NAME.1
-        first = re.sub(r"\.\d+$", "", name)
-        if columns.count(name) > 1 or (first != name and first in columns):
-            raise NotPossible(f"the data has two columns of this name: {first}")
+def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
+    """Places of markers from their columns [m], NaN where one was not seen."""
+    each = [[_numbers(table, x) * _unit(x)[2] for x in own] for own in columns.values()]
+    places = np.moveaxis(np.array(each), 2, 0)
+    seen = np.isfinite(places).all(axis=2)
+    if not seen.any():
+        raise NotPossible("no marker was seen in any sample: its columns hold no number")
+    places[~seen] = np.nan
+    return places
 
 
 def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
@@ -218,6 +211,21 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
 
 
 def _table(data: Any) -> tuple[pd.DataFrame, str]:
+    """A table of one row at least, no two columns of which have one name, and its own name."""
+    table, source = _opened(data)
+    if not len(table):
+        raise InvalidInput("data", source, "a table with at least one row")
+    if len(table) > _MOST_ROWS:
+        raise InvalidInput("data", f"{len(table):,} rows", f"at most {_MOST_ROWS:,}")
+    columns = [str(name) for name in table.columns]
+    for name in columns:  # the second of which pandas calls NAME.1
+        first = re.sub(r"\.\d+$", "", name)
+        if columns.count(name) > 1 or (first != name and first in columns):
+            raise NotPossible(f"the data has two columns of this name: {first}")
+    return table.set_axis(columns, axis=1), source
+
+
+def _opened(data: Any) -> tuple[pd.DataFrame, str]:
     import pandas as pd
 
     if isinstance(data, pd.DataFrame):
@@ -229,12 +237,12 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
             return pd.DataFrame(dict(data)), "a dictionary"
         except ValueError as error:
             raise InvalidInput("data", str(error), "columns of one length") from None
-    if isinstance(data, str | PathLike):
-        path = Path(data)
-        if not path.is_file():
-            raise InvalidInput("data", str(path), "a file that exists")
-        return read_table(path, str(path)), path.name
-    raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
+    if not isinstance(data, str | PathLike):
+        raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
+    path = Path(data)
+    if not path.is_file():
+        raise InvalidInput("data", str(path), "a file that exists")
+    return read_table(path, str(path)), path.name
 
 
 def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
@@ -249,15 +257,10 @@ def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
     try:
         if suffix in (".parquet", ".pq"):
             return pd.read_parquet(file)
-        if suffix == ".zip":
-            archive = zipfile.ZipFile(file)
-            opened = archive.open(archive.namelist()[0])
-        else:
-            unpacked = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}.get(suffix)
-            opened = (
-                unpacked(file) if unpacked else file.open("rb") if isinstance(file, Path) else file
-            )
-        with opened:
+        with (
+            file.open("rb") if isinstance(file, Path) else file as packed,
+            _UNPACKED.get(suffix, nullcontext)(packed) as opened,
+        ):
             text = text_of("data", name, opened.read(_MOST_BYTES + 1), _MOST_BYTES)
         _refuse_short(text)
         return pd.read_csv(io.StringIO(text), skipinitialspace=True, comment="#")
@@ -266,6 +269,14 @@ def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
     except Exception as error:  # each kind of compression has its own
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InvalidInput("data", name, f"a table in CSV or Parquet: {reason}") from None
+
+
+def _unzipped(file: IO[bytes]) -> IO[bytes]:
+    archive = zipfile.ZipFile(file)
+    return archive.open(archive.namelist()[0])
+
+
+_UNPACKED = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open, ".zip": _unzipped}
 
 
 def _refuse_short(text: str) -> None:
@@ -335,23 +346,18 @@ def _missing(what: str, name: str, columns: list[str]) -> InvalidInput:
 
 def _unit(column: str) -> tuple[str, str, float]:
     """Name without its unit, the SI unit and its size; no unit where none is known."""
-    name, _, suffix = column.rpartition("_")
-    if not (match := re.fullmatch(r"(.*?)\s*[\[(](.*)[\])]", column)) and not name:
-        return column, "", 1.0
-    if match:
-        name, suffix = match[1], match[2]
+    match = re.fullmatch(r"(.*?)\s*[\[(](.*)[\])]|(.+)_([^_]*)", column)
+    name, suffix = (part for part in match.groups() if part is not None) if match else ("", "")
     unit = _SIZES.get(suffix.lower())
     return (column, "", 1.0) if unit is None else (name, *unit)
 
 
-def _triples(columns: list[str], taken: set[str | None]) -> dict[str, list[str]]:
+def _triples(columns: list[str]) -> dict[str, list[str]]:
     """Columns x, y, z of places by the start, or the number, that they share."""
     found: dict[str, dict[str, str]] = {}
     for column in columns:
         name, unit, _ = _unit(column)
-        if column in taken or unit != "m":
-            continue
-        if match := _PLACE.fullmatch(name):
+        if unit == "m" and (match := _PLACE.fullmatch(name)):
             start = match["head"].rstrip("_ ") or match["number"]
             start += match["number"] if match["head"].rstrip("_ ") else ""
             found.setdefault(start, {})[match["axis"].lower()] = column
@@ -369,18 +375,8 @@ def _chosen_markers(
     arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
 ) -> dict[str, str]:
     names = [marker.name for marker in arm.markers] or ["tip"]
-    chosen: dict[str, str] = {}
-    for name, start in given.items():
-        if name not in names:
-            raise InvalidInput("markers", name, f"one of {', '.join(names)}")
-        if start not in triples:
-            raise _missing(f"columns of marker {name}", start, list(triples))
-        chosen[name] = start
-    simple = {_simple(start): start for start in triples}
-    free = [name for name in names if name not in chosen]
-    by_name = {name: simple[_simple(name)] for name in free if _simple(name) in simple}
-    if by_name or given:
-        return {name: (chosen | by_name)[name] for name in names if name in chosen | by_name}
+    if chosen := _matched("marker", names, given, dict(zip(triples, triples, strict=True))):
+        return chosen
     if len(names) != len(triples):
         listed = ", ".join(start or "x, y, z" for start in triples)
         own = f"{counted(len(names), 'marker')} ({', '.join(names)})"
@@ -390,25 +386,29 @@ def _chosen_markers(
     return dict(zip(names, triples, strict=True))
 
 
-def _simple(name: str) -> str:
-    return re.sub(r"[\s_\-.]+", "", name).lower()
+def _matched(
+    what: str, names: Sequence[str], given: Mapping[str, str], columns: Mapping[str, str]
+) -> dict[str, str]:
+    """Columns of markers or inputs, of those with such names: as given, else by their names."""
+
+    def simple(name: str) -> str:
+        return re.sub(r"[\s_\-.]+", "", name).lower()
+
+    for name, column in given.items():
+        if name not in names:
+            hint = did_you_mean(name, names)
+            raise InvalidInput(f"{what}s", name, f"one of {', '.join(names)}", hint)
+        if column not in columns and (column or what == "marker"):
+            raise _missing(f"columns of {what} {name}", column, list(columns))
+    known = {simple(name): column for column, name in columns.items()}
+    found = {name: given.get(name, known.get(simple(name))) for name in names}
+    return {name: column for name, column in found.items() if column is not None}
 
 
 def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:
     """Column of each input; "" for one that stays at zero."""
-    chosen: dict[str, str] = {}
-    for name, column in given.items():
-        if name not in arm.input_names:
-            allowed = f"one of {', '.join(arm.input_names)}"
-            raise InvalidInput("inputs", name, allowed, did_you_mean(name, arm.input_names))
-        if column and column not in columns:
-            raise _missing(f"column of {name}", column, columns)
-        chosen[name] = column
+    chosen = _matched("input", arm.input_names, given, {c: _unit(c)[0] for c in columns})
     units = dict(zip(arm.input_names, arm.input_units, strict=True))
-    simple = {_simple(_unit(column)[0]): column for column in columns}
-    for name in arm.input_names:
-        if name not in chosen and _simple(name) in simple:
-            chosen[name] = simple[_simple(name)]
     left = [name for name in arm.input_names if name not in chosen]
     for unit in dict.fromkeys(units[name] for name in left):
         wanting = [name for name in left if units[name] == unit]
@@ -438,13 +438,8 @@ def _numbers(table: pd.DataFrame, column: str) -> Array:
     return values
 
 
-def _order(table: pd.DataFrame, run: str | None, order: str | None) -> NDArray[np.intp]:
+def _order(table: pd.DataFrame, begins: Index, order: str | None) -> NDArray[np.intp]:
     """Samples in the order in which they were taken: run by run, as the file has them."""
     if order is None or table[order].dtype.kind not in "iuf":  # names of samples say nothing
         return np.arange(len(table))
-    keys = _numbers(table, order)
-    if run is None:
-        return np.argsort(keys, kind="stable").astype(np.intp)
-    first = {name: k for k, name in reversed(list(enumerate(table[run].astype(str))))}
-    place = np.array([first[name] for name in table[run].astype(str)])
-    return np.lexsort((keys, place)).astype(np.intp)
+    return np.lexsort((_numbers(table, order), begins)).astype(np.intp)

@@ -6,6 +6,7 @@ equilibrium; all that follows from them, how the arm moves, is the linear respon
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -35,7 +36,7 @@ from softreach.rod.response import (
 )
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array, Index, Mask
 
 _BLOCK = 1024  # samples at once: their shapes at all nodes are kept
 _TOL = 1e-6
@@ -85,6 +86,16 @@ def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
     return places, np.array([marker.offset for marker in arm.markers])
 
 
+def marker_names(arm: Manipulator) -> tuple[str, ...]:
+    """Names of the markers of an arm, which is "tip" without any."""
+    return tuple(marker.name for marker in arm.markers) or ("tip",)
+
+
+def marker_places(arm: Manipulator, names: Iterable[str]) -> Index:
+    """Places of some markers among those of an arm, shape (n,)."""
+    return np.array([marker_names(arm).index(name) for name in names])
+
+
 @dataclass(frozen=True, eq=False)
 class MarkerModel:
     """Markers of an arm as functions of its free numbers, at given inputs."""
@@ -98,14 +109,12 @@ class MarkerModel:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the markers that were measured."""
-        known = [marker.name for marker in self.free.arm.markers] or ["tip"]
-        return tuple(known[k] for k in self.markers)
+        return tuple(marker_names(self.free.arm)[k] for k in self.markers)
 
     @classmethod
     def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
         """The model of measured poses."""
-        names = [marker.name for marker in free.arm.markers] or ["tip"]
-        return cls(free, data.inputs, np.array([names.index(name) for name in data.marker_names]))
+        return cls(free, data.inputs, marker_places(free.arm, data.marker_names))
 
     def predict(self, values: Array, *, slopes: bool = False) -> Prediction:
         """Places of the markers, and their derivatives if asked for.
@@ -288,12 +297,12 @@ def _with_tensions(
 def _strains(at: _Explicit, state: RodState) -> tuple[Array, Array]:
     """ω dZ (n, step, 3, 3) and (ζ - 1) dZ (n, step, 3) at the nodes."""
     table, gamma = at.table, state.gamma
-    growth = table.length * (1.0 + np.einsum("kij,nj->nki", table.growth, gamma))
+    rest_length = table.length * (1.0 + np.einsum("kij,nj->nki", table.rest_length_factor, gamma))
     bend = np.einsum("kicj,nj->nkic", table.curvature, gamma)
-    bend = growth[..., None] * (bend + table.compliance[..., 1:] * state.moment)
+    bend = rest_length[..., None] * (bend + table.compliance[..., 1:] * state.moment)
     thrust = np.einsum("nkic,kic->nki", state.directors[..., 2, :], table.force)
     rise = table.length * np.einsum("kij,nj->nki", table.extension, gamma)
-    return bend, rise + growth * table.compliance[..., 0] * thrust
+    return bend, rise + rest_length * table.compliance[..., 0] * thrust
 
 
 def _explicit_shortening(at: _Explicit, change: _Explicit, bend: Array, rise: Array) -> Array:

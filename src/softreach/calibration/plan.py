@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.calibration.fit import identifiable
 from softreach.calibration.free_numbers import FreeNumbers, free_numbers
-from softreach.calibration.model import MarkerModel
+from softreach.calibration.model import MarkerModel, marker_names, marker_places
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arguments import as_integer, as_names, as_number
@@ -131,10 +131,9 @@ def plan_poses(
     candidates = as_integer("candidates", candidates, 2, 200_000)
     n, seed = as_integer("n", n, 1, candidates), as_integer("seed", seed)
     names = _markers(arm, markers)
-    known = [marker.name for marker in arm.markers] or ["tip"]
-    at = np.array([known.index(name) for name in names])
     inputs = _candidates(arm, candidates, seed)
-    prediction = MarkerModel(numbers, inputs, at).predict(numbers.start, slopes=True)
+    model = MarkerModel(numbers, inputs, marker_places(arm, names))
+    prediction = model.predict(numbers.start, slopes=True)
     assert prediction.slopes is not None
     usable = np.isfinite(prediction.slopes).all(axis=(1, 2, 3))
     usable &= prediction.status == TipStatus.STABLE
@@ -162,7 +161,7 @@ def plan_poses(
 
 
 def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
-    known = tuple(marker.name for marker in arm.markers) or ("tip",)
+    known = marker_names(arm)
     if given is None:
         return known
     names = as_names("markers", given)
@@ -194,11 +193,7 @@ def _candidates(arm: Manipulator, count: int, seed: int) -> Array:
 def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
     """Rows with a large determinant of JᵀJ: one after another, then by exchange.
 
-    Args:
-        slopes: Of each candidate in the scales of the numbers, shape (candidate, 3 marker, number).
-        at: Candidates in the unit cube, no two of those chosen nearer than half of the mean
-            distance of n points; shape (candidate, input).
-        n: How many to choose.
+    No two of them are nearer in the unit cube than half of the mean distance of n points.
     """
     each = np.einsum("crp,crq->cpq", slopes, slopes)
     start = _START * np.trace(each.sum(axis=0)) / each.shape[1] * np.eye(each.shape[1])

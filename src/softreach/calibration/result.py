@@ -32,7 +32,7 @@ from softreach.support.arrays import Array, Index, Mask, as_rows
 from softreach.support.errors import counted
 from softreach.support.files.text import write_text
 from softreach.support.quantity import quantity
-from softreach.support.report import Report, Section
+from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit, as_unit, readable_unit
 from softreach.support.versions import versions
 
@@ -71,7 +71,7 @@ class ErrorRow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration:
+class Calibration(Reported):
     """A calibrated arm, the numbers that were fitted, and all that the data says of them."""
 
     arm: Manipulator
@@ -210,12 +210,9 @@ class Calibration:
         rng = np.random.default_rng(as_integer("seed", seed))
         root = np.linalg.svd(self.uncertainty.covariance, hermitian=True)
         factor = root[0] * np.sqrt(root[1])
-        low, high = self.fit.free.bounds
-        arms = []
-        for _ in range(as_integer("count", count, 2, 10_000)):
-            shift = factor @ rng.standard_normal(len(self.names))
-            arms.append(self.fit.free.made(np.clip(self.fit.values + shift, low, high)))
-        return arms
+        shifts = rng.standard_normal((as_integer("count", count, 2, 10_000), len(self.names)))
+        values = (self.fit.values + factor @ shift for shift in shifts)
+        return [self.fit.free.made(np.clip(each, *self.fit.free.bounds)) for each in values]
 
     def band(
         self, quantity: Callable[[Manipulator], ArrayLike], count: int = 32, seed: int = 0
@@ -345,6 +342,7 @@ class Calibration:
         arm, data = self.arm, self.data
         shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
         fitted = counted(len(data) - int(self.held.sum()), "sample")
+        numbers, seen = counted(len(self.names), "number"), ", ".join(data.marker_names)
         origin = [(_WORDS.get(key, key), text) for key, text in self.provenance.items()]
         for name, column in zip(arm.input_names, data.input_names, strict=True):
             origin.append((f"input {name}", f"column {column}" if column else "stays at 0"))
@@ -352,10 +350,7 @@ class Calibration:
             title=f"Calibration from {data.source}",
             verdict=self.verdict.sentence,
             state=self.verdict.limit,
-            facts=[
-                f"{counted(len(self.names), 'number')} from {fitted} of "
-                f"{', '.join(data.marker_names)}, {self.seconds:.1f} s"
-            ],
+            facts=[f"{numbers} from {fitted} of {seen}, {self.seconds:.1f} s"],
             sections=[
                 Section(
                     title="Numbers",
@@ -380,17 +375,12 @@ class Calibration:
             ],
         )
 
-    def __repr__(self) -> str:
-        return str(self.report())
-
 
 def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     fit, widths = result.fit, result.uncertainty.sigma.tolist()
     pairs = zip(fit.free.numbers, fit.values.tolist(), widths, fit.at_bound, strict=True)
     # The pose starts from the data and not from the design.
-    pose: dict[str, float] = dict(
-        zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True)
-    )
+    pose = dict[str, float](zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True))
     for number, value, sigma, at_bound in pairs:
         name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma / size, digits=2)
@@ -401,10 +391,8 @@ def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, s
 
 def _error_cells(row: ErrorRow, unit: LengthUnit, length: float) -> tuple[str, ...]:
     law, samples, errors = row
-    values = (errors.rms, errors.median, errors.most)
-    texts = [f"{value / unit.size:.3g}" for value in values] + [
-        f"{100 * errors.rms / length:.2g} %"
-    ]
+    texts = [f"{value / unit.size:.3g}" for value in (errors.rms, errors.median, errors.most)]
+    texts.append(f"{100 * errors.rms / length:.2g} %")
     return law, samples, *(texts if errors.number else "----")
 
 

@@ -8,30 +8,29 @@ from __future__ import annotations
 
 import traceback
 from contextlib import suppress
-from importlib.metadata import version
 from typing import Annotated, Any, cast
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
+import softreach
 from softreach.cli.console import HelpConsole, console
-from softreach.support.errors import NotPossible, NotWritten, SoftreachError, check_date
+from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
-_MORE = Group("More", sort_key=-1)
-_COMMANDS = (
-    (Group("Design", sort_key=-6), ("design", "check", "search", "list", "studio")),
-    (Group("Bench", sort_key=-5.5), ("plan-poses", "calibrate")),
-    (Group("Reach", sort_key=-5), ("reach", "cloud", "volume", "payload", "gradient")),
-    (Group("Places", sort_key=-4), ("solve", "track", "equilibria")),
-    (Group("Output", sort_key=-3), ("show", "export", "import")),
-    (Group("Families", sort_key=-2), ("atlas",)),
-    (_MORE, ("demo", "paper", "warmup")),
+_GROUPS = (
+    ("Design", "design:design search:check search:search listing:list studio:studio"),
+    ("Bench", "bench:plan-poses bench:calibrate"),
+    ("Reach", "reach:reach cloud:cloud cloud:volume reach:payload reach:gradient"),
+    ("Places", "places:solve places:track places:equilibria"),
+    ("Output", "cloud:show convert:export convert:import"),
+    ("Families", "atlas:atlas"),
+    ("More", "demo:demo demo:example warmup:doctor demo:paper warmup:warmup"),
 )
-_OBJECTS = {
-    "import": "import_file",
-    "list": "listing",
-    "plan-poses": "plan_poses",
-}  # where Python needs the name itself
+"""Titles of the help, and commands behind the modules that they are in."""
+MODULES = {
+    name: module for _, words in _GROUPS for module, name in (w.split(":") for w in words.split())
+}
+_FUNCTIONS = {"import": "import_file", "list": "listing"}  # where Python needs the name itself
 
 
 def _shown_default(value: object) -> Any:
@@ -63,9 +62,9 @@ A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a
 built-in design, such as minimal_trunk; softreach list designs has them all.
 Start with
 
-    softreach demo --out out
+    softreach reach minimal_trunk
 """,
-    version=lambda: version("softreach"),
+    version=lambda: softreach.__version__,
     exit_on_error=False,
     print_error=False,
     suppress_keyboard_interrupt=False,
@@ -74,18 +73,21 @@ Start with
     console=cast(Any, HelpConsole()),
     default_parameter=Parameter(negative=(), show_default=_shown_default),
 )
-_NAMES = {name for _, names in _COMMANDS for name in names}
-for _group, _names in _COMMANDS:
-    for _place, _name in enumerate(_names):
-        _object = _OBJECTS.get(_name, _name)
-        app.command(f"softreach.cli.{_object}:{_object}", name=_name, group=_group, sort_key=_place)
-for _flag in ("--help", "--version"):
-    app[_flag].group = _MORE
+_titles = {title: Group(title, sort_key=k - 9) for k, (title, _) in enumerate(_GROUPS)}
+for _title, _words in _GROUPS:
+    for _place, _name in enumerate(_word.partition(":")[2] for _word in _words.split()):
+        _function = f"{MODULES[_name]}:{_FUNCTIONS.get(_name, _name.replace('-', '_'))}"
+        _where = f"softreach.cli.{_function}"
+        app.command(_where, name=_name, group=_titles[_title], sort_key=_place)
 app.meta.suppress_keyboard_interrupt = False
 app.register_install_completion_command(add_to_startup=False)
-app["--install-completion"].group = _MORE
+for _flag in ("--help", "--version", "--install-completion"):
+    app[_flag].group = _titles["More"]
 
-_ALWAYS = Group("Options of every command", sort_key=9)
+
+def _always(*names: str, help: str) -> Parameter:
+    group = Group("Options of every command", sort_key=9)
+    return Parameter(name=names, group=group, show_default=False, help=help)
 
 
 @app.meta.default
@@ -93,27 +95,18 @@ def _start(
     *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
     quiet: Annotated[
         bool,
-        Parameter(
-            name=("--quiet", "-q"),
-            group=_ALWAYS,
-            show_default=False,
-            help="Print results and errors only: no warnings, no progress.",
-        ),
+        _always("--quiet", "-q", help="Print results and errors only: no warnings, no progress."),
     ] = False,
     verbose: Annotated[
         bool,
-        Parameter(
-            name=("--verbose", "-v"),
-            group=_ALWAYS,
-            show_default=False,
-            help="Print more: what is compiled, and where an error comes from.",
+        _always(
+            "--verbose", "-v", help="Print more: what is compiled, and where an error comes from."
         ),
     ] = False,
     imports: Annotated[
         list[str] | None,
-        Parameter(
-            name="--import",
-            group=_ALWAYS,
+        _always(
+            "--import",
             help="Module, or .py file, with actuators, profiles or metrics of your own, which is "
             "run. May be repeated.",
         ),
@@ -130,9 +123,8 @@ def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
     with console.listening():
         try:
-            check_date()
-            if not _NAMES & {*arguments}:
-                _ = [app[name] for name in _NAMES]  # imports them: help lists their docstrings
+            if not MODULES.keys() & {*arguments}:
+                _ = [app[name] for name in MODULES]  # imports them: help lists their docstrings
             code = app.meta(arguments, result_action="return_value")
             console.flush()
         except BrokenPipeError:

@@ -8,22 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.lengths import Rows
-from softreach.cli.options import (
-    OUT,
-    SAMPLING,
-    AsJson,
-    Durable,
-    Overwrite,
-    Sampling,
-    check_picture,
-    refuse,
-)
-from softreach.cli.values import Whole, as_read, pairs_in
-from softreach.support.errors import InvalidInput, MissingExtra, NotPossible
-from softreach.support.quantity import numbers_in
+from softreach.cli.values import Whole, pairs_in, read_positive, rows_of
+from softreach.support.errors import InvalidInput, NotPossible, counted
+from softreach.support.quantity import read_number
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -54,7 +44,7 @@ def build(
     vary: list[str] | None = None,
     design: str | None = None,
     space: Path | None = None,
-    sampling: Sampling = SAMPLING,
+    sampling: options.Sampling = options.SAMPLING,
     alpha: str | None = None,
     metrics: str | None = None,
     keep_clouds: Annotated[bool, Parameter(negative="--no-keep-clouds")] = True,
@@ -62,8 +52,8 @@ def build(
     scheduler_file: Path | None = None,
     shard: Shard = "0/1",
     changes: Changes = UNCHANGED,
-    durable: Durable = False,
-    json: AsJson = False,
+    durable: options.Durable = False,
+    json: options.AsJson = False,
 ) -> None:
     """Compute the clouds and the metrics of all designs.
 
@@ -89,7 +79,7 @@ def build(
 
     groups = tuple(METRIC_GROUPS) if metrics is None else tuple(metrics.split(","))
     if "concave" not in groups:
-        refuse("without the metrics concave", alpha=alpha)
+        options.refuse("without the metrics concave", alpha=alpha)
     build_atlas(
         _space_of(space, design, vary, changes),
         store,
@@ -105,18 +95,25 @@ def build(
 
 
 @atlas.command
-def status(store: Store, /, *, json: AsJson = False) -> None:
+def status(store: Store, /, *, json: options.AsJson = False) -> None:
     """Count the designs that are done, and explain the others.
 
     Example: softreach atlas status atlas.zarr
     """
     from softreach.atlas import atlas_status
 
-    _print_status(store, atlas_status(store), json)
+    _print(store, atlas_status(store), json)
+
+
+def _print(store: str, state: AtlasStatus, json: bool) -> None:
+    if json:
+        console.json(asdict(state))
+    else:
+        console.line("\n  ".join([f"atlas {store}", *str(state).splitlines()]))
 
 
 @atlas.command
-def verify(store: Store, /, *, json: AsJson = False) -> None:
+def verify(store: Store, /, *, json: options.AsJson = False) -> None:
     """Read all of an atlas and check it.
 
     The command that built it computes again what is damaged.
@@ -125,18 +122,12 @@ def verify(store: Store, /, *, json: AsJson = False) -> None:
     """
     from softreach.atlas import verify_atlas
 
-    state = verify_atlas(store)
-    _print_status(store, state, json)
+    _print(store, state := verify_atlas(store), json)
     if state.damaged:
-        allowed = "0; the command that built the atlas computes them again"
-        raise InvalidInput(f"damaged designs of {store}", state.damaged, allowed)
-
-
-def _print_status(store: str, state: AtlasStatus, json: bool) -> None:
-    if json:
-        console.json(asdict(state))
-    else:
-        console.block(f"atlas {store}", state)
+        raise NotPossible(
+            f"{counted(state.damaged, 'design')} of {store} damaged; the command that built the "
+            "atlas computes them again"
+        )
 
 
 @atlas.command
@@ -148,7 +139,9 @@ def best(
     smallest: bool = False,
     where: list[str] | None = None,
     count: Whole = 1,
-    json: AsJson = False,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    json: options.AsJson = False,
 ) -> None:
     """Find the designs with the largest metric, under constraints.
 
@@ -159,17 +152,22 @@ def best(
         smallest: Prefer small values.
         where: A constraint, unreachability<=0.4 or taper_deg>=1. May be repeated.
         count: Number of designs.
+        out: Design file (.toml) for the best of them.
     """
-    from softreach.atlas import best_designs, open_atlas
+    from softreach.arm.design_file import DESIGN_FILE
+    from softreach.atlas import atlas_design, best_designs, open_atlas
+    from softreach.atlas.reading import command_of
 
-    designs = best_designs(open_atlas(store), metric, smallest=smallest, where=where, count=count)
-    columns = {str(name): column for name, column in designs.variables.items()}
-    rows: Rows = {
-        name: as_read(column.values, str(column.attrs.get("units", "1")))
-        for name, column in columns.items()
-        if column.dtype.kind in "fi"
-    }
-    console.rows(f"best {metric} of {store}", rows, json)
+    options.check_output(out, DESIGN_FILE, overwrite)
+    atlas = open_atlas(store)
+    designs = best_designs(atlas, metric, smallest=smallest, where=where or (), count=count)
+    if out is not None:
+        if not designs.sizes["rank"]:
+            raise NotPossible(f"no design of {store} meets {' and '.join(where or ())}")
+        parameters = command_of(atlas).space.names
+        first = {name: float(designs[name][0]) for name in parameters}
+        atlas_design(atlas, **first).save(out, overwrite=overwrite)
+    console.rows(f"best {metric} of {store}", rows_of(designs), json)
 
 
 @atlas.command
@@ -178,8 +176,8 @@ def figures(
     /,
     *,
     panels: Whole = 7,
-    out: Annotated[Path, OUT] = Path("figures"),
-    overwrite: Overwrite = False,
+    out: Annotated[Path, options.OUT] = Path("figures"),
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Draw the atlas: sheets, corners, maps, curvature.
 
@@ -192,21 +190,18 @@ def figures(
         out: Folder for the figures.
     """
     from softreach.atlas import open_atlas
-    from softreach.paper.atlas_figures import atlas_figures
+    from softreach.plot import atlas_figures
     from softreach.plot.style import pyplot, save_figure
     from softreach.support.arguments import as_integer
 
     as_integer("panels", panels, 1)
     for suffix in ("png", "pdf"):  # tried by a name that any of them may have
-        check_picture(out / f"clouds.{suffix}", overwrite)
+        options.check_picture(out / f"clouds.{suffix}", overwrite)
     for name, figure in atlas_figures(open_atlas(store), panels):
         for suffix in ("png", "pdf"):
             save_figure(figure, out / f"{name}.{suffix}", overwrite=overwrite)
             console.line(f"{out / name}.{suffix}")
         pyplot().close(figure.get_figure(root=True))
-
-
-_NAMED_IN_FILE = "with --space, whose file names the design"
 
 
 def _space_of(
@@ -219,7 +214,7 @@ def _space_of(
     if (path is None) == (vary is None):
         raise NotPossible("give either --vary or --space")
     if path is not None:
-        refuse(_NAMED_IN_FILE, design=design, **changes.given)
+        options.refuse("with --space, whose file names the design", design=design, **changes.given)
         return parse_space(read_text("space", path, LONGEST), design_from)
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
@@ -229,29 +224,28 @@ def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter
 
-    pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8") or {}
+    pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8")
     return DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))
 
 
 def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:
+    from softreach.support.files.formats import check_installed
+
     if scheduler is not None:
-        refuse("with --scheduler", scheduler_file=scheduler_file)
+        options.refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:
         return None
-    try:
-        from distributed import Client
-    except ModuleNotFoundError as error:
-        raise MissingExtra(("distributed", "cluster")) from error
+    check_installed(("distributed", "cluster"))
+    from distributed import Client
+
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
 
 
 def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
-    values = numbers_in(text.removesuffix("L"), 1) if text.endswith("L") else None
-    if not values or values[0] <= 0:
-        allowed = "a radius > 0 over the length of each design, like 0.05L"
-        raise InvalidInput("alpha", text or "''", allowed)
-    return values[0]
+    allowed = "a radius > 0 over the length of each design, like 0.05L"
+    bare = text.removesuffix("L") if text.endswith("L") else ""
+    return read_positive("alpha", text, lambda _: read_number(bare), allowed)
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -1,41 +1,33 @@
-"""`softreach cloud`: compute a reachability cloud and store it."""
+"""`softreach cloud`, `volume` and `show`: samples of what an arm reaches."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
-from softreach.cli.lengths import Lengths, Rows
-from softreach.cli.options import (
-    SAMPLING,
-    AsJson,
-    Design,
-    Out,
-    Overwrite,
-    Sampling,
-    Unit,
-    check_output,
-)
-from softreach.cli.values import Number
+from softreach.cli.values import Number, Rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from softreach.geometry.hull import Hull
+
 
 def cloud(
-    design: Design,
+    design: options.Design,
     /,
     *,
-    sampling: Sampling = SAMPLING,
+    sampling: options.Sampling = options.SAMPLING,
     tol: Number = 1e-6,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Sample the reachability cloud of a design and store it as Zarr.
 
@@ -50,10 +42,9 @@ def cloud(
     from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, save_cloud
     from softreach.rod.rods import as_tip_map
 
-    arm = design_from(design, changes)
-    lengths = Lengths.of(arm, unit)
+    arm = design_from(design, changes, unit)
     out = out or Path(f"{Path(design).stem}.zarr")
-    check_output(out, CLOUD_STORE, overwrite)
+    options.check_output(out, CLOUD_STORE, overwrite)
     arguments = sampling.arguments
     start = perf_counter()
     dataset = compute_cloud(arm, **arguments, tol=tol)
@@ -71,15 +62,132 @@ def cloud(
         "lowest tip": (float(dataset.tip[:, 2].min()), "m"),
         "cloud": (str(out), ""),
     }
-    console.rows(f"cloud of {design}", rows, json, lengths)
+    console.rows(f"cloud of {design}", rows, json, arm)
 
 
 def _status_rows(cloud: xr.Dataset) -> Rows:
-    if "status" not in cloud:
-        return {}
     from softreach.rod.tip_map import TipStatus
 
     return {
         status.name.lower().replace("_", " "): (int((cloud.status == status).sum()), "")
-        for status in TipStatus
+        for status in (TipStatus if "status" in cloud else ())
     }
+
+
+def volume(
+    source: options.Source,
+    /,
+    *,
+    alpha: str = "0.05L",
+    sampling: options.Sampling = options.SAMPLING,
+    changes: Changes = UNCHANGED,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> None:
+    """Estimate volumes and unreachability from a cloud.
+
+    The volume is that of an α-shape of the samples, which limit its accuracy.
+    softreach reach computes the exact volume, without samples and with its error.
+
+    Example: softreach volume trunk.zarr --alpha 0.03L --out hull.ply
+
+    Args:
+        alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical.
+        out: Write the α-shape here: .ply .stl .obj .glb .vtu
+    """
+    from softreach.cloud.volume import concave_hull, convex_hull, flat_areas
+    from softreach.export import export_mesh
+    from softreach.export.surfaces import SURFACE_FILES
+    from softreach.schema import is_stable
+
+    options.check_output(out, SURFACE_FILES, overwrite)
+    options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
+    cloud, arm = options.cloud_of(source, sampling, changes, unit, check_hull_memory)
+    bias = cloud.attrs["sampler"] == "uniform"
+    concave = concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
+    rows = volume_rows(concave, convex_hull(cloud.tip))
+    areas = flat_areas(cloud.tip.values[is_stable(cloud.tip)], concave.alpha)
+    if areas is not None:
+        share = 1 - areas[0] / areas[1] if areas[1] else None
+        rows = {name: rows[name] for name in ("points", "alpha")}
+        rows |= {"area (in one plane)": (areas[0], "m²"), "convex area": (areas[1], "m²")}
+        rows["unreachability"] = (share, "")
+    console.rows(f"volume of {source}", rows, json, arm)
+    if out is not None:
+        export_mesh(concave, out, unit=options.written_unit(arm), overwrite=overwrite)
+        console.written(out, options.written_unit(arm))
+
+
+_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
+
+
+def check_hull_memory(n: int) -> None:
+    """Refuse more samples than can be computed and triangulated in the free memory."""
+    from softreach.support.memory import check_memory
+
+    check_memory("n", n, _BYTES * n)
+
+
+def volume_rows(concave: Hull, convex: Hull) -> Rows:
+    """The size of a cloud and the trust that it deserves."""
+    share = 1 - concave.volume / convex.volume if convex.volume else None
+    return {
+        "points": (concave.n, ""),
+        "alpha": (concave.alpha, "m"),
+        "mean spacing": (concave.spacing, "m"),
+        "regions": (concave.regions, ""),
+        "volume": (concave.volume, "m³"),
+        "volume without sampling bias (estimate)": (concave.volume_corrected, "m³"),
+        "convex volume": (convex.volume, "m³"),
+        "unreachability": (share, ""),
+    }
+
+
+def show(
+    source: options.Source,
+    /,
+    *,
+    color: str | None = None,
+    activation: options.Activation = None,
+    sampling: options.Sampling = options.SAMPLING,
+    changes: Changes = UNCHANGED,
+    out: Annotated[Path, options.OUT] = Path("cloud.png"),
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+) -> None:
+    """Draw a cloud and its arm from four sides, or as a web page that turns.
+
+    Three views are orthogonal, one is oblique; --activation bends the arm. A page
+    (.html) is one file, which needs no network.
+
+    Example: softreach show trunk.zarr --activation -1,0,-0.5 --out trunk.pdf
+
+    Args:
+        color: rgb (mixed lights: if left out, of up to three bundles), strongest (bundle: if left
+            out, of more), effort, the name of a bundle, or compliance: how far the tip yields.
+        out: Picture file: .png .pdf .svg, or .html to turn
+    """
+    from softreach.plot import plot_3d, plot_views
+
+    options.check_picture(out, overwrite, page=True)
+    cloud, arm = options.cloud_of(source, sampling, changes, unit)
+    shape = None if activation is None else options.shape_of(activation, arm)
+    look = {"color": _colors(cloud, color), "unit": arm.length_unit}
+    if options.is_page(out):
+        figure = plot_3d([cloud, arm if shape is None else shape], **look)
+    else:
+        figure = plot_views(cloud, arm, shape, **look)
+    options.save_picture(figure, out, overwrite)
+    console.line(out)
+
+
+def _colors(cloud: xr.Dataset, color: str | None) -> str | xr.DataArray | None:
+    """The colors of the samples: a name that figures know, or numbers that they do not compute."""
+    from softreach.plot.coloring import bundle_names
+    from softreach.stiffness import cloud_compliance
+
+    if color != "compliance" or color in bundle_names(cloud):
+        return color
+    return cloud_compliance(cloud)["largest_compliance"]

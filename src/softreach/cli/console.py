@@ -14,16 +14,19 @@ from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
-from softreach.cli.values import finite, key, shown
+from softreach.cli.values import Rows, key, plain, rows_for_machines, rows_for_people, shown
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
+from softreach.support.quantity import columns
+from softreach.support.units import METER
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rich.console import Console as RichConsole
 
-    from softreach.cli.lengths import Lengths
+    from softreach.arm.manipulator import Manipulator
+    from softreach.support.units import LengthUnit
 
 
 _NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
@@ -58,64 +61,44 @@ class Console:
         """A result in words."""
         sys.stdout.write(f"{_printable(text)}\n")
 
-    def block(self, title: str, result: object) -> None:
-        """A result that prints itself, below its title."""
-        self.line("\n  ".join([title, *str(result).splitlines()]))
-
     def json(self, value: Any, indent: int | None = None) -> None:
         """A result for machines; null where there is no number."""
-        self.line(json.dumps(finite(value), indent=indent, allow_nan=False))
+        self.line(json.dumps(plain(value), indent=indent, allow_nan=False))
 
-    def rows(
-        self,
-        title: str,
-        rows: Mapping[str, tuple[Any, str]],
-        as_json: bool,
-        lengths: Lengths | None = None,
-    ) -> None:
+    def rows(self, title: str, rows: Rows, as_json: bool, arm: Manipulator | None = None) -> None:
         """Named values with their units, one below the other.
 
         Args:
             title: Heading for people.
-            rows: Name -> (value, unit); JSON keys are the names with their units.
+            rows: Name -> (value, unit) in SI units; JSON keys are the names with their units.
             as_json: Print JSON.
-            lengths: The unit of lengths, areas and volumes, which are given in SI units; None for
-                that.
+            arm: The design whose unit people see, and whose length is the unit L for machines.
         """
         if as_json:
-            plain = ((name, *pair) for name, pair in rows.items())
-            each = plain if lengths is None else lengths.for_machines(rows)
+            each = rows_for_machines(rows, None if arm is None else arm.length)
             self.json({key(name, unit): value for name, value, unit in each})
             return
-        rows = rows if lengths is None else lengths.for_people(rows)
-        width = max(len(name) for name in rows)
-        texts = {name: (shown(value), unit) for name, (value, unit) in rows.items()}
         self.line(title)
-        for name, (text, unit) in texts.items():
-            self.line(f"  {name:<{width}}  {text} {'' if text == '-' else unit}".rstrip())
+        texts = rows_for_people(rows, METER if arm is None else arm.length_unit)
+        for line in columns([(name, text) for name, text in texts.items()]):
+            self.line(f"  {line}")
 
     def table(self, records: Sequence[Mapping[str, Any]], as_json: bool) -> None:
         """Records with the same keys, one to a line below a heading."""
         if as_json:
             self.json(records)
             return
-        lines = [
-            list(records[0]),
-            *([shown(value) for value in record.values()] for record in records),
-        ]
-        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        for cells in lines:
-            padded = (f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True))
-            self.line("  ".join(padded).rstrip())
+        for line in columns([[*records[0]], *([*map(shown, one.values())] for one in records)]):
+            self.line(line)
 
     def note(self, text: str) -> None:
         """A remark beside the results."""
         if not self.quiet:
             self.error(text)
 
-    def written(self, path: Path, lengths: Lengths) -> None:
+    def written(self, path: Path, unit: LengthUnit) -> None:
         """Unit in which a table or a mesh was written."""
-        self.note(f"{path}: lengths in {lengths.written.name}")
+        self.note(f"{path}: lengths in {unit.name}")
 
     def error(self, text: str) -> None:
         """A line on standard error."""

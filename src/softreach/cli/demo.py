@@ -1,4 +1,4 @@
-"""`softreach demo`: the main job on the paper's design, start to end."""
+"""`softreach demo`, `example` and `paper`: the main job, files to begin with, all of the paper."""
 
 from __future__ import annotations
 
@@ -7,13 +7,19 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+import softreach
+from softreach.cli.cloud import check_hull_memory, volume_rows
 from softreach.cli.console import console
-from softreach.cli.lengths import Lengths
-from softreach.cli.options import OUT, AsJson, Overwrite, Unit, check_output
+from softreach.cli.options import OUT, AsJson, Overwrite, Unit, check_output, written_unit
 from softreach.cli.values import Whole
-from softreach.cli.volume import check_hull_memory, volume_rows
+from softreach.support.errors import InvalidInput
 
-_FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
+_FILES = {
+    "tentacle": ("tentacle.toml", "tentacle.csv"),
+    "three_fibers": ("three_fibers.toml", "five_places.toml"),
+    "tendon_arm": ("tendon_arm.toml", "tendon_arm.sh", "requirement_check.py"),
+    "spine": ("spine.toml", "magnets.py", "own_actuator.sh"),
+}
 
 
 def demo(
@@ -34,51 +40,110 @@ def demo(
         n: Number of samples.
         out: Folder for the results.
     """
+    from functools import partial
     from time import perf_counter
 
     from softreach import export, plot
-    from softreach.arm import designs
-    from softreach.cloud.clouds import compute_cloud, save_cloud
-    from softreach.cloud.volume import Hull, concave_hull, convex_hull
+    from softreach.arm.design_file import DESIGN_FILE
+    from softreach.cli.changes import design_from
+    from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, save_cloud
+    from softreach.cloud.volume import concave_hull, convex_hull
+    from softreach.export.clouds import CLOUD_FILES
     from softreach.rod.kinematics import configuration
     from softreach.support import parallel
+    from softreach.support.files.formats import PICTURES
 
     start = perf_counter()
-    arm = designs.minimal_trunk()
-    lengths = Lengths.of(arm, unit)
-    _check(out, overwrite)
+    arm = design_from("minimal_trunk", unit=unit)
+    formats = {
+        "design.toml": DESIGN_FILE,
+        "cloud.zarr": CLOUD_STORE,
+        "cloud.ply": CLOUD_FILES,
+        "hull.ply": CLOUD_FILES,
+        "cloud.png": PICTURES,
+    }
+    for name, kinds in formats.items():
+        check_output(out / name, kinds, overwrite)
     check_hull_memory(n)
     cloud = compute_cloud(arm, n)
     computed = perf_counter() - start
-
-    def hulls() -> tuple[Hull, Hull]:
-        return concave_hull(cloud.tip, bias=True), convex_hull(cloud.tip)
-
-    with parallel.meanwhile(hulls) as result:
+    written = written_unit(arm)
+    hulls = partial(concave_hull, cloud.tip, bias=True), partial(convex_hull, cloud.tip)
+    with parallel.meanwhile(lambda: [make() for make in hulls]) as made:
         arm.save(out / "design.toml", overwrite=overwrite)
         save_cloud(cloud, out / "cloud.zarr", overwrite=overwrite)
-        export.export_cloud(cloud, out / "cloud.ply", unit=lengths.written, overwrite=overwrite)
+        export.export_cloud(cloud, out / "cloud.ply", unit=written, overwrite=overwrite)
         shape = configuration(arm, [-1.0, 0.0, -0.4])
-        figure = plot.plot_views(cloud, arm, shape, unit=lengths.unit)
+        figure = plot.plot_views(cloud, arm, shape, unit=arm.length_unit)
         plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
-        concave, convex = result()
-    export.export_mesh(concave, out / "hull.ply", unit=lengths.written, overwrite=overwrite)
+        concave, convex = made()
+    export.export_mesh(concave, out / "hull.ply", unit=written, overwrite=overwrite)
     for name in ("cloud.ply", "hull.ply"):
-        console.written(out / name, lengths)
-
+        console.written(out / name, written)
     rows = volume_rows(concave, convex)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
-    rows["written"] = ([str(out / name) for name in _FILES], "")
-    console.rows("minimal trunk, revolution 108°, taper 2°", rows, json, lengths)
+    rows["written"] = ([str(out / name) for name in formats], "")
+    console.rows("minimal trunk, revolution 108°, taper 2°", rows, json, arm)
 
 
-def _check(folder: Path, overwrite: bool) -> None:
-    from softreach.arm.design_file import DESIGN_FILE
-    from softreach.cloud.clouds import CLOUD_STORE
-    from softreach.export.clouds import CLOUD_FILES
-    from softreach.support.files.formats import PICTURES
+def example(
+    name: str, /, *, out: Annotated[Path, OUT] = Path(), overwrite: Overwrite = False
+) -> None:
+    """Write an example here: a design and the data and scripts that go with it.
 
-    formats = (DESIGN_FILE, CLOUD_STORE, CLOUD_FILES, CLOUD_FILES, PICTURES)
-    for name, kinds in zip(_FILES, formats, strict=True):
-        check_output(folder / name, kinds, overwrite)
+    softreach list examples prints their names. Designs of the gallery are examples
+    of one file.
+
+    Example: softreach example tentacle
+
+    Args:
+        name: Name of the example.
+        out: Folder for the files: this one if left out.
+    """
+    from softreach.support.files.atomic import check_place, writing
+
+    if name not in (known := examples()):
+        raise InvalidInput("example", name, f"one of {', '.join(known)}")
+    for file in known[name]:
+        check_place(out / file.name, overwrite=overwrite)
+    out.mkdir(parents=True, exist_ok=True)
+    for file in known[name]:
+        with writing(out / file.name, overwrite=overwrite) as stream:
+            stream.write(file.read_bytes())
+        console.line(out / file.name)
+
+
+def examples() -> dict[str, tuple[Path, ...]]:
+    """The files of each example by its name."""
+    known = {
+        name: tuple(_folder("examples") / file for file in files) for name, files in _FILES.items()
+    }
+    return known | {file.stem: (file,) for file in sorted(_folder("designs").glob("*.toml"))}
+
+
+def _folder(name: str) -> Path:
+    """Folder in the installed package, or at the root of a clone."""
+    package = Path(softreach.__file__).parent
+    return package / name if (package / name).is_dir() else package.parents[1] / name
+
+
+def paper(
+    *,
+    quick: bool = False,
+    out: Annotated[Path, OUT] = Path("paper"),
+    overwrite: Overwrite = False,
+) -> None:
+    """Recompute the paper's figures and statements into a report.
+
+    The same command continues after an interruption.
+
+    Example: softreach paper --out paper --quick
+
+    Args:
+        quick: Small clouds: coarse numbers in under a minute.
+        out: Folder for the report and its figures.
+    """
+    from softreach.paper import reproduce_paper
+
+    console.line(reproduce_paper(out, quick=quick, overwrite=overwrite, say=console.note))

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output, refuse
-from softreach.cli.values import to_degrees
+from softreach.cli.values import Rows, to_degrees
 from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 
 if TYPE_CHECKING:
+    from softreach.arm.loads import Loads
     from softreach.arm.manipulator import Manipulator
     from softreach.rest import Rest
     from softreach.rod.summary import DesignSummary
@@ -55,15 +55,13 @@ def design(
     if design is None:
         raise NotPossible("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
-        arm = design_from(design, changes)
-    lengths = Lengths.of(arm, unit)
+        arm = design_from(design, changes, unit)
     check_output(out, DESIGN_FILE, overwrite)
     facts = describe(arm)
     if out is not None:
-        shown = arm if unit is None else arm.replace(display_unit=unit)
-        shown.save(out, overwrite=overwrite)
-    details = _rows_for_machines(arm, facts) if json else _bundle_rows(arm, facts)
-    console.rows(f"design {design}", _rows(arm, facts) | details, json, lengths)
+        arm.save(out, overwrite=overwrite)
+    details = _for_machines(arm, facts) if json else _bundle_rows(arm, facts)
+    console.rows(f"design {design}", _rows(arm, facts) | details, json, arm)
     if not json:
         for note in (*facts.lacking, *(facts.validity if console.verbose else ())):
             console.line(f"  {note}")
@@ -72,6 +70,8 @@ def design(
 
 
 def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
+    from softreach.arm.number import fields_of
+
     rows: Rows = {"bundles": (arm.bundles, ""), "bundle names": (list(arm.bundle_names), "")}
     if arm.fibers:
         rows["helical angle"] = (to_degrees(facts.helical_angles), "deg")
@@ -82,46 +82,33 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
         "outer radius at tip": (facts.tip_radius, "m"),
         "base to tip ratio": (facts.taper_ratio, ""),
         "inner to outer radius": (facts.radius_ratio, ""),
+        "breakpoints": (list(facts.breakpoints), "m"),
+        **{f"station {name}": (z, "m") for name, z in arm.stations.items()},
     }
-    if facts.breakpoints:
-        rows["breakpoints"] = (list(facts.breakpoints), "m")
-    rows |= {f"station {name}": (z, "m") for name, z in arm.stations.items()}
-    pieces = enumerate(arm.rigid_pieces)
-    rows |= {f"rigid piece {k}": (list(piece.span(arm.length)), "m") for k, piece in pieces}
-    if arm.markers:
-        rows["markers"] = ([marker.name for marker in arm.markers], "")
-    rows["extension"] = (list(facts.extension), "")
-    rows["curvature times L"] = (list(facts.curvature), "")
-    return rows | _measured_rows(arm) | _rows_of_matter(facts) | load_rows(arm) | _rest_rows(arm)
-
-
-def _measured_rows(arm: Manipulator) -> Rows:
-    from softreach.arm.number import fields_of
-
-    if (measured := arm.section.measured) is None:
-        return {}
-    numbers = fields_of(type(measured)).values()
-    known = [number.meaning for number in numbers if getattr(measured, number.field) is not None]
-    return {"measured": (known, "")}
-
-
-def _rows_of_matter(facts: DesignSummary) -> Rows:
-    rows: Rows = {}
+    for k, piece in enumerate(arm.rigid_pieces):
+        rows[f"rigid piece {k}"] = (list(piece.span(arm.length)), "m")
+    rows |= {
+        "markers": ([marker.name for marker in arm.markers], ""),
+        "extension": (list(facts.extension), ""),
+        "curvature times L": (list(facts.curvature), ""),
+    }
+    if (measured := arm.section.measured) is not None:
+        numbers = fields_of(type(measured)).values()
+        known = [each.meaning for each in numbers if getattr(measured, each.field) is not None]
+        rows["measured"] = (known, "")
     if facts.stiffness is not None:
-        units = {"K0": "N", "K1": "N m²", "K3": "N m²"}
-        for (name, unit), values in zip(units.items(), facts.stiffness, strict=True):
+        for name, values in zip(("K0", "K1", "K3"), facts.stiffness, strict=True):
+            unit = "N" if name == "K0" else "N m²"
             rows[f"{name} at base and tip"] = (values.tolist(), unit)
-    if facts.mass is not None:
-        rows["mass"] = (facts.mass, "kg")
-    if facts.load_number is not None:
-        rows["load number"] = (facts.load_number, "")
-    return rows
+    rows |= {"mass": (facts.mass, "kg"), "load number": (facts.load_number, "")}
+    known = {name: row for name, row in rows.items() if row[0] not in (None, [])}
+    return known | load_rows(arm) | _rest_rows(arm)
 
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     """Bounds and effects of each activation; neighbors that are equal share a line."""
     texts = [
-        f"{_span(arm.bounds[k])}{_suffix(unit)}: length {_span(100.0 * facts.bundle_strain[k])} %, "
+        f"{_span(arm.bounds[k], unit)}: length {_span(100.0 * facts.bundle_strain[k])} %, "
         f"ζ {_span(facts.bundle_extension[k])}, |κ| R2 {_span(facts.bundle_bending[k])}"
         for k, unit in enumerate(arm.bundle_units)
     ]
@@ -132,40 +119,31 @@ def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
         rows[f"activation {label}"] = (text, "")
     for drive in arm.drives:
         gains = ", ".join(f"{gain:+g} {name}" for name, gain in drive.gains.items())
-        rows[f"drive {drive.name}"] = (f"{_span(drive.bounds)}{_suffix(drive.unit)}: {gains}", "")
+        rows[f"drive {drive.name}"] = (f"{_span(drive.bounds, drive.unit)}: {gains}", "")
     return rows
 
 
-def _suffix(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
+def _span(ends: Any, unit: str = "1") -> str:
+    return f"{ends[0]:.4g} to {ends[1]:.4g}{'' if unit == '1' else f' {unit}'}"
 
 
-def _span(ends: Any) -> str:
-    return f"{ends[0]:.4g} to {ends[1]:.4g}"
-
-
-def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
-    names = ("name", "unit", "bounds", "strain", "extension", "bending_times_R2")
-    columns = (
-        arm.bundle_names,
-        arm.bundle_units,
-        arm.bounds.tolist(),
-        facts.bundle_strain.tolist(),
-        facts.bundle_extension.tolist(),
-        facts.bundle_bending.tolist(),
-    )
-    inputs = arm.input_names, arm.input_units, arm.input_bounds.tolist()
-    drives = [dict(zip(names, row, strict=False)) for row in zip(*inputs, strict=True)]
-    return {
-        **({"inputs": (drives, "")} if arm.drives else {}),
-        "activations": (
-            [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
-            "",
-        ),
-        "lacking": (list(facts.lacking), ""),
-        "validity": (list(facts.validity), ""),
-        "warnings": (list(facts.warnings), ""),
+def _for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
+    bundles = {
+        "name": arm.bundle_names,
+        "unit": arm.bundle_units,
+        "bounds": arm.bounds,
+        "strain": facts.bundle_strain,
+        "extension": facts.bundle_extension,
+        "bending_times_R2": facts.bundle_bending,
     }
+    drives = {"name": arm.input_names, "unit": arm.input_units, "bounds": arm.input_bounds}
+    texts = {name: (getattr(facts, name), "") for name in ("lacking", "validity", "warnings")}
+    inputs = {"inputs": (_records(drives), "")} if arm.drives else {}
+    return {**inputs, "activations": (_records(bundles), ""), **texts}
+
+
+def _records(columns: dict[str, Any]) -> list[dict[str, Any]]:
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def load_rows(arm: Manipulator) -> Rows:
@@ -177,23 +155,20 @@ def load_rows(arm: Manipulator) -> Rows:
     if loads is None:
         return rows
     if any(loads.gravity):
-        posture = _posture(loads.seen_from(arm.base).gravity)
         rows = {
             "gravity": (list(loads.gravity), "m/s²"),
-            "base": (f"{posture}: {arm.base}" if posed else posture, ""),
+            "base": (_posture(loads.seen_from(arm.base)) + (f": {arm.base}" if posed else ""), ""),
         }
     for field, number in fields_of(type(loads)).items():
         value = getattr(loads, field)
         if field != "gravity" and (any(value) if isinstance(value, tuple) else value):
             rows[field.replace("_", " ")] = (value, number.unit)
-    if loads.point_loads:
-        rows["point loads"] = (len(loads.point_loads), "")
-    return rows
+    return rows | ({"point loads": (len(loads.point_loads), "")} if loads.point_loads else {})
 
 
-def _posture(gravity: tuple[float, float, float]) -> str:
+def _posture(loads: Loads) -> str:
     """The way the base stands by gravity in its own frame: a straight arm points along +z there."""
-    angle = to_degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
+    angle = to_degrees(math.acos(-loads.gravity[2] / math.hypot(*loads.gravity)))
     names = {0: "upright", 90: "sideways", 180: "hanging"}
     return names.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
 
@@ -205,19 +180,27 @@ def _rest_rows(arm: Manipulator) -> Rows:
     upright; nothing where moduli or densities are not known.
     """
     from softreach.arm.base import Base
-    from softreach.arm.load_number import load_number_faults
-    from softreach.arm.loads import GRAVITY, Loads
+    from softreach.arm.body import load_number_faults
+    from softreach.arm.loads import GRAVITIES, Loads
 
     if load_number_faults(arm):
         return {}
     if arm.loads is not None:
-        rest = _rest(arm)
-        return _sag("", rest) | {"at rest": (_stability(rest), "")}
-    sideways, upright = (
-        _rest(arm.replace(loads=Loads(gravity=gravity), base=Base()))
-        for gravity in ((GRAVITY, 0.0, 0.0), (0.0, 0.0, -GRAVITY))
-    )
-    return _sag(" sideways", sideways) | {"at rest upright": (_stability(upright), "")}
+        held = stood = _rest(arm)
+        how = "", ""
+    else:
+        ways = (Loads(gravity=GRAVITIES[way]) for way in ("sideways", "down"))
+        held, stood = (_rest(arm.replace(loads=loads, base=Base())) for loads in ways)
+        how = " sideways", " upright"
+    return {
+        f"sag at rest{how[0]}": (None if held is None else held.sag, "m"),
+        f"at rest{how[1]}": (
+            "unknown: the loads are too large"
+            if stood is None
+            else stood.status.name.lower().replace("_", " "),
+            "",
+        ),
+    }
 
 
 def _rest(arm: Manipulator) -> Rest | None:
@@ -230,20 +213,3 @@ def _rest(arm: Manipulator) -> Rest | None:
         if error.name != "loads":
             raise
         return None
-
-
-_STABILITY = {
-    "STABLE": "stable",
-    "UNSTABLE": "not stable",
-    "NO_EQUILIBRIUM": "the loads shorten the arm to nothing",
-    "UNDECIDED": "undecided: the search for an equilibrium gave up",
-    "SNAPS": "the arm snaps before",
-}
-
-
-def _stability(rest: Rest | None) -> str:
-    return "unknown: the loads are too large" if rest is None else _STABILITY[rest.status.name]
-
-
-def _sag(how: str, rest: Rest | None) -> Rows:
-    return {f"sag at rest{how}": (None if rest is None else rest.sag, "m")}

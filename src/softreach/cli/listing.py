@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 from cyclopts import App
 
@@ -13,11 +13,15 @@ from softreach.cli.values import as_read
 
 listing = App(
     name="list",
-    help="""List designs, materials, actuators, metrics, objectives, or parameters of a design.
+    help="""List designs, examples, materials, actuators, metrics, objectives, or parameters.
 
 Example: softreach list parameters minimal_trunk
 """,
 )
+
+
+def _print(columns: str, rows: Sequence[Sequence[object]], json: bool) -> None:
+    console.table([dict(zip(columns.split(), row, strict=True)) for row in rows], json)
 
 
 @listing.command
@@ -29,14 +33,32 @@ def designs(*, json: AsJson = False) -> None:
     from softreach.arm import designs
 
     makers = {name: getattr(designs, name) for name in designs.__all__}
+    rows = [
+        (name, (arm := make()).bundles, arm.length, _summary(make).rstrip(".").replace("`", ""))
+        for name, make in makers.items()
+    ]
+    _print("design bundles length_m description", rows, json)
+
+
+def _summary(documented: object) -> str:
+    return (documented.__doc__ or "").strip().partition("\n")[0]
+
+
+@listing.command
+def examples(*, json: AsJson = False) -> None:
+    """List the examples that softreach example writes, with their files.
+
+    Example: softreach list examples
+    """
+    from softreach.cli.demo import examples as known
+
     records = [
         {
-            "design": name,
-            "bundles": (arm := make()).bundles,
-            "length_m": arm.length,
-            "description": (make.__doc__ or "").partition("\n")[0].rstrip(".").replace("`", ""),
+            "example": name,
+            "files": " ".join(file.name for file in files),
+            "description": files[0].read_text("utf-8").partition("\n")[0].lstrip("# ").rstrip("."),
         }
-        for name, make in makers.items()
+        for name, files in known().items()
     ]
     console.table(records, json)
 
@@ -49,17 +71,18 @@ def materials(*, json: AsJson = False) -> None:
     """
     from softreach.arm.material import material_names, material_record
 
-    records = [
-        {
-            "material": name,
-            "young_modulus_pa": (record := material_record(name)).material.young_modulus,
-            "poisson_ratio": record.material.poisson_ratio,
-            "density_kg_m3": record.material.density,
-            "modulus": record.modulus,
-        }
-        for name in material_names()
+    records = [(name, material_record(name)) for name in material_names()]
+    rows = [
+        (
+            name,
+            of.material.young_modulus,
+            of.material.poisson_ratio,
+            of.material.density,
+            of.modulus,
+        )
+        for name, of in records
     ]
-    console.table(records, json)
+    _print("material young_modulus_pa poisson_ratio density_kg_m3 modulus", rows, json)
 
 
 @listing.command
@@ -73,17 +96,11 @@ def actuators(*, json: AsJson = False) -> None:
     from softreach.arm.actuators import Actuator
     from softreach.arm.design_file.keys import every_kind
 
-    records = [
-        {
-            "kind": name,
-            "activation": kind.activation,
-            "unit": kind.unit,
-            "module": kind.__module__,
-            "description": (kind.__doc__ or "").strip().partition("\n")[0],
-        }
+    rows = [
+        (name, kind.activation, kind.unit, kind.__module__, _summary(kind))
         for name, kind in every_kind(Actuator).items()
     ]
-    console.table(records, json)
+    _print("kind activation unit module description", rows, json)
 
 
 @listing.command
@@ -96,13 +113,13 @@ def metrics(*, json: AsJson = False) -> None:
     """
     from softreach.atlas.metrics import METRIC_GROUPS, own_metrics
 
-    own = [(name, (metric,)) for name, metric in own_metrics().items()]
-    records = [
-        {"metric": metric.name, "group": group, "unit": metric.unit, "meaning": metric.meaning}
-        for group, members in [*METRIC_GROUPS.items(), *own]
+    groups = METRIC_GROUPS | {name: (metric,) for name, metric in own_metrics().items()}
+    rows = [
+        (metric.name, group, metric.unit, metric.meaning)
+        for group, members in groups.items()
         for metric in members
     ]
-    console.table(records, json)
+    _print("metric group unit meaning", rows, json)
 
 
 @listing.command
@@ -115,17 +132,11 @@ def objectives(*, json: AsJson = False) -> None:
     """
     from softreach.optimization import OBJECTIVES
 
-    records = [
-        {
-            "objective": objective.name,
-            "unit": objective.unit,
-            "asks": objective.asks,
-            "derivatives": "yes" if objective.smooth else "no",
-            "meaning": objective.meaning,
-        }
-        for objective in OBJECTIVES.values()
+    rows = [
+        (each.name, each.unit, each.asks, "yes" if each.smooth else "no", each.meaning)
+        for each in OBJECTIVES.values()
     ]
-    console.table(records, json)
+    _print("objective unit asks derivatives meaning", rows, json)
 
 
 @listing.command
@@ -141,11 +152,8 @@ def parameters(design: Design, /, *, changes: Changes = UNCHANGED, json: AsJson 
     from softreach.arm.written import written_name
 
     arm = design_from(design, changes)
-    records: list[dict[str, Any]] = []
-    for name, parameter in parameters_of(arm).items():
-        value, unit = as_read(parameter.value(arm), parameter.unit)
-        written = written_name(name, parameter.unit)
-        row = (written, value, unit, parameter.symbol, parameter.meaning)
-        columns = ("parameter", "value", "unit", "symbol", "meaning")
-        records.append(dict(zip(columns, row, strict=True)))
-    console.table(records, json)
+    rows = [
+        (written_name(name, one.unit), *as_read(one.value(arm), one.unit), one.symbol, one.meaning)
+        for name, one in parameters_of(arm).items()
+    ]
+    _print("parameter value unit symbol meaning", rows, json)

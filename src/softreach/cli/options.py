@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,63 +9,53 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.changes import Changes, design_from, say_limits
+from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
-from softreach.cli.lengths import Lengths, check_unit
-from softreach.cli.values import Whole
+from softreach.cli.values import Whole, read_positive
 from softreach.support.errors import InvalidInput, NotPossible
+from softreach.support.files.formats import (
+    PAGES,
+    PICTURES,
+    FileFormat,
+    Formats,
+    check_installed,
+    format_of,
+)
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in
-from softreach.support.units import TYPED, read_length
+from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.arm.manipulator import Manipulator
-    from softreach.support.files.formats import Formats
 
 
 OUTPUT = Group("Output options", sort_key=3)
-
 OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
 """The one name of the file or folder that a command writes."""
 
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
 _STORED = "on a stored cloud: give the design instead"
 
+
+def _output(help: str, name: str | None = None) -> Parameter:
+    return Parameter(name=name, group=OUTPUT, help=help)
+
+
 Design = Annotated[
     str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
 ]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
-Activation = Annotated[
-    str | None,
-    Parameter(
-        help="Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5",
-        allow_leading_hyphen=True,
-    ),
-]
-AsJson = Annotated[
-    bool, Parameter(name="--json", group=OUTPUT, help="Print JSON; null where there is no number.")
-]
-Unit = Annotated[
-    str | None,
-    Parameter(
-        name="--unit",
-        group=OUTPUT,
-        help="Unit of lengths: m, cm, mm, or L, the arm's length. If left out, that of the design "
-        "file; else mm for arms below 1 m, m for others, and m for meshes and tables.",
-    ),
-]
-Durable = Annotated[
-    bool,
-    Parameter(group=OUTPUT, help="Flush to disk before exiting."),
-]
-Overwrite = Annotated[bool, Parameter(group=OUTPUT, help="Overwrite existing output.")]
+_ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
+Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]
+AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "--json")]
+_UNIT = "Unit of lengths: m, cm, mm or L; that of the design file, or a handy one, if left out."
+Unit = Annotated[str | None, _output(_UNIT)]
+Durable = Annotated[bool, _output("Flush to disk before exiting.")]
+Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
-View = Annotated[
-    str | None,
-    Parameter(group=OUTPUT, help="View of the picture: oblique (if left out), front, side, top."),
-]
+View = Annotated[str | None, _output("View: oblique (if left out), front, side, top.")]
 
 
 @Parameter(name="*")
@@ -91,11 +80,7 @@ class Sampling:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Arguments of `compute_cloud` and `build_atlas`.
-
-        Raises:
-            InvalidInput: A seed for a sampler without chance.
-        """
+        """Arguments of `compute_cloud` and `build_atlas`."""
         if self.sampler == "grid":
             refuse("on the sampler grid, which is not random", seed=self.seed)
         return {"n": self.count, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
@@ -122,21 +107,26 @@ def cloud_of(
     changes: Changes,
     unit: str | None,
     check: Callable[[int], None] | None = None,
-) -> tuple[xr.Dataset, Lengths]:
-    """The stored cloud, or one of the design once its number of samples is checked; its lengths."""
+) -> tuple[xr.Dataset, Manipulator]:
+    """The stored cloud, or one of the design once its number of samples is checked; its design."""
     from softreach.cloud.clouds import compute_cloud, design_of, open_cloud
 
-    check_unit(unit)
+    if unit is not None:
+        as_unit(unit, 1.0)  # before anything is computed
     if is_stored(source):
-        refuse(_STORED, **changes.given)
-        refuse(_STORED, **vars(sampling))
+        refuse(_STORED, **changes.given, **vars(sampling))
         cloud = open_cloud(source)
-        say_limits(arm := design_of(cloud))
-        return cloud, Lengths.of(arm, unit)
+        say_limits(arm := shown_in(unit, design_of(cloud)))
+        return cloud, arm
     if check is not None:
         check(sampling.count)
-    arm = design_from(source, changes)
-    return compute_cloud(arm, **sampling.arguments), Lengths.of(arm, unit)
+    arm = design_from(source, changes, unit)
+    return compute_cloud(arm, **sampling.arguments), arm
+
+
+def written_unit(arm: Manipulator) -> LengthUnit:
+    """Unit of tables and meshes, which other programs take to be in m unless one was chosen."""
+    return METER if arm.display_unit is None else arm.length_unit
 
 
 def activation_of(text: str | None, arm: Manipulator) -> list[float]:
@@ -175,35 +165,27 @@ def radius_of(text: str, length: float) -> float | str:
     """An alpha radius in m from `0.05L`, `5cm`, `0.05` (m) or `critical`."""
     if text == "critical":
         return text
-    try:
-        radius = read_length(text, length)
-    except ValueError:
-        radius = 0.0
-    if not 0.0 < radius < math.inf:
-        allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
-        raise InvalidInput("alpha", text or "''", allowed)
-    return radius
+    allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
+    return read_positive("alpha", text, lambda text: read_length(text, length), allowed)
 
 
 def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
-    """Refuse a file that could not be written in the end, before anything is computed.
+    """Refuse a file that could not be written in the end, before anything is computed."""
+    check_outputs([] if path is None else [path], formats, overwrite)
 
-    Args:
-        path: Where it goes, if it is asked for.
-        formats: What can be written there, by suffix.
-        overwrite: Whether it may replace what is there.
 
-    Raises:
-        InvalidInput: Another suffix, something is there, or there is nothing to overwrite.
-        MissingExtra: A library that writes it is not installed.
-        NotWritten: Nothing can be written there.
-    """
+def check_outputs(
+    paths: list[Path], formats: Formats, overwrite: bool, *libraries: tuple[str, str]
+) -> None:
+    """As `check_output`, of several files; all libraries that are missing are named at once."""
     from softreach.support.files.atomic import check_place
-    from softreach.support.files.formats import format_of
 
-    if path is None:
+    if not paths:
         refuse("without --out", overwrite=overwrite)
-    else:
+    known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
+    needed = [(name, each.extra) for each in known for name in each.libraries]
+    check_installed(*needed, *libraries)
+    for path in paths:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")
 
@@ -213,7 +195,6 @@ def check_picture(
 ) -> None:
     """Refuse a view, and a place for a picture or for a page that turns, as `check_output`."""
     from softreach.picture.projection import view_angles
-    from softreach.support.files.formats import PAGES, PICTURES
 
     if path is None:
         refuse("without --out", view=view)
@@ -224,25 +205,13 @@ def check_picture(
 
 def is_page(path: Path) -> bool:
     """True if a figure is asked for that turns in a browser."""
-    from softreach.support.files.formats import PAGES
-
     return path.suffix.lower() in PAGES
 
 
-def write_page(
-    data: list[Any], path: Path, lengths: Lengths, *, overwrite: bool, **look: Any
-) -> None:
-    """Write what is given as a figure that turns in a browser, and say what part it shows."""
-    from softreach.plot import plot_3d, save_figure
+def save_picture(figure: Any, path: Path, overwrite: bool) -> None:
+    """Write a figure, and say what part of the data a page that turns shows."""
+    from softreach.plot import save_figure
 
-    figure = plot_3d(data, unit=lengths.unit, **look)
     save_figure(figure, path, overwrite=overwrite)
-    if figure.note:
-        console.note(f"{path}: {figure.note}")
-
-
-def check_surface(path: Path | None, overwrite: bool) -> None:
-    """Refuse a place for a surface, as `check_output`."""
-    from softreach.export.surfaces import SURFACE_FILES
-
-    check_output(path, SURFACE_FILES, overwrite)
+    if note := getattr(figure, "note", ""):
+        console.note(f"{path}: {note}")

@@ -1,4 +1,4 @@
-"""`softreach reach`: the exact reachable set of a design."""
+"""`softreach reach`, `payload` and `gradient`: the exact reachable set, and what changes it."""
 
 from __future__ import annotations
 
@@ -7,41 +7,30 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli import options
+from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
-from softreach.cli.lengths import Lengths, Rows
-from softreach.cli.options import (
-    OUT,
-    OUTPUT,
-    AsJson,
-    Design,
-    Overwrite,
-    Unit,
-    check_output,
-    is_page,
-    refuse,
-    write_page,
-)
-from softreach.cli.values import Number
-from softreach.support.errors import InvalidInput
+from softreach.cli.values import ERROR, Number, Rows, as_read, rows_of
+from softreach.support.errors import NotPossible
+from softreach.support.files.formats import PAGES, PICTURES
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
-    from softreach.workspace import ReachableSet, ReachableSolid
+    from softreach.workspace import ReachableSet
 
 
 def reach(
-    design: Design,
+    design: options.Design,
     /,
     *,
     accuracy: Number = 3e-3,
     changes: Changes = UNCHANGED,
-    out: Annotated[list[Path] | None, OUT] = None,
-    at: Annotated[str | None, Parameter(group=OUTPUT, allow_leading_hyphen=True)] = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: Annotated[list[Path] | None, options.OUT] = None,
+    at: Annotated[str | None, Parameter(group=options.OUTPUT, allow_leading_hyphen=True)] = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> None:
     """Compute the exact reachable set: volume, multiplicity, folds.
 
@@ -56,125 +45,134 @@ def reach(
             the set as a web page that turns (.html). May be repeated.
         at: Point x,y,z that the slices meet at: the middle of the set if left out.
     """
+    from softreach.export.surfaces import SURFACE_FILES
     from softreach.inverse.request import position_in
     from softreach.support import progress
     from softreach.workspace import reachable_set
 
-    arm = design_from(design, changes)
-    lengths = Lengths.of(arm, unit)
-    outs = sorted(out or [], key=_is_picture)  # pictures come last
-    _check_outputs(arm, outs, overwrite)
-    if not any(map(_is_picture, outs)):
-        refuse("without a picture: add --out slices.png", at=at)
+    arm = design_from(design, changes, unit)
+    outs = sorted(out or [], key=_is_drawn)  # pictures come last
+    meshed = [("skimage", "surface")] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
+    options.check_outputs(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite, *meshed)
+    if not any(map(_is_drawn, outs)):
+        options.refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
-    rows = load_rows(arm) | _rows(reached)
-    if reached.lost_share > 0.0:
-        rows["activations without a posture"] = (100.0 * reached.lost_share, "%")
-    if reached.hysteresis_share > 0.0:
-        rows["activations with two postures (hysteresis)"] = (100 * reached.hysteresis_share, "%")
-    console.rows(f"reachable set of {design}", rows, json, lengths)
+    rows = load_rows(arm) | rows_of(reached.to_dataset())
+    console.rows(f"reachable set of {design}", rows, json, arm)
     for path in outs:
-        _write(reached, path, point, lengths, overwrite)
+        _write(reached, arm, path, point, overwrite)
 
 
-def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
-    """Refuse files that cannot be written, or that a set of so few dimensions does not have."""
-    if not outs:
-        check_output(None, {}, overwrite)
-        return
-    from softreach.export.surfaces import SURFACE_FILES
-    from softreach.support.files.formats import PAGES, PICTURES, check_installed
-
-    formats = {**SURFACE_FILES, **PICTURES, **PAGES}
-    suffixes = [path.suffix.lower() for path in outs]
-    known = [formats[suffix] for suffix in suffixes if suffix in formats]
-    needed = [(library, each.extra) for each in known for library in each.libraries]
-    has_surface = any(suffix in SURFACE_FILES for suffix in suffixes)
-    check_installed(*needed, *[("skimage", "surface")] * has_surface)
-    free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
-    for path in outs:
-        check_output(path, formats, overwrite)
-        if not is_page(path) and free < (3 if _is_picture(path) else 2):
-            raise _no_such_output(path)
-
-
-def _is_picture(path: Path) -> bool:
-    from softreach.support.files.formats import PICTURES
-
+def _is_drawn(path: Path) -> bool:
     return path.suffix.lower() in PICTURES
 
 
-def _no_such_output(path: Path) -> InvalidInput:
-    return InvalidInput("out", path, "left out for a design with so few free bundles")
-
-
 def _write(
-    reached: ReachableSet, path: Path, point: list[float] | None, lengths: Lengths, overwrite: bool
+    reached: ReachableSet, arm: Manipulator, path: Path, at: list[float] | None, overwrite: bool
 ) -> None:
+    from softreach.export import export_mesh
+    from softreach.plot import plot_3d, plot_slices
     from softreach.workspace import ReachableSolid, ReachableSurface
 
-    if is_page(path):
-        write_page([reached, reached.arm], path, lengths, overwrite=overwrite)
-    elif _is_picture(path):
-        from softreach.plot import plot_slices, save_figure
-
-        if not isinstance(reached, ReachableSolid):
-            raise _no_such_output(path)
-        figure = plot_slices(reached.grid, at=point, unit=lengths.unit)
-        save_figure(figure, path, overwrite=overwrite)
+    unit = arm.length_unit
+    if options.is_page(path):
+        options.save_picture(plot_3d([reached, arm], unit=unit), path, overwrite)
+    elif _is_drawn(path) and isinstance(reached, ReachableSolid):
+        options.save_picture(plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
+    elif not _is_drawn(path) and isinstance(reached, ReachableSolid | ReachableSurface):
+        export_mesh(reached.surface(), path, unit=options.written_unit(arm), overwrite=overwrite)
+        console.written(path, options.written_unit(arm))
     else:
-        from softreach.export import export_mesh
-
-        if not isinstance(reached, ReachableSolid | ReachableSurface):
-            raise _no_such_output(path)
-        export_mesh(reached.surface(), path, unit=lengths.written, overwrite=overwrite)
-        console.written(path, lengths)
+        raise NotPossible(f"{path} cannot be written for a design with so few free bundles")
 
 
-def _rows(reached: ReachableSet) -> Rows:
-    from softreach.workspace import (
-        ReachableCurve,
-        ReachablePoint,
-        ReachableRegion,
-        ReachableSolid,
-        ReachableSurface,
-    )
+def payload(
+    design: options.Design,
+    /,
+    *,
+    share: Number = 0.8,
+    payloads: str | None = None,
+    accuracy: Number = 0.01,
+    changes: Changes = UNCHANGED,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> None:
+    """Compute how much of its reach a payload costs an arm.
 
-    convex = _size("convex volume", reached.convex_volume, reached.convex_volume_error, "m³")
-    match reached:
-        case ReachableSolid():
-            size = _size("volume", reached.volume, reached.volume_error, "m³")
-            if (shell := reached.shell) is not None:
-                thin = _size("area (middle of the shell)", *shell.area, "m²")
-                size = thin | _size("thickness (mean)", *shell.thickness, "m") | size
-            return size | convex | _solid_rows(reached)
-        case ReachableRegion():
-            size = _size("area (in one plane)", reached.area, reached.area_error, "m²")
-            size |= _size("convex area", reached.convex_area, reached.convex_area_error, "m²")
-            share: Rows = {"unreachability": (reached.unreachability, "")}
-            return size | (share if reached.convex_area > 0.0 else {})
-        case ReachableSurface():
-            return _size("area", reached.area, reached.area_error, "m²") | convex
-        case ReachableCurve():
-            size = (reached.curve_length, reached.curve_length_error)
-            return _size("length", *size, "m") | convex
-        case ReachablePoint():
-            places = zip("xyz", reached.tip, strict=True)
-            return {axis: (float(place), "m") for axis, place in places}
-    raise AssertionError(reached)
+    The volumes under several payloads, which take the place of the design's own,
+    and the largest payload that keeps a share of the volume.
+
+    Example: softreach payload lce_arm --gravity up --share 0.8
+
+    Args:
+        share: Share to keep of the volume without a payload.
+        payloads: Masses at the tip, instead of the design's own payload: 2g,5g,10g
+        accuracy: Relative error allowed in each volume.
+        out: Draw the curve: .png .pdf .svg
+    """
+    from softreach.support import progress
+    from softreach.workspace.payload import payload_curve
+
+    arm = design_from(design, changes, unit)
+    options.check_picture(out, overwrite)
+    if arm.loads is None:
+        raise NotPossible("this design has no loads; add --gravity down")
+    masses = None if payloads is None else [read_mass("payloads", m) for m in payloads.split(",")]
+    with progress.bar("computing volumes", None) as step:
+        curve = payload_curve(arm, masses, accuracy=accuracy, progress=step)
+        largest = curve.largest_payload(share)
+    rows = rows_of(curve.to_dataset())
+    rows |= {
+        "share to keep": (share, ""),
+        "largest payload": (largest.payload, "kg"),
+        f"largest payload{ERROR}": (largest.payload_error, "kg"),
+    }
+    console.rows(f"payload of {design}", rows, json, arm)
+    if arm.loads.payload and not json:
+        console.line(f"  they take the place of the design's own payload, {arm.loads.payload:g} kg")
+    if out is not None:
+        from softreach.plot import plot_payload_curve
+
+        options.save_picture(plot_payload_curve(curve, largest=[largest]), out, overwrite)
 
 
-def _size(name: str, value: float, error: float, unit: str) -> Rows:
-    return {name: (value, unit), f"{name} error (estimate)": (error, unit)}
+def gradient(
+    design: options.Design,
+    parameters: list[str],
+    /,
+    *,
+    accuracy: Number = 3e-3,
+    changes: Changes = UNCHANGED,
+    json: options.AsJson = False,
+) -> None:
+    """Differentiate the reachable volume by design parameters.
 
+    Also its convex hull and its unreachability; everything in SI units.
 
-def _solid_rows(reached: ReachableSolid) -> Rows:
-    rows: Rows = {"unreachability": (reached.unreachability, ""), "route": (reached.route, "")}
-    for times, volume in reached.multiplicity.items():
-        if volume > 1e-7 * reached.volume:
-            rows[f"reached by {times} activation{'s' * (times > 1)}"] = (volume, "m³")
-    if reached.multiplicity:
-        rows["behind folds"] = (reached.fold_volume, "m³")
-    return rows
+    Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
+
+    Args:
+        parameters: Parameters, as softreach list parameters DESIGN names them.
+        accuracy: Relative error allowed in what is rasterized.
+    """
+    from softreach.support import progress
+    from softreach.workspace import volume_gradient
+
+    arm = design_from(design, changes)
+    with progress.bar("differentiating the volume", len(parameters)) as step:
+        derivatives = volume_gradient(arm, parameters, accuracy=accuracy, progress=step)
+    numbers = rows_of(derivatives.to_dataset())
+    rows: Rows = {"route": numbers.pop("route")}
+    for k, (parameter, unit) in enumerate(
+        zip(derivatives.parameters, derivatives.units, strict=True)
+    ):
+        for name, (values, symbol) in numbers.items():
+            label = f"{name.removesuffix(ERROR)} by {parameter}{ERROR * name.endswith(ERROR)}"
+            kind = as_read((), symbol.removesuffix(" per unit"))[1]
+            per = kind if unit == "1" else f"{kind or '1'}/{unit}"
+            rows[label] = (values[k], per)
+    console.rows(f"derivatives of what {design} reaches", rows, json)

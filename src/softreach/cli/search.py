@@ -1,4 +1,4 @@
-"""`softreach search`: the designs that meet requirements and are best."""
+"""`softreach check` and `search`: a design against what it is for, and designs that meet it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,82 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from softreach.cli.changes import Changes, design_from
-from softreach.cli.check import EXIT, finding_record
+from softreach.cli import options
+from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
 from softreach.cli.console import console
-from softreach.cli.lengths import Lengths
-from softreach.cli.options import OUT, AsJson, Overwrite, Unit
-from softreach.cli.values import Number, Whole, as_read, pairs_in
+from softreach.cli.values import Number, Whole, as_read, pairs_in, record
 
 if TYPE_CHECKING:
     from softreach.optimization import Candidate, Search
+    from softreach.requirements import Check, Finding
 
 _ASKED = Group("Override the file", sort_key=1)
+_EXIT = {"met": 0, "missed": 1, "undecided": 3}
+"""Verdict -> exit code; 2 is that of wrong input."""
+
+
+def check(
+    design: options.Design,
+    needs: Path,
+    /,
+    *,
+    accuracy: Number = 1e-2,
+    changes: Changes = UNCHANGED,
+    out: options.Out = None,
+    view: options.View = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> int:
+    """Check a design against requirements: met or missed, and by how much.
+
+    Places to reach, regions to stay in or to avoid, payloads, limits, measures;
+    for what is missed, how far, which bounds hold the arm back, and what it would
+    take. A margin that is smaller than its own error is undecided. The exit code
+    is 0 if all is met, 1 if something is missed, and 3 if something is undecided.
+
+    Example: softreach check arm.toml needs.toml --out check.png
+
+    Args:
+        needs: Requirements (.toml).
+        accuracy: Accuracy of coverages and volumes.
+        out: Draw the arm at the places (.png .pdf .svg).
+    """
+    from softreach.requirements import Requirements
+    from softreach.requirements import check as checked
+    from softreach.support import progress
+
+    arm = design_from(design, changes, unit)
+    options.check_picture(out, overwrite, view=view)
+    requirements = Requirements.load(needs, length=arm.length)
+    with progress.bar("checking", None) as step:
+        result = checked(arm, requirements, accuracy=accuracy, progress=step)
+    if json:
+        console.json(_checked(result))
+    else:
+        console.line(result)
+    if out is not None:
+        from softreach.plot import plot_check
+
+        axes: Any = plot_check(result, view=view or "oblique", unit=arm.length_unit)
+        options.save_picture(axes.figure, out, overwrite)
+    return _EXIT[result.verdict]
+
+
+def _checked(result: Check) -> dict[str, Any]:
+    names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
+    return {
+        **record(
+            {name: getattr(result, name) for name in names}, result.arm.length, "places", "gaps"
+        ),
+        "findings": [_finding(finding) for finding in result.findings],
+        "payloads_kg": result.payloads,
+        "coverages": [coverage._asdict() for coverage in result.coverages],
+    }
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {**vars(finding), "met": finding.met}
 
 
 def search(
@@ -39,10 +104,10 @@ def search(
     sampler: Annotated[str | None, Parameter(group=_ASKED)] = None,
     polish: Annotated[bool | None, Parameter(negative="--no-polish", group=_ASKED)] = None,
     storage: Path | None = None,
-    out: Annotated[Path, OUT] = Path("best"),
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    out: Annotated[Path, options.OUT] = Path("best"),
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
 ) -> int:
     """Search the designs that meet requirements and are best.
 
@@ -75,42 +140,43 @@ def search(
     from softreach.requirements.requirements import LONGEST
     from softreach.support.files.text import read_text
 
-    options = {"designs": designs, "seed": seed, "accuracy": accuracy, "sampler": sampler}
-    given = {
+    asked_for = {
         "design": design,
         "maximize": None if maximize is None else maximize.split(","),
         "minimize": None if minimize is None else minimize.split(","),
-        "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2"),
-        "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4"),
+        "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2") or None,
+        "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4") or None,
         "polish": polish,
-        **options,
+        "designs": designs,
+        "seed": seed,
+        "accuracy": accuracy,
+        "sampler": sampler,
     }
-    given = {name: value for name, value in given.items() if value is not None}
+    given = {name: value for name, value in asked_for.items() if value is not None}
     text = read_text("requirements", needs, LONGEST)
     designs_from = partial(design_from, changes=Changes(point=point))
     asked = read_search(text, needs.parent, designs_from, source=str(needs), given=given)
     base = asked.base
-    first = next(iter(base.values())) if isinstance(base, Mapping) else base
-    lengths = Lengths.of(first, unit)
+    arm = shown_in(unit, next(iter(base.values())) if isinstance(base, Mapping) else base)
     check_folder(out, overwrite=overwrite)
     if storage is None:
         out.mkdir(parents=True, exist_ok=True)
         storage = out / "search.journal"
     result = _searched(asked, storage)
     if json:
-        console.json(_record(result, out))
+        console.json(_found(result, out))
     else:
-        console.line(result.report(lengths.unit.name))
-    result.save(out, unit=lengths.unit.name if lengths.chosen else None, overwrite=overwrite)
-    return EXIT[result.verdict]
+        console.line(result.report(arm.length_unit.name))
+    result.save(out, unit=arm.display_unit, overwrite=overwrite)
+    return _EXIT[result.verdict]
 
 
 def _searched(asked: Any, storage: Path) -> Search:
     from softreach import optimization
     from softreach.support import progress
 
-    watch = _Watch(asked.options)
-    with progress.bar(watch.label, watch.total) as step:
+    watch = _Watch()
+    with progress.bar(watch.label, asked.options.get("designs", 200)) as step:
         return optimization.search(
             asked.base,
             asked.free,
@@ -124,48 +190,29 @@ def _searched(asked: Any, storage: Path) -> Search:
 
 
 class _Watch:
-    def __init__(self, options: Mapping[str, Any]) -> None:
-        self.total = options.get("designs", 200)
-        self._up, self._down = options["maximize"], options["minimize"]
-        self._best: Candidate | None = None
-        self._met = 0
+    """How far a search is, in a few words."""
+
+    def __init__(self) -> None:
+        self._met, self._excess = 0, math.inf
 
     def __call__(self, candidate: Candidate) -> None:
         self._met += candidate.is_feasible
-        if self._best is None or self._place(candidate) < self._place(self._best):
-            self._best = candidate
-
-    def _place(self, candidate: Candidate) -> tuple[float, float]:
-        if not candidate.is_feasible:
-            by_bounds = candidate.fidelity == "bounds"  # at least, so that it beats nothing
-            return (math.inf if by_bounds else candidate.excess or math.inf), 0.0
-        sign = -1.0 if self._up else 1.0
-        return 0.0, sign * candidate.objectives[0].value if candidate.objectives else 0.0
+        if candidate.fidelity != "bounds":  # whose excess is at least that, and may be more
+            self._excess = min(self._excess, candidate.excess or math.inf)
 
     def label(self) -> str:
-        """The best in a few words; with several objectives, how many designs meet all."""
-        best, names = self._best, [*self._up, *self._down]
-        if best is None or math.isinf(self._place(best)[0]):
-            return "searching"
-        if not best.is_feasible:
-            return f"searching, best misses {best.excess:.3g}"
-        if len(names) != 1:
+        if self._met:
             return f"searching, {self._met} meet all"
-        return f"searching, best {names[0]} {best.objectives[0].value:.5g}"
+        return "searching" + f", best misses {self._excess:.3g}" * math.isfinite(self._excess)
 
 
-def _record(result: Search, out: Path) -> dict[str, Any]:
+def _found(result: Search, out: Path) -> dict[str, Any]:
     """The result for machines: SI units, angles in degrees."""
+    names = ("met", "verdict", "restarts", "designs", "judged", "seconds", "at_ends")
     return {
-        "met": result.met,
-        "verdict": result.verdict,
-        "restarts": result.restarts,
-        "designs": result.designs,
-        "judged": result.judged,
-        "seconds": result.seconds,
+        **{name: getattr(result, name) for name in names},
         "front": [_design(result, each) for each in result.front],
-        "at_ends": result.at_ends,
-        "findings": [finding_record(finding) for finding in result.findings],
+        "findings": [_finding(finding) for finding in result.findings],
         "folder": str(out),
     }
 
@@ -174,10 +221,8 @@ def _design(result: Search, each: Candidate) -> dict[str, Any]:
     parameters = []
     for parameter in result.problem.parameters.free:
         value = each.values[parameter.name]
-        unit = ""
-        if not isinstance(value, str):
-            value, unit = as_read(value, parameter.unit)
-        parameters.append({"parameter": parameter.name, "value": value, "unit": unit})
+        read, unit = (value, "") if isinstance(value, str) else as_read(value, parameter.unit)
+        parameters.append({"parameter": parameter.name, "value": read, "unit": unit})
     objectives = [
         {"objective": goal.name, **value._asdict(), "unit": goal.objective.unit}
         for goal, value in zip(result.goals, each.objectives, strict=bool(each.objectives))

@@ -10,9 +10,9 @@ from cyclopts import Parameter
 from softreach.cli.atlas import grid_of
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
-from softreach.cli.lengths import check_unit
 from softreach.cli.options import OUTPUT, Overwrite, Unit, refuse
 from softreach.cli.values import Whole
+from softreach.support.units import as_unit
 
 if TYPE_CHECKING:
     from softreach.studio import Start
@@ -64,8 +64,7 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.serve.guard import new_token
-    from softreach.studio.serve.server import check_address, is_local
+    from softreach.studio.serve import check_address, is_local, new_token
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
@@ -92,7 +91,7 @@ def _write_static(
     from softreach.support import progress
     from softreach.support.errors import counted
 
-    check_unit(unit)
+    as_unit(unit or "m", 1.0)
     space = grid_of(design_from(source), vary or [])
     with progress.bar("computing designs", space.size) as step:
         title = Path(source).stem
@@ -101,10 +100,7 @@ def _write_static(
         )
     gaps = f", {counted(written.gaps, 'gap')}" if written.gaps else ""
     console.line(str(written.page))
-    console.line(
-        f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB; "
-        f"{written.computed} computed now"
-    )
+    console.line(f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB")
 
 
 def _warning(*, with_token: bool) -> str:

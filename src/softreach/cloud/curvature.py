@@ -195,8 +195,8 @@ def _exact(table: Tables, box: ActivationBox) -> tuple[Array, Array, Array]:
     most, torsion = _most_bending(table.curvature[:, :2], bounds), table.curvature[:, 2]
     bending, torsion = np.stack([np.zeros_like(most), most], axis=1), ends_over(torsion, bounds)
     extension = 1.0 + ends_over(table.extension, bounds)
-    if table.growth is not table.extension:  # η/ζ = 1 - (ζ - η)/ζ
-        forces = ends_over(table.extension - table.growth, bounds)
+    if table.has_forces:  # η/ζ = 1 - (ζ - η)/ζ
+        forces = ends_over(table.extension - table.rest_length_factor, bounds)
         ratio = 1.0 - _products(forces, 1.0 / extension)
         bending, torsion = bending * ratio[:, :1], _products(torsion, ratio)
     return bending, torsion, extension

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from io import BufferedWriter
 from itertools import chain, count
 from os import PathLike
@@ -16,7 +17,7 @@ from softreach.export.formats import (
     format_file,
     load_library,
     write_by_suffix,
-    write_ply_points,
+    write_ply,
     write_vtu,
 )
 from softreach.schema import a_cloud, activation_units
@@ -53,24 +54,19 @@ class CloudTable(NamedTuple):
     """Design (TOML), seed, tolerance, versions and units."""
     unit: LengthUnit
 
-    @property
-    def gammas(self) -> list[str]:
-        """Names of the activation columns."""
-        return column_names(self.bundles)
-
-    def columns(self, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+    def columns(self, rows: slice = slice(None), suffix: str = "") -> dict[str, NDArray[Any]]:
         """Contiguous columns by name: x, y, z, the activations, and the status if there is one."""
         arrays = [*self.tip[rows].T, *self.activation[rows].T]
-        names = ["x", "y", "z", *self.gammas]
+        names = [*(f"{axis}{suffix}" for axis in "xyz"), *column_names(self.bundles)]
         if self.status is not None:
             arrays.append(self.status[rows])
             names.append("status")
         return {name: np.ascontiguousarray(a) for name, a in zip(names, arrays, strict=True)}
 
-    def blocks(self) -> Iterator[dict[str, NDArray[Any]]]:
-        """The columns, a bounded number of rows at a time."""
+    def blocks(self) -> Iterator[slice]:
+        """Rows, a bounded number at a time."""
         for start in range(0, len(self.tip), _BLOCK) or [0]:
-            yield self.columns(slice(start, start + _BLOCK))
+            yield slice(start, start + _BLOCK)
 
 
 def cloud_table(cloud: xr.Dataset) -> pd.DataFrame:
@@ -194,54 +190,42 @@ def _length(cloud: xr.Dataset) -> float | None:
 
 
 def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
-    colors = activation_colors(table.activation)
-
-    def blocks():
-        start = 0
-        for block in table.blocks():
-            stop = start + len(block["x"])
-            rgb = dict(zip(("red", "green", "blue"), colors[start:stop].T, strict=True))
-            yield {**block, **rgb}
-            start = stop
-
-    write_ply_points(file, len(table.tip), blocks(), table.metadata)
+    colors, names = activation_colors(table.activation), ("red", "green", "blue")
+    columns = (
+        table.columns(rows) | dict(zip(names, colors[rows].T, strict=True))
+        for rows in table.blocks()
+    )
+    write_ply(file, len(table.tip), columns, table.metadata)
 
 
 def _write_csv(table: CloudTable, file: BufferedWriter) -> None:
-    pa, csv = load_library("pyarrow"), load_library("pyarrow.csv")
+    writer = load_library("pyarrow.csv").CSVWriter
     suffix = {"m": "", "L": "_over_length"}.get(table.unit.name, f"_{table.unit.name}")
-    names = {name: f"{name}{suffix}" for name in "xyz"}
-    fields = [(name, pa.float64()) for name in (*names.values(), *table.gammas)]
-    if table.status is not None:
-        fields.append(("status", pa.uint8()))
-    schema = pa.schema(fields)
-    with csv.CSVWriter(file, schema) as writer:
-        for block in table.blocks():
-            named = {names.get(name, name): values for name, values in block.items()}
-            writer.write_batch(pa.record_batch(named, schema=schema))
+    _write_batches(partial(writer, file), table, suffix)
 
 
 def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
-    pa, parquet = load_library("pyarrow"), load_library("pyarrow.parquet")
-    fields = [pa.field(name, pa.float64(), metadata={"units": table.unit.name}) for name in "xyz"]
-    fields += [
-        pa.field(name, pa.float64(), metadata={"units": unit})
-        for name, unit in zip(table.gammas, table.units, strict=True)
+    writer = load_library("pyarrow.parquet").ParquetWriter
+    _write_batches(partial(writer, file, compression="zstd"), table)
+
+
+def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str = "") -> None:
+    pa, units = load_library("pyarrow"), [table.unit.name] * 3 + [*table.units, "1"]
+    kinds = zip(table.columns(slice(0), suffix).items(), units, strict=False)
+    fields = [
+        pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"units": unit})
+        for (name, values), unit in kinds
     ]
-    if table.status is not None:
-        fields.append(pa.field("status", pa.uint8(), metadata={"units": "1"}))
     schema = pa.schema(fields, metadata={key: str(v) for key, v in table.metadata.items()})
-    with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
-        for block in table.blocks():
-            writer.write_batch(pa.record_batch(block, schema=schema))
+    with writer_of(schema=schema) as writer:
+        for rows in table.blocks():
+            writer.write_batch(pa.record_batch(table.columns(rows, suffix), schema=schema))
 
 
 def _write_npz(table: CloudTable, file: BufferedWriter) -> None:
     described = {key: np.array(value) for key, value in table.metadata.items()}
-    arrays = {"tip": table.tip, "activation": table.activation, "bundle": np.array(table.bundles)}
-    if table.status is not None:
-        arrays["status"] = table.status
-    np.savez(file, **{**described, **arrays})
+    arrays: dict[str, Any] = {**described, **_arrays(table), "bundle": np.array(table.bundles)}
+    np.savez(file, **arrays)
 
 
 def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
@@ -250,26 +234,21 @@ def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
     size = max(table.tip.nbytes, table.activation.nbytes)
     if size >= _MAT_LIMIT:
         raise InvalidInput("cloud", f"{size} bytes", "below 2 GiB for MAT", "use .parquet or .npz")
+    bundle = np.array(table.bundles, dtype=object)
+    content = {**_arrays(table), "bundle": bundle, "metadata": table.metadata}
+    savemat(file, content, oned_as="row")
+
+
+def _arrays(table: CloudTable) -> dict[str, NDArray[Any]]:
     status = {} if table.status is None else {"status": table.status}
-    savemat(
-        file,
-        {
-            **status,
-            "tip": table.tip,
-            "activation": table.activation,
-            "bundle": np.array(table.bundles, dtype=object),
-            "metadata": table.metadata,
-        },
-        oned_as="row",
-    )
+    return {"tip": table.tip, "activation": table.activation, **status}
 
 
-def _point_mesh(table: CloudTable) -> Any:
-    meshio = load_library("meshio")
-    columns = table.columns()
-    data = {name: values for name, values in columns.items() if name not in ("x", "y", "z")}
+def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
+    data = {name: values for name, values in table.columns().items() if name not in "xyz"}
     cells = [("vertex", np.arange(len(table.tip))[:, None])]
-    return meshio.Mesh(table.tip, cells, point_data=data)
+    # compressed it takes five times as long for a file two thirds as large
+    write_vtu(file, table.tip, cells, compression=None, point_data=data)
 
 
 CLOUD_FILES: Formats = {
@@ -278,12 +257,6 @@ CLOUD_FILES: Formats = {
     ".parquet": format_file(_write_parquet, "pyarrow"),
     ".npz": format_file(_write_npz),
     ".mat": format_file(_write_mat),
-    # compressed it takes five times as long for a file two thirds as large
-    ".vtu": format_file(
-        lambda table, file: write_vtu(
-            _point_mesh(table), file, compression=None, header_type="UInt64"
-        ),
-        "meshio",
-    ),
+    ".vtu": format_file(_write_vtu, "meshio"),
 }
 """Formats of clouds."""

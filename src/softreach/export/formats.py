@@ -47,53 +47,43 @@ def write_by_suffix(
         write(content, file)
 
 
-def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:
-    """Write a mesh of meshio, which for this format opens what it is given itself."""
-    load_library("meshio").vtu.write(os.fspath(file.name), mesh, **options)
+def write_vtu(
+    file: BufferedWriter, points: Any, cells: Any, *, compression: str | None = "zlib", **data: Any
+) -> None:
+    """Write a mesh as meshio has it, which for this format opens what it is given itself."""
+    meshio = load_library("meshio")
+    options = {"compression": compression, "header_type": "UInt64"}
+    meshio.vtu.write(os.fspath(file.name), meshio.Mesh(points, cells, **data), **options)
 
 
-def write_ply_points(
+def write_ply(
     file: BinaryIO,
     count: int,
     blocks: Iterable[Mapping[str, NDArray[np.generic]]],
     description: Mapping[str, object],
+    faces: NDArray[np.integer] | None = None,
 ) -> None:
-    """Write a binary PLY of blocks of equally named columns as one `vertex` element.
+    """Write points or triangles as a binary PLY (Turk's polygon format, version 1.0).
 
     Args:
         file: Where to.
-        count: Rows of all blocks together.
-        blocks: Columns of float64, float32 or uint8, by name.
+        count: Points of all blocks together.
+        blocks: Points as equally named columns of float64, float32 or uint8, in order.
         description: Goes into the header, one comment per line of text.
+        faces: Corners of triangles, shape (f, 3); None for points alone.
     """
-    for number, block in enumerate(blocks):
-        rows = _ply_rows(block)
+    for number, columns in enumerate(blocks):
+        fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+        rows = np.zeros(len(next(iter(columns.values()))), fields)
+        for name, values in columns.items():
+            rows[name] = values
         if number == 0:
-            file.write(_ply_header(count, rows.dtype, description))
+            file.write(_ply_header(count, rows.dtype, description, faces))
         file.write(rows.data)
-
-
-def write_ply_mesh(
-    file: BinaryIO,
-    vertices: Mapping[str, NDArray[np.generic]],
-    faces: NDArray[np.integer],
-    description: Mapping[str, object],
-) -> None:
-    """Write triangles as a binary PLY (Turk's polygon format, version 1.0).
-
-    Args:
-        file: Where to.
-        vertices: Columns of float64, float32 or uint8, by name.
-        faces: Corners, shape (f, 3).
-        description: As for `write_ply_points`.
-    """
-    rows = _ply_rows(vertices)
-    triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
-    triangles["count"], triangles["corners"] = 3, faces
-    element = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-    file.write(_ply_header(len(rows), rows.dtype, description, element))
-    file.write(rows.data)
-    file.write(triangles.data)
+    if faces is not None:
+        triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
+        triangles["count"], triangles["corners"] = 3, faces
+        file.write(triangles.data)
 
 
 def load_library(module: str) -> Any:
@@ -111,24 +101,20 @@ def load_library(module: str) -> Any:
         raise MissingExtra((library, "export")) from error
 
 
-def _ply_rows(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:
-    fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
-    rows = np.zeros(len(next(iter(columns.values()))), fields)
-    for name, values in columns.items():
-        rows[name] = values
-    return rows
-
-
 def _ply_header(
-    count: int, fields: np.dtype[np.void], description: Mapping[str, object], further: str = ""
+    count: int,
+    fields: np.dtype[np.void],
+    description: Mapping[str, object],
+    faces: NDArray[np.integer] | None,
 ) -> bytes:
     lines = ["ply", "format binary_little_endian 1.0"]
     for key, value in description.items():
         lines += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
     lines.append(f"element vertex {count}")
-    for name in fields.names or ():
-        lines.append(f"property {_TYPES[fields[name].str[1:]]} {name}")
-    return "\n".join([*lines, f"{further}end_header", ""]).encode("ascii")
+    lines += [f"property {_TYPES[fields[name].str[1:]]} {name}" for name in fields.names or ()]
+    if faces is not None:
+        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    return "\n".join([*lines, "end_header", ""]).encode("ascii")
 
 
 def _ascii(text: str) -> str:

@@ -16,10 +16,11 @@ from softreach.export.formats import (
     format_file,
     load_library,
     write_by_suffix,
-    write_ply_mesh,
+    write_ply,
     write_vtu,
 )
 from softreach.geometry.surface import SurfaceMesh, parted
+from softreach.geometry.tube import joined
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points
@@ -164,18 +165,17 @@ def export_arm(
 
 
 def _write_ply(scene: Scene, file: BufferedWriter) -> None:
-    parts = scene.parts
-    vertices, faces = _joined(parts)
-    colors = np.concatenate([np.tile(_rgba(part), (len(part.vertices), 1)) for part in parts])
-    columns = dict(zip("xyz", vertices.T, strict=True))
+    surface = joined(scene.parts)
+    colors = np.concatenate([_colors(part) for part in scene.parts])
+    columns = dict(zip("xyz", surface.vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    write_ply_mesh(file, columns, faces, {"units": scene.unit.name})
+    units = {"units": scene.unit.name}
+    write_ply(file, len(surface.vertices), [columns], units, surface.faces)
 
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
-    trimesh = load_library("trimesh")
-    parts = [_colored(part) for part in scene.parts]
-    binary = trimesh.util.concatenate(parts).export(file_type="stl")
+    meshes = [_colored(part) for part in scene.parts]
+    binary = load_library("trimesh").util.concatenate(meshes).export(file_type="stl")
     file.write(_said_unit(scene).encode().ljust(80) + binary[80:])
 
 
@@ -193,58 +193,42 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     # as a node and not in the numbers, so that a reader gets back the vertices we have
     meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
     for part in scene.parts:
+        visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(
+                name=part.name,
+                baseColorFactor=[*part.color, part.opacity],
+                alphaMode="BLEND" if part.opacity < 1 else None,
+                metallicFactor=0.0,
+                roughnessFactor=0.6,
+                doubleSided=True,
+            )
+        )
+        mesh = trimesh.Trimesh(part.vertices, part.faces, visual=visual, process=False)
         names = {"node_name": part.name, "geom_name": part.name}
-        meshes.add_geometry(_shiny(part), parent_node_name="z_up", **names)
+        meshes.add_geometry(mesh, parent_node_name="z_up", **names)
     file.write(meshes.export(file_type="glb"))
+
+
+def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
+    surface = joined(scene.parts)
+    number = np.repeat(np.arange(len(scene.parts)), [len(part.faces) for part in scene.parts])
+    cells = [("triangle", surface.faces)]
+    write_vtu(file, surface.vertices, cells, cell_data={"part": [number]})
 
 
 def _said_unit(scene: Scene) -> str:
     return f"softreach, lengths in {scene.unit.name}"
 
 
-def _mesh(parts: Sequence[Part]) -> Any:
-    meshio = load_library("meshio")
-    vertices, faces = _joined(parts)
-    number = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-    return meshio.Mesh(vertices, [("triangle", faces)], cell_data={"part": [number]})
-
-
-def _joined(parts: Sequence[Part]) -> tuple[Array, Faces]:
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-    return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
-
-
 def _colored(part: Part) -> Any:
-    trimesh = load_library("trimesh")
-    colors = np.tile(_rgba(part), (len(part.vertices), 1))
-    return trimesh.Trimesh(
-        part.vertices,
-        part.faces,
-        vertex_colors=colors,
-        metadata={"name": part.name},
-        process=False,
-    )
+    look = {"vertex_colors": _colors(part), "metadata": {"name": part.name}, "process": False}
+    return load_library("trimesh").Trimesh(part.vertices, part.faces, **look)
 
 
-def _rgba(part: Part) -> NDArray[np.uint8]:
-    return np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
-
-
-def _shiny(part: Part) -> Any:
-    trimesh = load_library("trimesh")
-    visual = load_library("trimesh.visual")
-    material = visual.material.PBRMaterial(
-        name=part.name,
-        baseColorFactor=[*part.color, part.opacity],
-        alphaMode="BLEND" if part.opacity < 1 else None,
-        metallicFactor=0.0,
-        roughnessFactor=0.6,
-        doubleSided=True,
-    )
-    return trimesh.Trimesh(
-        part.vertices, part.faces, visual=visual.TextureVisuals(material=material), process=False
-    )
+def _colors(part: Part) -> NDArray[np.uint8]:
+    """RGBA of each vertex."""
+    color = np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
+    return np.tile(color, (len(part.vertices), 1))
 
 
 SURFACE_FILES: Formats = {
@@ -252,6 +236,6 @@ SURFACE_FILES: Formats = {
     ".stl": format_file(_write_stl, "trimesh"),
     ".obj": format_file(_write_obj, "trimesh"),
     ".glb": format_file(_write_glb, "trimesh"),
-    ".vtu": format_file(lambda scene, file: write_vtu(_mesh(scene.parts), file), "meshio"),
+    ".vtu": format_file(_write_vtu, "meshio"),
 }
 """Formats of surfaces and arms."""

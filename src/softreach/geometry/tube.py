@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,8 +87,8 @@ def grid_faces(stations: int, across: int) -> Faces:
     return _halves(_grid(np.arange(stations * across).reshape(stations, across)))
 
 
-def joined(parts: Sequence[Surface]) -> Surface:
-    """Several surfaces as one; none is a surface without vertices."""
+def joined(parts: Sequence[Any]) -> Surface:
+    """Several surfaces, each with vertices and faces, as one; none is one without vertices."""
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])

@@ -13,8 +13,8 @@
 5. Damped Newton with the exact Jacobian leads from each start to a root
    (`kernels.branches.newton`).
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
-   opposite, along the null direction of the Jacobian (`kernels.branches.folds`), and is searched as
-   well.
+   opposite, along the null direction of the Jacobian (`newton.second_preimages`), and is searched
+   as well.
 7. Roots between which the tip hardly leaves the target are one.
 8. A root beyond a bound is one on the bound if the tip misses no more there than the error of the
    map leaves open.
@@ -43,7 +43,7 @@ from softreach.inverse.roots import (
     roots_at,
     smallest_singular_values,
 )
-from softreach.kernels.branches import candidates, folds, newton
+from softreach.kernels.branches import candidates, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.rod.tip_map import TipMap
@@ -263,7 +263,7 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
         start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
         known = roots.cell, roots.gamma, roots.slope, smallest_singular_values(roots.slope)
         bounds = box.low - margin, box.high + margin
-        folds.second_preimages(
+        newton.second_preimages(
             prepared.mesh, *known, _PARTNER_RANGE, overshoot, *bounds, start, near
         )
         roots, unknown = rows(roots, near), np.zeros((int(near.sum()), 3, 3))

@@ -11,8 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from softreach.kernels.box.box_projection import project
-from softreach.kernels.box.cell_cover import near_cells
+from softreach.kernels.box.box_projection import near_cells, project
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index

@@ -1,8 +1,7 @@
 """From requirements to designs: free parameters, objectives, search, tolerance."""
 
 from softreach.optimization.deviations import Spread
-from softreach.optimization.objectives import OBJECTIVES, Objective, Value
-from softreach.optimization.problem import Candidate
+from softreach.optimization.problem import OBJECTIVES, Candidate, Objective, Value
 from softreach.optimization.result import Search
 from softreach.optimization.searching import search
 from softreach.optimization.sensitivity import Multiplier, Sensitivity, VarianceShares, sensitivity

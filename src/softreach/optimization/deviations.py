@@ -45,11 +45,6 @@ class Deviations:
         """Names of the parameters."""
         return tuple(parameter.name for parameter in self.parameters)
 
-    def draws(self, count: int, seed: int) -> Array:
-        """Changes of the parameters [their units], shape (count, parameters)."""
-        normal = np.random.default_rng(seed).standard_normal((count, len(self.sigmas)))
-        return normal * self.sigmas
-
     def made(self, change: Array) -> Manipulator:
         """The arm with changes of its parameters; parts that share one change alike.
 
@@ -66,11 +61,7 @@ class Deviations:
 
 
 def deviations_of(arm: Manipulator, sigmas: Mapping[str, Any]) -> Deviations:
-    """Deviations from what a user gives.
-
-    Args:
-        arm: The design.
-        sigmas: Parameter -> standard deviation in its SI unit.
+    """Deviations of a design from standard deviations [SI units] by parameter.
 
     Raises:
         InvalidInput: None, an unknown parameter or one without a single value, or no σ >= 0.
@@ -132,12 +123,7 @@ class Spread:
         return all(x <= _AGREEMENT * error + rounding for x, error in zip(off, errors, strict=True))
 
     def with_made(self, values: Array, error: float = 0.0) -> Self:
-        """The same with values of arms that were made, NaN for those without one.
-
-        Args:
-            values: Of each arm.
-            error: Error that all values share.
-        """
+        """The same with values of arms that were made, NaN without one, which share an error."""
         values = values[np.isfinite(values)]
         count = len(values)
         if count < 2:
@@ -191,8 +177,10 @@ class FirstOrder:
     def __init__(
         self, deviations: Deviations, needs: Requirements, accuracy: float, changes: Array
     ) -> None:
-        self.deviations, self.needs, self.accuracy = deviations, needs, accuracy
-        self.changes = changes
+        self.deviations, self.needs = deviations, needs
+        self.accuracy, self.changes = accuracy, changes
+        self.targets = [target for target in needs.targets if target.places is not None]
+        self.regions = [target for target in needs.targets if target.region is not None]
         self.gradient = volume_gradient(deviations.arm, deviations.names, accuracy=accuracy)
         self.solid = self.gradient.solid
         self.boundary = MovingBoundary.of(self.solid, deviations.parameters)
@@ -211,12 +199,8 @@ class FirstOrder:
             return None, None
         if not isinstance(solid, ReachableSolid):
             raise NotPossible(f"with {payload:g} kg at its tip the arm reaches no volume")
-        return solid, MovingBoundary.of(solid, deviations_of(arm, self.sigmas).parameters)
-
-    @property
-    def sigmas(self) -> dict[str, float]:
-        """Deviations by name."""
-        return dict(zip(self.deviations.names, self.deviations.sigmas.tolist(), strict=True))
+        known = find_parameters(arm, self.deviations.names)
+        return solid, MovingBoundary.of(solid, tuple(known.values()))
 
     def kept(self) -> Spread:
         """Share of the volume that is kept."""
@@ -224,15 +208,9 @@ class FirstOrder:
         shares = 1.0 - self.boundary.lost(self.changes) / volume
         # The triangles sweep what the gradient, which is more exact, says to be swept in all.
         off = np.linalg.norm((self.boundary.growth - self.gradient.volume) * sigmas)
-        return Spread(
-            name="reach kept",
-            unit="1",
-            nominal=1.0,
-            mean=1.0 - self.boundary.mean_lost(sigmas) / volume,
-            deviation=float(shares.std()),
-            quantile=float(max(0.0, np.quantile(shares, 0.05))),
-            error=float(off) / volume / math.sqrt(2.0 * math.pi),
-        )
+        mean = 1.0 - self.boundary.mean_lost(sigmas) / volume
+        error = float(off) / volume / math.sqrt(2.0 * math.pi)
+        return _spread_of("reach kept", shares, 1.0, mean, error)
 
     def costs(self) -> Array:
         """Share lost by each parameter alone."""
@@ -259,7 +237,10 @@ class FirstOrder:
         """Depth of places within reach [m], and how the boundary there moves, by payloads."""
         for solid, boundary in self.loaded:
             if solid is None or boundary is None:
-                yield np.full(len(places), -np.inf), np.zeros((len(places), len(self.sigmas)))
+                yield (
+                    np.full(len(places), -np.inf),
+                    np.zeros((len(places), len(self.deviations.sigmas))),
+                )
             else:
                 yield within - solid.distance(places), boundary.speed_at(places)
 
@@ -267,13 +248,11 @@ class FirstOrder:
         """Probability that each place is reached, under the worst payload."""
         assert target.places is not None
         sigmas, within = self.deviations.sigmas, max(target.within, TOL * self.solid.arm.length)
-        return np.min(
-            [
-                probabilities(depth, np.linalg.norm(speed * sigmas, axis=1))
-                for depth, speed in self.depths(target.places, within)
-            ],
-            axis=0,
+        each = (
+            probabilities(depth, np.linalg.norm(speed * sigmas, axis=1))
+            for depth, speed in self.depths(target.places, within)
         )
+        return np.min([*each], axis=0)
 
     def covered(self, target: Target) -> Spread:
         """Share of a region that is covered, under the worst payload."""
@@ -284,15 +263,14 @@ class FirstOrder:
             for block in parallel.blocks(len(shares), max(1, _BLOCK // len(places))):
                 held = (depth + self.changes[block] @ speed.T >= 0.0).mean(axis=1)
                 shares[block] = np.minimum(shares[block], held)
-        return Spread(
-            name=target.name,
-            unit="1",
-            nominal=nominal,
-            mean=float(shares.mean()),
-            deviation=float(shares.std()),
-            quantile=float(np.quantile(shares, 0.05)),
-            error=math.sqrt(max(nominal * (1.0 - nominal), 1.0 / len(places)) / len(places)),
-        )
+        error = math.sqrt(max(nominal * (1.0 - nominal), 1.0 / len(places)) / len(places))
+        return _spread_of(target.name, shares, nominal, float(shares.mean()), error)
+
+
+def _spread_of(name: str, shares: Array, nominal: float, mean: float, error: float) -> Spread:
+    low, deviation = max(0.0, float(np.quantile(shares, _QUANTILE))), float(shares.std())
+    first = dict(nominal=nominal, mean=mean, deviation=deviation, quantile=low, error=error)
+    return Spread(name=name, unit="1", **first)  # pyright: ignore[reportArgumentType]
 
 
 def region_places(target: Target) -> Array:

@@ -8,11 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.optimization.design_point import DesignPoint
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.optimization.program import Part, Point, stacked, stacked_slopes
-from softreach.requirements.parts import POSE_LIMITS
+from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
@@ -42,7 +40,7 @@ def can_polish(problem: Problem) -> bool:
     """True of problems with numbers that can change a little, and goals with derivatives."""
     needs = problem.requirements
     regions = any(target.region is not None for target in needs.targets)
-    of_poses = needs.keeps or any(name in needs.limits.given for name in POSE_LIMITS)
+    of_poses = needs.keeps or needs.limits.of_poses
     return (
         not (regions and of_poses)  # what is covered depends on poses at countless places
         and len(problem.parameters.real) > 0

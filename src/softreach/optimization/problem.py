@@ -1,29 +1,291 @@
-"""Problem of a search: free parameters, requirements and goals; a design judged by them."""
+"""Problem of a search: goals and requirements, and how a design is judged by them."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Literal, NamedTuple, Self
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 
-from softreach.atlas.metric import MetricFailed
+from softreach.arm.body import mass
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.intermediates import Intermediates
+from softreach.atlas.metric import Metric, MetricFailed
+from softreach.atlas.metrics import known_metric
 from softreach.optimization.free_parameters import FreeParameters, Values
-from softreach.optimization.objectives import SETS, DesignCase, Goal, Value
+from softreach.requirements.checks import Check, Sets, checked, quick_check, sets_to
 from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.arguments import as_given, as_names
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, no_warnings
+from softreach.support.lazy import lazy
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.workspace import ReachableSet
+
+SETS = {
+    "exact_volume": "volume",
+    "exact_convex_volume": "convex_volume",
+    "exact_unreachability": "unreachability",
+}
+"""Goals and measures of the reachable set, and what they are called there."""
 
 NEAR = 0.1
 """Relative distance within which objectives at the ends of polishes agree."""
 
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
+
+_COARSE, _FINE = 1 << 12, 1 << 15
+"""Samples of the cloud of coarse and of fine cases."""
+_RADIUS = 0.1  # of neighbors for D̄, in L
+_SHARE = 0.8  # of the volume, that the payload leaves
+
+
+class Value(NamedTuple):
+    """A number and how far off it may be."""
+
+    value: float
+    error: float = math.nan
+
+
+@dataclass(eq=False)
+class DesignCase:
+    """A design under requirements at one accuracy; its sets, cloud and check are computed once."""
+
+    arm: Manipulator
+    requirements: Requirements
+    accuracy: float
+    """Relative error of volumes."""
+    fine: bool = True
+    """Clouds have as many samples as numbers that are reported need."""
+
+    @lazy
+    def reached(self) -> ReachableSet:
+        """The reachable set."""
+        return self.set_of(self.arm)
+
+    @lazy
+    def set_of(self) -> Sets:
+        """Reachable sets of the design and of it under payloads."""
+        return sets_to(self.accuracy, quiet=not self.fine)
+
+    @lazy
+    def check(self) -> Check:
+        """Requirements met and missed; on the way by poses that few descents find."""
+        if self.fine:
+            return checked(self.arm, self.requirements, self.accuracy, self.set_of)
+        with no_warnings():
+            return quick_check(self.arm, self.requirements, self.accuracy, self.set_of)
+
+    @lazy
+    @no_warnings()
+    def cloud(self) -> xr.Dataset:
+        """Samples of the activation box."""
+        from softreach.cloud import compute_cloud
+
+        return compute_cloud(self.arm, self.samples, sampler="sobol")
+
+    @property
+    def samples(self) -> int:
+        """Samples of a cloud."""
+        return _FINE if self.fine else _COARSE
+
+    @no_warnings()
+    def metric(self, metric: Metric) -> float:
+        """A metric of the atlas."""
+        return float(metric.value(self._intermediates, {}))
+
+    @lazy
+    def _intermediates(self) -> Intermediates:
+        return Intermediates.of_one(
+            self.arm, self.samples, self.accuracy, partial(self.set_of, self.arm)
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Objective:
+    """A number of a design that a search makes large or small."""
+
+    name: str
+    unit: str
+    meaning: str
+    compute: Callable[[DesignCase], Value]
+    asks: str = ""
+    """Part of the requirements that it is about: "targets" or "regions"; "" for none."""
+    smooth: bool = False
+    """A polish knows its derivatives."""
+
+
+class Goal(NamedTuple):
+    """An objective, and whether it is to be large or small."""
+
+    objective: Objective
+    sense: float
+    """1 to maximize, -1 to minimize."""
+
+    @property
+    def name(self) -> str:
+        """Name of the objective."""
+        return self.objective.name
+
+    def value(self, case: DesignCase) -> Value:
+        """Value of a design; NaN where it has none, as a flat set has no unreachability."""
+        value = self.objective.compute(case)
+        return value if math.isfinite(value.value) else Value(math.nan)
+
+
+def goals(
+    maximize: str | Metric | Sequence[str | Metric],
+    minimize: str | Metric | Sequence[str | Metric],
+    requirements: Requirements,
+) -> tuple[Goal, ...]:
+    """Objectives with their senses, in the order in which names or metrics are given.
+
+    Raises:
+        InvalidInput: An unknown one, one that is given twice, or one about targets or regions that
+            the requirements do not have.
+    """
+    result = []
+    for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
+        several = [given] if isinstance(given, Metric) else given
+        if not (isinstance(several, list | tuple) and any(isinstance(x, Metric) for x in several)):
+            several = as_names(word, several)
+        result += [Goal(known_objective(word, each), sense) for each in several]
+    names = [goal.name for goal in result]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InvalidInput("objective", twice[0], "given once")
+    targets = requirements.targets
+    has = {"", *["targets"] * bool(targets), *("regions" for t in targets if t.region is not None)}
+    for goal in (goal for goal in result if goal.objective.asks not in has):
+        allowed = f"left out: the requirements have no {goal.objective.asks}"
+        raise InvalidInput("objective", goal.name, allowed)
+    return tuple(result)
+
+
+def known_objective(word: str, given: str | Metric) -> Objective:
+    """The objective of a name, or of a metric, which errors call by a word.
+
+    Raises:
+        InvalidInput: There is none.
+    """
+    if isinstance(given, str) and given in OBJECTIVES:
+        return OBJECTIVES[given]
+    metric = given if isinstance(given, Metric) else known_metric(given)
+    if metric is None:
+        hint = did_you_mean(str(given), OBJECTIVES)
+        allowed = f"one of {', '.join(OBJECTIVES)}, or a metric of the atlas"
+        raise InvalidInput(word, as_given(given), allowed, hint)
+    if metric.over:
+        raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
+    return Objective(
+        name=metric.name,
+        unit=metric.unit,
+        meaning=metric.meaning,
+        compute=lambda case: Value(case.metric(metric)),
+    )
+
+
+def _of_set(name: str, case: DesignCase) -> Value:
+    return Value(getattr(case.reached, name), getattr(case.reached, f"{name}_error"))
+
+
+def _coverage(case: DesignCase) -> Value:
+    covered = case.check.coverages
+    shares = [each.share for each in covered]
+    return Value(float(np.mean(shares)), float(np.mean([each.error for each in covered])))
+
+
+def _effort(total: Callable[[Array], float], case: DesignCase) -> Value:
+    return Value(float(total(case.check.effort)), 0.0)
+
+
+def _sampled(values: Any) -> Value:
+    """Mean of values over samples of the activation box, and its standard error."""
+    known = np.asarray(values, float)
+    known = known[np.isfinite(known)]
+    if not len(known):
+        return Value(math.nan)
+    return Value(float(known.mean()), float(known.std() / math.sqrt(len(known))))
+
+
+def _dexterity(case: DesignCase) -> xr.Dataset:
+    from softreach.cloud.dexterity import dexterity
+
+    return dexterity(case.cloud)
+
+
+def _activation_distance(case: DesignCase) -> Value:
+    from softreach.cloud.redundancy import activation_distance
+
+    radius = _RADIUS * case.arm.length
+    return _sampled(activation_distance(case.cloud, radius, queries=min(4096, case.samples)))
+
+
+def _compliance(case: DesignCase) -> Value:
+    from softreach.stiffness import principal_compliances, tip_compliance
+
+    gamma = case.cloud.activation.values[:256]
+    return _sampled(principal_compliances(tip_compliance(case.arm, gamma)).values[:, 0])
+
+
+def _payload(case: DesignCase) -> Value:
+    from softreach.workspace.payload import payload_curve
+
+    accuracy = max(case.accuracy, 0.01)
+    most = payload_curve(case.arm, [], accuracy=accuracy).largest_payload(_SHARE, accuracy=accuracy)
+    return Value(most.payload, most.payload_error)
+
+
+_ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value]], ...] = (
+    ("exact_volume", "m3", "volume of the reachable set", partial(_of_set, "volume")),
+    ("exact_convex_volume", "m3", "volume of its convex hull", partial(_of_set, "convex_volume")),
+    ("exact_unreachability", "1", "1 - volume / convex volume", partial(_of_set, "unreachability")),
+    ("coverage", "1", "mean share of the regions that is reached", _coverage),
+    ("mean_effort", "1", "mean effort at the targets", partial(_effort, np.mean)),
+    ("worst_effort", "1", "largest effort at the targets", partial(_effort, np.max)),
+    (
+        "manipulability",
+        "m3/input3",
+        "mean √det(J Jᵀ) over the box",
+        lambda case: _sampled(_dexterity(case).manipulability),
+    ),
+    (
+        "dexterity",
+        "1",
+        "mean of 1 / condition of J over the box",
+        lambda case: _sampled(1.0 / _dexterity(case).condition),
+    ),
+    ("activation_distance", "input", "mean D̄ within L/10", _activation_distance),
+    ("payload", "kg", "payload under which 80 % of the volume is left", _payload),
+    ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance),
+    ("mass", "kg", "mass of the arm", lambda case: Value(mass(case.arm), 0.0)),
+    ("actuators", "1", "number of inputs", lambda case: Value(float(case.arm.inputs), 0.0)),
+)
+_ASKS = {"coverage": "regions", "mean_effort": "targets", "worst_effort": "targets"}
+_ROUGH = {"manipulability", "dexterity", "activation_distance", "payload", "compliance"}
+"""Objectives without derivatives."""
+
+OBJECTIVES = {
+    name: Objective(
+        name=name,
+        unit=unit,
+        meaning=meaning,
+        compute=compute,
+        asks=_ASKS.get(name, ""),
+        smooth=name not in _ROUGH,
+    )
+    for name, unit, meaning, compute in _ROWS
+}
+"""Objectives by name, beside the metrics of the atlas."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,15 +325,6 @@ class Candidate:
         """The candidate that `to_dict` described."""
         objectives = tuple(Value(*pair) for pair in record["objectives"])
         return cls(**{**record, "objectives": objectives, "undecided": (*record["undecided"],)})
-
-
-class Score(NamedTuple):
-    """Order of candidates of one goal, or of none: the least first."""
-
-    bound: bool
-    """True of what bounds alone have judged: its excess is no less, so that it beats nothing."""
-    excess: float
-    cost: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,11 +399,8 @@ class Problem:
             # Nothing stable under these loads, or a number that this kind of arm does not have.
             fault = str(error)
             return Candidate(values=values, excess=math.inf, fidelity=fidelity, fault=fault)
-        lacking = [
-            goal.name
-            for goal, value in zip(self.goals, objectives, strict=True)
-            if not math.isfinite(value.value)
-        ]
+        pairs = zip(self.goals, objectives, strict=True)
+        lacking = [goal.name for goal, (value, _) in pairs if not math.isfinite(value)]
         fault = f"no {', '.join(lacking)}" if lacking else ""
         return Candidate(objectives=objectives, fault=fault, **known)
 
@@ -159,11 +409,14 @@ class Problem:
         pairs = zip(self.goals, candidate.objectives, strict=True)
         return tuple(-goal.sense * value.value for goal, value in pairs)
 
-    def score(self, candidate: Candidate) -> Score:
-        """Place among others: what is missed first, then the only goal."""
+    def score(self, candidate: Candidate) -> tuple[bool, float, float]:
+        """Place among others, the least first: by what is missed, then by the only goal.
+
+        What bounds alone have judged misses no less than they say, so that it beats nothing.
+        """
         if not candidate.is_feasible:
-            return Score(candidate.fidelity == "bounds", candidate.excess or math.inf, 0.0)
-        return Score(False, 0.0, self.costs(candidate)[0] if self.goals else 0.0)
+            return candidate.fidelity == "bounds", candidate.excess or math.inf, 0.0
+        return False, 0.0, self.costs(candidate)[0] if self.goals else 0.0
 
     def front(self, candidates: Iterable[Candidate]) -> list[Candidate]:
         """Feasible designs that no other one beats in every goal; the best alone for one goal.
@@ -175,11 +428,10 @@ class Problem:
         if not feasible or len(self.goals) < 2:
             return [min(feasible or every, key=self.score)] if every else []
         costs = np.array([self.costs(each) for each in feasible])
-        kept = [
-            k
-            for k, own in enumerate(costs)
-            if not ((costs <= own).all(axis=1) & (costs < own).any(axis=1)).any()
-            and not (costs[:k] == own).all(axis=1).any()
-        ]
-        kept.sort(key=lambda k: tuple(costs[k]))
-        return [feasible[k] for k in kept]
+
+        def is_beaten(k: int) -> bool:
+            no_worse, better = (costs <= costs[k]).all(axis=1), (costs < costs[k]).any(axis=1)
+            return bool((no_worse & better).any() or (costs[:k] == costs[k]).all(axis=1).any())
+
+        kept = (k for k in range(len(costs)) if not is_beaten(k))
+        return [feasible[k] for k in sorted(kept, key=lambda k: tuple(costs[k]))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,8 +17,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import unit_suffix
 from softreach.arm.written import with_suffix
 from softreach.optimization.free_parameters import FreeParameter
-from softreach.optimization.objectives import Goal, Value
-from softreach.optimization.problem import NEAR, Candidate, Problem
+from softreach.optimization.problem import NEAR, Candidate, Goal, Problem, Value
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
@@ -26,8 +25,8 @@ from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import SoftreachError, counted
 from softreach.support.files.atomic import check_place
 from softreach.support.files.text import write_table, write_text
-from softreach.support.report import Report, Section, check_libraries
-from softreach.support.units import LengthUnit, as_unit, handy_unit, readable, readable_unit
+from softreach.support.report import Report, Reported, Section, check_libraries
+from softreach.support.units import LengthUnit, as_unit, readable, readable_unit
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ _PICTURE = (
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Search:
+class Search(Reported):
     """The best designs of a search."""
 
     problem: Problem
@@ -131,14 +130,10 @@ class Search:
         Name -> "lower" or "upper".
         """
         ends = {}
-        for parameter in self.problem.parameters.free:
-            if parameter.choices:
-                continue
-            value, near = float(self.best.values[parameter.name]), parameter.high - parameter.low
-            if value <= parameter.low + _AT_END * near:
-                ends[parameter.name] = "lower"
-            elif value >= parameter.high - _AT_END * near:
-                ends[parameter.name] = "upper"
+        for p in (p for p in self.problem.parameters.free if not p.choices):
+            value, near = float(self.best.values[p.name]), _AT_END * (p.high - p.low)
+            if value <= p.low + near or value >= p.high - near:
+                ends[p.name] = "lower" if value <= p.low + near else "upper"
         return ends
 
     @property
@@ -169,16 +164,14 @@ class Search:
         """
         import xarray as xr
 
-        every = self.every
-        free, goals = self.problem.parameters.free, self.goals
-        names = self.problem.parameters.names
-        places = {_key(each, names): k for k, each in enumerate(self.candidates)}
-        ways = len(self.candidates)
-        coarse = [-1] * ways + [places.get(_key(each, names), -1) for each in self.finalists]
+        every, free = self.every, self.problem.parameters.free
+        goals, arm = self.goals, self.shown
+        shown = {"length": arm.length, "display_unit": arm.display_unit or ""}
+        places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
+        coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
         values = [[p.number(each.values[p.name]) for p in free] for each in every]
         pairs = [each.objectives or [(math.nan, math.nan)] * len(goals) for each in every]
-        shape = len(every), len(goals), 2
-        numbers = np.array([[[*pair] for pair in row] for row in pairs], float).reshape(shape)
+        numbers = np.array(pairs, float).reshape(len(every), len(goals), 2)
         looked_at = np.cumsum([each.designs for each in self.candidates], dtype=int)
         return xr.Dataset(
             {
@@ -190,7 +183,7 @@ class Search:
                 "front": ("design", [any(each is one for one in self.front) for each in every]),
                 "fidelity": ("design", np.array([each.fidelity for each in every], dtype=str)),
                 "looked_at": ("design", [*looked_at, *[self.designs] * len(self.finalists)]),
-                "coarse_design": ("design", coarse),
+                "coarse_design": ("design", [-1] * len(self.candidates) + coarse),
                 "fault": ("design", np.array([each.fault for each in every], dtype=str)),
             },
             {
@@ -203,17 +196,16 @@ class Search:
                 "objective_unit": ("objective", [goal.objective.unit for goal in goals]),
                 "sense": ("objective", [goal.sense for goal in goals]),
             },
-            {**self.attributes, **self.provenance, "finalists": len(self.finalists)},
+            {**provenance(arm), **shown, **self.provenance, "finalists": len(self.finalists)},
         )
 
     @property
-    def attributes(self) -> dict[str, object]:
-        """Length of the best and the unit that it is shown in; those of the base without one."""
+    def shown(self) -> Manipulator:
+        """The design of the best; its base where no such arm can exist."""
         try:
-            arm = self.arm
+            return self.arm
         except SoftreachError:
-            arm = next(iter(self.problem.parameters.bases.values()))
-        return {**provenance(arm), "length": arm.length, "display_unit": arm.display_unit or ""}
+            return next(iter(self.problem.parameters.bases.values()))
 
     def save(
         self, folder: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
@@ -253,11 +245,11 @@ class Search:
         self.report(unit).save(place / "report.html", overwrite=overwrite)
 
     def _design_text(self, each: Candidate) -> str:
-        arm = self.problem.parameters.arm(each.values)
+        arm, unit = self.problem.parameters.arm(each.values), self.shown.length_unit
         pairs = zip(self.goals, each.objectives, strict=bool(each.objectives))
         lines = [
             f"{_FOUND}{'' if each.is_feasible else '; it does not meet all requirements'}.",
-            *(f"# {goal.name}: {_value_text(goal, value, self.unit)}" for goal, value in pairs),
+            *(f"# {goal.name}: {_value_text(goal, value, unit)}" for goal, value in pairs),
             *(f"# {key}: {text}" for key, text in self.provenance.items()),
         ]
         return "\n".join(lines) + f"\n\n{arm.file_text}"
@@ -271,27 +263,29 @@ class Search:
         """
         import pandas as pd
 
-        length, records = as_unit(unit, self._length), []
-        for number, each in enumerate(self.every if as_flag("every", every) else self.front, 1):
-            record: dict[str, Any] = {
-                "design": number,
-                "front": int(any(each is one for one in self.front)),
-                "fidelity": each.fidelity,
-                "feasible": int(each.is_feasible),
-                "excess": each.excess,
-            }
-            objectives = each.objectives or [Value(math.nan)] * len(self.goals)
-            for goal, value in zip(self.goals, objectives, strict=True):
-                suffix, size = _written_unit(goal.objective.unit, length)
-                record[f"{goal.name}{suffix}"] = value.value / size
-                record[f"{goal.name}_error{suffix}"] = value.error / size
-            for parameter in self.problem.parameters.free:
-                suffix, size = _written_unit(parameter.unit, length)
-                value = each.values[parameter.name]
-                value = value if isinstance(value, str) else value / size
-                record[with_suffix(parameter.name, suffix)] = value
-            records.append(record | {"missed": "; ".join(each.missed), "fault": each.fault})
-        return pd.DataFrame.from_records(records)
+        length = as_unit(unit, self.shown.length)
+        designs = self.every if as_flag("every", every) else self.front
+        columns: dict[str, Any] = {
+            "design": range(1, len(designs) + 1),
+            "front": [int(any(each is one for one in self.front)) for each in designs],
+            "fidelity": [each.fidelity for each in designs],
+            "feasible": [int(each.is_feasible) for each in designs],
+            "excess": [each.excess for each in designs],
+        }
+        lacks = [Value(math.nan)] * len(self.goals)
+        for k, goal in enumerate(self.goals):
+            suffix, size = _written_unit(goal.objective.unit, length)
+            values = [(each.objectives or lacks)[k] for each in designs]
+            columns[f"{goal.name}{suffix}"] = [each.value / size for each in values]
+            columns[f"{goal.name}_error{suffix}"] = [each.error / size for each in values]
+        for p in self.problem.parameters.free:
+            suffix, size = _written_unit(p.unit, length)
+            values = (each.values[p.name] for each in designs)
+            columns[with_suffix(p.name, suffix)] = [
+                value if isinstance(value, str) else value / size for value in values
+            ]
+        columns["missed"] = ["; ".join(each.missed) for each in designs]
+        return pd.DataFrame(columns | {"fault": [each.fault for each in designs]})
 
     def report(self, unit: str | None = None) -> Report:
         """Numbers, requirements, front and pictures, to be printed, or saved as an .html file.
@@ -299,7 +293,8 @@ class Search:
         Args:
             unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
         """
-        shown = self.unit if unit is None else as_unit(unit, self._length)
+        arm = self.shown
+        shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
         missed = sorted((x for x in self.findings if not x.met), key=lambda each: -each.excess)
         fault = self.best.fault.splitlines()[:1] if self.best.fault else map(str, missed)
         try:
@@ -332,33 +327,18 @@ class Search:
         )
 
     @property
-    def unit(self) -> LengthUnit:
-        """Unit of lengths that the design is shown in, or one that is handy."""
-        shown = str(self.attributes["display_unit"]) or handy_unit(self._length)
-        return as_unit(shown, self._length)
-
-    @property
-    def _length(self) -> float:
-        return float(str(self.attributes["length"]))
-
-    @property
     def every(self) -> tuple[Candidate, ...]:
         """All designs: those on the way in their order, then those at full accuracy."""
         return (*self.candidates, *self.finalists)
 
-    def __repr__(self) -> str:
-        return str(self.report())
-
     def _repr_html_(self) -> str:
-        from html import escape
-
         from softreach.arm.skin import arm_card
 
         try:
             card = arm_card(self.arm, self.arm.base)
         except SoftreachError:  # no arm can exist
             card = ""
-        return f"{card}<pre>{escape(repr(self))}</pre>"
+        return card + super()._repr_html_()
 
 
 def check_folder(folder: Path, *, overwrite: bool) -> None:
@@ -372,10 +352,6 @@ def check_folder(folder: Path, *, overwrite: bool) -> None:
     check_libraries()
     for name in _FILES:
         check_place(folder / name, overwrite=overwrite, name="out")
-
-
-def _key(candidate: Candidate, names: Sequence[str]) -> tuple[float | str, ...]:
-    return tuple(candidate.values[name] for name in names)
 
 
 def _best(search: Search, unit: LengthUnit) -> Section:
@@ -430,7 +406,7 @@ def _value_text(goal: Goal, value: Value, unit: LengthUnit) -> str:
     return readable(value.value, goal.objective.unit, unit, value.error)
 
 
-def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[Sequence[str]]:
+def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[tuple[str, ...]]:
     values, ends, parameters = search.best.values, search.at_ends, search.problem.parameters
     free = {parameter.name: parameter for parameter in parameters.free}
     for name, each in free.items():

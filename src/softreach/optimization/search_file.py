@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ from softreach.arm.parameters import unknown_parameter
 from softreach.arm.written import Written
 from softreach.atlas.space_file import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
-from softreach.optimization.objectives import goals, known_objective
+from softreach.optimization.problem import goals, known_objective
 from softreach.optimization.study import SAMPLERS
 from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_flag, as_integer, as_number, as_one_of
@@ -42,7 +42,7 @@ class SearchFile:
     requirements: Requirements
     free: Mapping[str, tuple[float, float] | str]
     """Parameter -> range [SI unit], or the parameter that it is tied to."""
-    choices: Mapping[str, list[Any]]
+    choices: Mapping[str, Sequence[Any]]
     """Parameter -> values [SI unit]."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Objectives and numbers of the search: further arguments of `search`."""
@@ -56,29 +56,21 @@ def read_search(
     source: str = "",
     given: Mapping[str, Any] | None = None,
 ) -> SearchFile:
-    """A search from the text of a file.
+    """A search from the text of a file: requirements, and what is searched, in a table `[search]`.
 
     ```toml
-    [[reach]]                       # requirements, as in every file of them
-    places_mm = [[200, 0, 700]]
     [search]
     design = "arm.toml"             # or a named design, or a list of several
     maximize = "exact_volume"
     designs = 200                   # seed, accuracy, sampler, polish
     [search.free]
-    taper_deg = [0, 3.2]
     "left.revolution_deg" = [-360, 360]
     "right.revolution" = "-left.revolution"
     [search.choices]
     bundles = [3, 4]
     ```
 
-    Args:
-        text: TOML.
-        folder: Folder that the paths in it start from.
-        design_from: Name or path of a design -> the design.
-        source: What errors call the file.
-        given: What was said elsewhere and goes before the table, by the same keys.
+    What is `given` by the same keys goes before the table; paths in the text start from `folder`.
 
     Raises:
         InvalidDesign: All faults, of the requirements too, in the words of the file.
@@ -89,9 +81,10 @@ def read_search(
         document = {}  # for which the requirements are refused
     reader = _Reader(document, given or {}, folder, design_from)
     bases = reader.bases()
-    free, choices = reader.parameters(bases)
+    if bases:
+        reader.parameters(bases)
     lengths = {arm.length for arm in bases.values()}
-    alike = len(lengths) == 1 and "length" not in {*free, *choices}
+    alike = len(lengths) == 1 and "length" not in {*reader.free, *reader.choices}
     needs, faults = None, ()
     try:
         needs = Requirements.from_toml(
@@ -106,8 +99,8 @@ def read_search(
     return SearchFile(
         base=bases if len(bases) > 1 else next(iter(bases.values())),
         requirements=needs,
-        free=free,
-        choices=choices,
+        free=reader.free,
+        choices=reader.choices,
         options=options,
     )
 
@@ -123,6 +116,8 @@ class _Reader(FaultReader):
         design_from: Callable[[str], Manipulator],
     ) -> None:
         super().__init__()
+        self.free: dict[str, Any] = {}
+        self.choices: dict[str, Any] = {}
         self._folder, self._design_from, self._given = folder, design_from, given
         self._raw = self._table(document, "search")
         self._check_keys(self._raw, "search", _KEYS)
@@ -145,37 +140,29 @@ class _Reader(FaultReader):
             bases[name] = self._tried(path, name, partial(self._design_from, place))
         return {name: arm for name, arm in bases.items() if arm is not WRONG}
 
-    def parameters(
-        self, bases: Mapping[str, Manipulator]
-    ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-        """Ranges and ties, and choices, by parameter."""
-        choices: dict[str, list[Any]] = {}
-        free: dict[str, Any] = {}
-        if not bases:
-            return free, choices
+    def parameters(self, bases: Mapping[str, Manipulator]) -> None:
+        """Read choices, ranges and ties, each judged as `search` does."""
+        self._bases = dict(bases)
         for path, key, value in self._entries("choices"):
             if key in NAMED_CHOICES:
-                self._add(path, choices, key, self._named_choice(bases, path, key, value))
-        names = Written(known_parameters(bases.values(), choices.get("bundles", ())))
+                self._add(path, value, self.choices, key, _named_choice(key, value))
+        names = Written(known_parameters(bases.values(), self.choices.get("bundles", ())))
         for path, key, value in self._entries("choices", names):
-            if key not in NAMED_CHOICES and (name := self._name(names, path, key)):
-                listed = value.split(",") if isinstance(value, str) else value
-                self._add(path, choices, name, self._numbers(names, path, key, listed, None))
+            if key not in NAMED_CHOICES:
+                name = self._name(names, path, key)
+                self._add(path, value, self.choices, name, self._numbers(names, path, key, value))
+        ties = []
         for path, key, value in self._entries("free", names):
-            if name := self._name(names, path, key):
-                self._add(path, free, name, self._range(names, path, key, value))
-        ranges = {name: ends for name, ends in free.items() if not isinstance(ends, str)}
-        if not (ranges or choices or len(bases) > 1):
-            if not self.faults:
-                allowed = "needs one parameter or more with a range, or choices: taper_deg = [0, 3]"
-                self._refuse("search.free", None, allowed)
-            return free, choices
-        for path, key, value in self._entries("free", names):
-            name = names.by_key[key].name if key in names.by_key else ""
-            if isinstance(free.get(name), str):
-                tied = {**ranges, name: value}
-                self._tried(path, value, partial(free_parameters, dict(bases), tied, choices))
-        return free, choices
+            name = self._name(names, path, key)
+            if isinstance(value, str) and ":" not in value:
+                ties.append((path, value, self.free, name, value))
+            else:
+                self._add(path, value, self.free, name, self._numbers(names, path, key, value, ":"))
+        if not (self.free or self.choices or len(bases) > 1 or self.faults):
+            allowed = "needs one parameter or more with a range, or choices: taper_deg = [0, 3]"
+            self._refuse("search.free", None, allowed)
+        for tie in ties:
+            self._add(*tie)
 
     def options(self, needs: Requirements | None) -> dict[str, Any]:
         options: dict[str, Any] = {word: self._objectives(word) for word in _SENSES}
@@ -227,31 +214,14 @@ class _Reader(FaultReader):
         self._refuse(path, None, text)
         return ""
 
-    def _named_choice(
-        self, bases: Mapping[str, Manipulator], path: str, key: str, value: Any
-    ) -> Any:
-        values = value.split(",") if isinstance(value, str) else value
-        if key == "bundles" and isinstance(value, str):
-            values = [int(x) if x.strip().isdecimal() else x for x in values]
-        made = self._tried(path, value, partial(free_parameters, dict(bases), {}, {key: values}))
-        return WRONG if made is WRONG else list(values)
-
-    def _range(self, names: Written, path: str, key: str, value: Any) -> Any:
-        if isinstance(value, str) and ":" not in value:
-            return value
-        ends = value.split(":") if isinstance(value, str) else value
-        numbers = self._numbers(names, path, key, ends, 2)
-        if numbers is WRONG or numbers[0] < numbers[1]:
-            return WRONG if numbers is WRONG else tuple(numbers)
-        return self._refuse(path, value, "must be a range with low < high")
-
-    def _numbers(self, names: Written, path: str, key: str, values: Any, count: int | None) -> Any:
+    def _numbers(self, names: Written, path: str, key: str, given: Any, mark: str = ",") -> Any:
         """Numbers in SI units; `WRONG` where some are none or beyond what they may be."""
-        parameter = names.by_key[key]
-        wanted = {None: "a list of different numbers", 2: "a range [low, high]"}
-        if not isinstance(values, list | tuple) or (count or len(values)) != len(values):
-            return self._refuse(path, values, f"must be {wanted[count]}")
-        numbers = []
+        values = given.split(mark) if isinstance(given, str) else given
+        if key not in names.by_key:
+            return WRONG
+        if not isinstance(values, list | tuple):
+            return self._refuse(path, values, "must be a list of numbers")
+        parameter, numbers = names.by_key[key], []
         for value in values:
             try:
                 numbers.append(names.number(key, value))
@@ -261,14 +231,23 @@ class _Reader(FaultReader):
         allowed = parameter.range._replace(whole=False)
         if wrong := [value for value in numbers if not allowed.admits(value)]:
             shown = allowed.in_degrees() if parameter.unit == "rad" else allowed
-            value = values[numbers.index(wrong[0])]
-            return self._refuse(path, value, f"must be {shown.text}")
-        if count is None and (not numbers or len({*numbers}) < len(numbers)):
-            return self._refuse(path, values, f"must be {wanted[None]}")
-        return numbers
+            return self._refuse(path, values[numbers.index(wrong[0])], f"must be {shown.text}")
+        return tuple(numbers)
 
-    def _add(self, path: str, table: dict[str, Any], name: str, value: Any) -> None:
+    def _add(self, path: str, given: Any, table: dict[str, Any], name: str, value: Any) -> None:
+        """Take the value of a parameter, the first of its name, if a search may have it."""
         if name in table:
             self._refuse(path, None, "is given twice")
-        elif value is not WRONG:
-            table[name] = value
+        elif name and value is not WRONG:
+            of_free = {**self.free, name: value} if table is self.free else {}
+            choices = {**self.choices, name: value} if table is self.choices else self.choices
+            make = partial(free_parameters, self._bases, of_free, choices)
+            if self._tried(path, given, make) is not WRONG:
+                table[name] = value
+
+
+def _named_choice(key: str, value: Any) -> Any:
+    values = value.split(",") if isinstance(value, str) else value
+    if key == "bundles" and isinstance(value, str):
+        return [int(x) if x.strip().isdecimal() else x for x in values]
+    return values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from os import PathLike
 from typing import Any
@@ -14,9 +14,8 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metric import Metric
 from softreach.optimization.free_parameters import free_parameters
-from softreach.optimization.objectives import goals
 from softreach.optimization.polish import MOST_DESIGNS, can_polish, polished
-from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.problem import Candidate, Problem, goals
 from softreach.optimization.result import Search
 from softreach.optimization.study import SAMPLERS, Sampler, Study
 from softreach.requirements.requirements import Requirements
@@ -131,29 +130,23 @@ def search(
     )
     polishes = as_flag("polish", polish) and can_polish(problem)
     progress = as_progress(progress)
-    run = _Run(study, designs, polishes=polishes, follow=follow, progress=progress)
-    return run.result(first)
+    last = polishes and (len(targets) > 1 or problem.is_finer_on_finer_sets)
+    kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
+    return _Run(problem, study, designs, kept, polishes, follow, progress).result(first)
 
 
+@dataclass(eq=False)
 class _Run:
-    def __init__(
-        self,
-        study: Study,
-        designs: int,
-        *,
-        polishes: bool,
-        follow: Callable[[Candidate], object],
-        progress: Progress,
-    ) -> None:
-        self.problem, self._study = study.problem, study
-        self._designs, self._polishes = designs, polishes
-        self._follow, self._progress = follow, progress
-        problem = study.problem
-        last = polishes and (len(problem.goals) > 1 or problem.is_finer_on_finer_sets)
-        self._kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
-        self._spent = 0
-        self._begun = time.perf_counter()
-        self._starts: list[Array] = []
+    problem: Problem
+    _study: Study
+    _designs: int
+    _kept: int  # designs, for the polish to full accuracy
+    _polishes: bool
+    _follow: Callable[[Candidate], object]
+    _progress: Progress
+    _spent: int = 0
+    _begun: float = field(default_factory=time.perf_counter)
+    _starts: list[Array] = field(default_factory=list)
 
     def result(self, first: int) -> Search:
         """Search until the designs are spent, the first of them spread; judge the best again."""
@@ -210,15 +203,12 @@ class _Run:
         room = max(1, self._left // _DESIGNS_OF_POLISH)
         starts = self._chosen(self._study.candidates, min(_POLISHES, room))
         most = min(MOST_DESIGNS, self._left // max(1, len(starts)))
-        turns = [(start, self._turn(start, k)) for k, start in enumerate(starts)]
-        tasks = (
-            partial(
-                self._study.judged,
-                ["polish", dict(start.values), most, *turn],
-                partial(self._polished, start, most, turn),
-            )
-            for start, turn in turns
-        )
+        tasks = []
+        for k, start in enumerate(starts):
+            turn = self._turn(start, k)
+            make = partial(self._polished, start, most, turn)
+            what = ["polish", dict(start.values), most, *turn]
+            tasks.append(partial(self._study.judged, what, make))
         for candidate, is_new in parallel.in_order(tasks):
             if candidate.designs:
                 self._note(candidate, is_new)
@@ -264,14 +254,8 @@ class _Run:
 
     def _place(self, candidate: Candidate) -> Array:
         """Place of a design in the ranges and choices, each from 0 to 1."""
-        place = []
-        for parameter in self.problem.parameters.free:
-            value = candidate.values[parameter.name]
-            if parameter.choices:
-                place.append(float(parameter.choices.index(value)))
-            else:
-                place.append((float(value) - parameter.low) / (parameter.high - parameter.low))
-        return np.array(place)
+        pairs = ((p, p.number(candidate.values[p.name])) for p in self.problem.parameters.free)
+        return np.array([x if p.choices else (x - p.low) / (p.high - p.low) for p, x in pairs])
 
     def _note(self, candidate: Candidate, is_new: bool, trial: Any = None) -> None:
         self._study.tell(candidate, trial)

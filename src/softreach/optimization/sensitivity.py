@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from softreach.atlas.metric import MetricFailed
-from softreach.optimization.objectives import SETS, Goal
 from softreach.optimization.polish import point_of
-from softreach.optimization.problem import Candidate, Problem
+from softreach.optimization.problem import SETS, Candidate, Goal, Problem
 from softreach.optimization.program import Point, stacked_slopes
 from softreach.optimization.result import Search
 from softreach.support import parallel
@@ -86,19 +85,16 @@ class Sensitivity:
         """Gradients, shares of variance and multipliers, labeled."""
         import xarray as xr
 
-        count = len(self.parameters)
-        lacks = np.full(count, math.nan)
-        empty = VarianceShares(lacks, lacks, lacks, lacks)
-        shares = [each or empty for each in self.variance]
-        columns = zip(*shares, strict=True) if shares else [()] * 4
-        pairs = zip(VarianceShares._fields, columns, strict=True)
-        variances = {name: np.array(values).reshape(-1, count) for name, values in pairs}
-        at = ("goal", "parameter")
+        at, count = ("goal", "parameter"), len(self.parameters)
+        lacks = np.full((4, count), math.nan)
+        each = [lacks if shares is None else shares for shares in self.variance]
+        shares = np.array(each).reshape(-1, 4, count).swapaxes(0, 1)
+        variances = zip(VarianceShares._fields, shares, strict=True)
         return xr.Dataset(
             {
                 "gradient": (("goal", "real"), self.gradient),
                 "gradient_error": (("goal", "real"), self.gradient_error),
-                **{name: (at, values, {"units": "1"}) for name, values in variances.items()},
+                **{name: (at, values, {"units": "1"}) for name, values in variances},
                 "multiplier": ("requirement", [each.value for each in self.multipliers]),
             },
             {
@@ -119,7 +115,7 @@ class Sensitivity:
             for name, unit, value, error in zip(
                 self.reals, self.units, self.gradient[k], self.gradient_error[k], strict=True
             ):
-                per = f"{self.goal_units[k].replace('m3', 'm³')}/{unit if unit != '1' else '1'}"
+                per = f"{self.goal_units[k].replace('m3', 'm³')}/{unit}"
                 if np.isfinite(value):
                     lines.append(f"  by {name}: {quantity(value, per, error)}")
             if (share := self.variance[k]) is not None:
@@ -263,15 +259,14 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
         return (), float(bool(size))
     weights, rest = nnls(np.stack(columns, axis=1), -slope)
     there, back, others = np.split(weights, [len(equations), 2 * len(equations)])
+    pulls = np.linalg.norm((there - back).reshape(-1, 3), axis=1).tolist()
+    pairs = zip(pulls, point.equations, strict=True)
+    each = [(what.name, what.unit, pull / what.scale) for pull, what in pairs]
+    pairs = zip(others.tolist(), bounds, strict=True)
+    each += [(what.name, what.unit, weight * what.gain) for weight, what in pairs if what.name]
     gains: dict[tuple[str, str], float] = {}
-    pulls = np.linalg.norm((there - back).reshape(-1, 3), axis=1)
-    for pull, what in zip(pulls.tolist(), point.equations, strict=True):
-        key = what.name, what.unit  # a place under several payloads counts with all of them
-        gains[key] = gains.get(key, 0.0) + pull / what.scale
-    for weight, each in zip(others.tolist(), bounds, strict=True):
-        if each.name:
-            key = each.name, each.unit
-            gains[key] = gains.get(key, 0.0) + weight * each.gain
+    for name, unit, gain in each:  # a place under several payloads counts with all of them
+        gains[name, unit] = gains.get((name, unit), 0.0) + gain
     result = [Multiplier(name, gain, unit) for (name, unit), gain in gains.items() if gain]
     result.sort(key=lambda each: -each.value)
     return tuple(result), float(rest) / size

@@ -44,15 +44,9 @@ class Study:
     def __init__(
         self, problem: Problem, *, storage: str | None, sampler: str, seed: int, first: int
     ) -> None:
-        """Open the storage, or begin it.
+        """Open the storage, or begin it; the first designs are spread evenly, before the sampler's.
 
-        Args:
-            problem: The problem.
-            storage: File of a journal, or an SQLite file by its suffix `.db` or `.sqlite`; None for
-                memory alone.
-            sampler: One of `SAMPLERS`.
-            seed: Of the sampler.
-            first: Number of designs, evenly spread, that come before those of the sampler.
+        Without a storage designs are kept in memory alone.
 
         Raises:
             InvalidInput: The storage cannot be opened, or belongs to another search or program.
@@ -83,9 +77,7 @@ class Study:
     def judged(self, what: Sequence[Any], make: Callable[[], Candidate]) -> tuple[Candidate, bool]:
         """What the storage knows, or what is made and kept there, and whether it was made.
 
-        Args:
-            what: All that it depends on, beside the problem: numbers and texts.
-            make: Makes it.
+        `what` says by numbers and texts all that it depends on, beside the problem.
         """
         key = json.dumps([self.problem.coarse, *what], sort_keys=True)
         with self._lock:
@@ -156,7 +148,7 @@ class Study:
             study_name=_NAME,
             storage=storage,
             directions=["minimize"] * max(1, len(self.problem.goals)),
-            sampler=self._made_sampler(self.seed),
+            sampler=self._made_sampler(),
             load_if_exists=True,
         )
 
@@ -187,8 +179,8 @@ class Study:
         real = all(each.is_real for each in self.problem.parameters.free)
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
-    def _made_sampler(self, seed: int) -> Any:
-        samplers = self._optuna.samplers
+    def _made_sampler(self) -> Any:
+        samplers, seed = self._optuna.samplers, self.seed
         population = max(8, min(self._first, 48))
         return {
             "cma": lambda: samplers.CmaEsSampler(seed=seed, warn_independent_sampling=False),

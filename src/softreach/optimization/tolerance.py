@@ -2,27 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.optimization.deviations import FirstOrder, Spread, deviations_of
-from softreach.optimization.monte_carlo import ArmsMade, arms_made, tried, with_places, with_region
-from softreach.requirements.requirements import Requirements
+from softreach.inverse.solve import solve_inverse
+from softreach.optimization.deviations import TOL, FirstOrder, Spread, deviations_of, region_places
+from softreach.requirements.requirements import Requirements, Target, with_payload
 from softreach.rod.rods import as_tip_map
+from softreach.sampling import sample_cube
 from softreach.schema import provenance
+from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
-from softreach.support.arrays import Array
-from softreach.support.errors import NotPossible, counted, no_warnings
+from softreach.support.arrays import Array, Index, Mask
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, counted, no_warnings
 from softreach.support.progress import Progress, as_progress
-from softreach.workspace.reach import ACCURACIES
+from softreach.workspace.reach import ACCURACIES, reachable_set
+from softreach.workspace.reachable import ReachableSolid
+from softreach.workspace.search import nearest_tips
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_POOL = 1 << 17  # places of space among which those are that are followed
+_FOLLOWED = 1 << 13  # near the boundary, and as many away from it
+_NEAR = 4.0  # deviations of the boundary
+_MOST_TRIED = 1024  # places of targets that arms are made for
+_STARTS = 8  # of searches for a place, beside the solutions of the design
 _MOST = 1_000_000
 
 
@@ -100,9 +111,9 @@ def tolerance(
         found = counted(count, "free bundle")
         raise NotPossible(f"a tolerance needs three free bundles or more, and this arm has {found}")
     with no_warnings():
-        first = FirstOrder(deviations, needs, accuracy, deviations.draws(samples, seed))
-        arms = arms_made(first, checked, seed, progress)
-        return _tolerance(first, arms)
+        shape = samples, len(deviations.sigmas)
+        changes = np.random.default_rng(seed).standard_normal(shape) * deviations.sigmas
+        return _tolerance(FirstOrder(deviations, needs, accuracy, changes), checked, seed, progress)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -136,8 +147,12 @@ class Tolerance:
     @property
     def agrees(self) -> bool:
         """True if the arms made agree with the first order in every number."""
-        spreads = (self.kept, self.volume, self.unreachability, *self.regions)
-        return self.made > 1 and all(each.agrees for each in (*spreads, *self.targets))
+        return self.made > 1 and all(each.agrees for each in (*self.spreads, *self.targets))
+
+    @property
+    def spreads(self) -> tuple[Spread, ...]:
+        """All that is but one number, regions last."""
+        return self.kept, self.volume, self.unreachability, *self.regions
 
     @property
     def worst_parameter(self) -> str:
@@ -148,7 +163,7 @@ class Tolerance:
         """All numbers, labeled: to first order and of arms made."""
         import xarray as xr
 
-        spreads = [self.kept, self.volume, self.unreachability, *self.regions]
+        spreads = self.spreads
         fields = ("nominal", "mean", "deviation", "quantile", "level", "error", "agrees")
         fields += ("made_mean", "made_error", "made_deviation", "deviation_error")
         fields += ("made_quantile", "quantile_error")
@@ -201,35 +216,164 @@ def _target_text(target: TargetTolerance) -> str:
     return f"{target.name} reached  {text}{which}"
 
 
-def _tolerance(first: FirstOrder, arms: ArmsMade) -> Tolerance:
-    made, deviations = arms.made, first.deviations
-
-    def column(name: str) -> Array:
-        return np.array([getattr(each, name) for each in made], float)
-
-    targets = []
-    for k, target in enumerate(with_places(first.needs)):
-        probability = first.probability(target)
-        share = np.full(len(probability), np.nan)
-        if made:
-            share[tried(len(share))] = np.mean([each.reached[k] for each in made], axis=0)
-        targets.append(TargetTolerance(target.name, probability, share, len(made)))
+def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
+    """Numbers to first order, and of arms that are made with the first of the changes."""
+    deviations, followed = first.deviations, _Followed.of(first, seed) if checked else None
+    numbers: list[tuple[Spread, _Asked]] = [
+        (first.kept(), lambda arm, solid: followed.kept(solid) if followed else math.nan),
+        (first.of_set("volume", "m3", 1.0), lambda arm, solid: solid.volume),
+        (first.of_set("unreachability", "1", -1.0), lambda arm, solid: solid.unreachability),
+        *((first.covered(target), partial(_share, first, target)) for target in first.regions),
+    ]
+    starts = [_starts(first, target) for target in first.targets] if checked else []
+    asked = [ask for _, ask in numbers]
+    tasks = (partial(_made, first, asked, starts, change) for change in first.changes[:checked])
+    made: list[tuple[list[float], list[Mask]]] = []
+    for each in parallel.in_order(tasks):
+        progress(1)
+        made += [] if each is None else [each]
+    values = np.array([row for row, _ in made]).reshape(len(made), len(numbers)).T.copy()
+    errors = np.zeros(len(numbers))
+    if made and followed:
+        errors[0] = followed.error(float(values[0].mean()))
+    spreads = zip(numbers, values, errors.tolist(), strict=True)
+    kept, volume, unreachability, *regions = (
+        spread.with_made(own, error) for (spread, _), own, error in spreads
+    )
     return Tolerance(
         arm=deviations.arm,
         parameters=deviations.names,
         units=tuple(each.unit for each in deviations.parameters),
         sigmas=deviations.sigmas,
-        kept=first.kept().with_made(column("kept"), arms.error_of_kept if made else 0.0),
-        volume=first.of_set("volume", "m3", 1.0).with_made(column("volume")),
-        unreachability=first.of_set("unreachability", "1", -1.0).with_made(
-            column("unreachability")
+        kept=kept,
+        volume=volume,
+        unreachability=unreachability,
+        targets=tuple(
+            _target(first, target, [reached[k] for _, reached in made])
+            for k, target in enumerate(first.targets)
         ),
-        targets=tuple(targets),
-        regions=tuple(
-            first.covered(target).with_made(np.array([each.covered[k] for each in made], float))
-            for k, target in enumerate(with_region(first.needs))
-        ),
+        regions=tuple(regions),
         costs=first.costs(),
         made=len(made),
-        impossible=arms.impossible,
+        impossible=checked - len(made),
     )
+
+
+def _target(first: FirstOrder, target: Target, reached: list[Mask]) -> TargetTolerance:
+    probability = first.probability(target)
+    share = np.full(len(probability), np.nan)
+    if reached:
+        share[_tried(len(share))] = np.mean(reached, axis=0)
+    return TargetTolerance(target.name, probability, share, len(reached))
+
+
+class _Followed(NamedTuple):
+    """Places within the reach of the design, more of them near its boundary."""
+
+    places: tuple[Array, Array]
+    """Near the boundary, and away from it."""
+    shares: tuple[float, float]
+    """Share of the volume that each stands for."""
+
+    @classmethod
+    def of(cls, first: FirstOrder, seed: int) -> _Followed:
+        solid, boundary = first.solid, first.boundary
+        low, high = boundary.places.min(axis=0), boundary.places.max(axis=0)
+        pool = low + (high - low) * sample_cube("sobol", _POOL, 3, seed)
+        pool = pool[solid.contains(pool)]
+        moves = np.linalg.norm(boundary.speed_at(pool) * first.deviations.sigmas, axis=1)
+        width = math.sqrt(float(boundary.area.mean()))
+        near = boundary.distance(pool) < _NEAR * moves + width
+        parts = pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED]
+        return cls(parts, (float(near.mean()), float((~near).mean())))
+
+    def kept(self, solid: ReachableSolid) -> float:
+        """Share of the volume that another set contains."""
+        return sum(
+            share * float(solid.contains(part).mean())
+            for part, share in zip(self.places, self.shares, strict=True)
+            if len(part)
+        )
+
+    def error(self, kept: float) -> float:
+        """Standard error of such a share, as if the places were random."""
+        share, count = self.shares[0], max(1, len(self.places[0]))
+        lost = min(1.0, (1.0 - kept) / max(share, 1e-9))
+        return share * math.sqrt(lost * (1.0 - lost) / count)
+
+
+_Asked = Callable[[Manipulator, ReachableSolid], float]
+"""A number of an arm that is made, and of its reachable set."""
+
+
+def _made(
+    first: FirstOrder, asked: list[_Asked], starts: list[list[Array]], change: Array
+) -> tuple[list[float], list[Mask]] | None:
+    """Numbers of an arm with deviations, and the places that it reaches; None without one."""
+    with parallel.undivided(), no_warnings():
+        try:
+            arm = first.deviations.made(change)
+            solid = reachable_set(arm, accuracy=first.accuracy)
+            if not isinstance(solid, ReachableSolid):
+                return None
+            pairs = zip(first.targets, starts, strict=True)
+            return [ask(arm, solid) for ask in asked], [_reached(arm, first, *x) for x in pairs]
+        except InvalidDesign:
+            return None
+        except InvalidInput as error:
+            if error.name != "loads":
+                raise
+            return None
+
+
+def _tried(count: int) -> Index:
+    """Numbers of the places that arms are made for, evenly spread over all."""
+    return np.unique(np.linspace(0, count - 1, min(count, _MOST_TRIED)).astype(np.int64))
+
+
+def _places(target: Target) -> Array:
+    assert target.places is not None
+    return target.places[_tried(len(target.places))]
+
+
+def _starts(first: FirstOrder, target: Target) -> list[Array]:
+    """Places of the cube to search from: of all solutions of the design, and of a grid."""
+    arm, places = first.deviations.arm, _places(target)
+    box, solutions = as_tip_map(arm).box, solve_inverse(arm, places, from_rest=True)
+    rows = [solutions.nearest_activations]
+    for number in range(int(solutions.counts.max(initial=0))):
+        has = solutions.counts > number
+        row = solutions.nearest_activations.copy()
+        row[has] = solutions.activations[solutions.offsets[:-1][has] + number]
+        rows.append(row)
+    known = [np.nan_to_num(box.to_cube(row)[:, box.free], nan=0.5) for row in rows]
+    grid = sample_cube("sobol", _STARTS, box.dimension)
+    return [*known, *(np.tile(start, (len(places), 1)) for start in grid)]
+
+
+def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[Array]) -> Mask:
+    """Places that an arm reaches under every payload, of those that are tried: by searches."""
+    places = _places(target)
+    within, held = max(target.within, TOL * arm.length), np.ones(len(places), bool)
+    for payload in first.needs.payloads or (None,):
+        rod, gaps = as_tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
+        for start in starts:
+            left = np.flatnonzero(gaps > within)
+            if len(left):
+                gamma = rod.box.from_free_cube(start[left])
+                nearest = nearest_tips(rod, gamma, places[left], within)
+                gaps[left] = np.fmin(gaps[left], nearest.distance)
+        held &= gaps <= within
+    return held
+
+
+def _share(first: FirstOrder, target: Target, arm: Manipulator, solid: ReachableSolid) -> float:
+    places, share = region_places(target), 1.0
+    for payload in first.needs.payloads or (None,):
+        loaded = with_payload(arm, payload)
+        own = solid if loaded is arm else reachable_set(loaded, accuracy=first.accuracy)
+        if not isinstance(own, ReachableSolid):
+            return 0.0
+        inside = own.distance(places) <= target.within if target.within else own.contains(places)
+        share = min(share, float(inside.mean()))
+    return share

@@ -1,80 +1,44 @@
-"""What a part of the report found, on disk as soon as it is done, and the sizes of its clouds."""
+"""What sections of the report share: sizes of clouds, numbers and figures on disk, findings."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
-from typing import Any, Self
+from types import SimpleNamespace
+from typing import Any, NamedTuple, Self
 
 from softreach.plot.style import pyplot, save_figure
 from softreach.support.files.atomic import writing
 
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure of the report."""
-
-    label: str
-    """Number of the figure in the paper, such as "2a"; empty for one of our own."""
-    name: str
-    """Of its files, without suffix."""
-    caption: str
+Numbers = SimpleNamespace
+"""Numbers that a section computed, by name."""
 
 
-@dataclass
-class Notebook:
-    """Numbers and figures of one part; `close` makes them last, so that a rerun skips the part."""
+class Verdict(StrEnum):
+    """Verdict on a statement."""
 
-    folder: Path
-    """Of the figures, within that of all results."""
-    part: str
-    key: Mapping[str, Any]
-    """Everything that the results depend on; a notebook of another key is stale."""
-    numbers: dict[str, Any] = field(default_factory=dict)
-    """Plain ones, texts, lists or dicts of them."""
-    pictures: list[Picture] = field(default_factory=list)
-    seconds: float = 0.0
+    AGREES = "agrees"
+    NEARLY = "nearly"
+    DIFFERS = "differs"
+    MISPRINT = "misprint"
+    OPEN = "open"
+    UNTESTED = "not tested"
 
-    def note(self, **numbers: Any) -> None:
-        """Keep numbers by name."""
-        self.numbers |= numbers
 
-    def draw(self, label: str, name: str, caption: str, figure: Any) -> None:
-        """Save a figure, or axes in it, as PNG and PDF, and close it."""
-        for suffix in ("png", "pdf"):
-            save_figure(figure, self.folder / f"{name}.{suffix}", overwrite=True)
-        pyplot().close(figure.get_figure(root=True))
-        self.pictures.append(Picture(label, name, caption))
+class Finding(NamedTuple):
+    """Result of a check."""
 
-    def close(self, seconds: float) -> None:
-        """Write what was found; the last act, so that a file means a finished part."""
-        self.seconds = seconds
-        content = asdict(self) | {"folder": None, "key": dict(self.key)}
-        with writing(self._file, overwrite=True) as file:
-            file.write(json.dumps(content, indent=1).encode())
+    text: str
+    verdict: Verdict
 
-    @classmethod
-    def opened(cls, folder: Path, part: str, key: Mapping[str, Any]) -> Self | None:
-        """The finished notebook of a part, or None if there is none of that key."""
-        book = cls(folder, part, key)
-        try:
-            stored = json.loads(book._file.read_text(encoding="utf-8"))
-            same = stored["key"] == json.loads(json.dumps(dict(key)))
-            book.pictures = [Picture(**picture) for picture in stored["pictures"]]
-            book.numbers, book.seconds = stored["numbers"], stored["seconds"]
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
-        return book if same and all(book.png(p).is_file() for p in book.pictures) else None
 
-    def png(self, picture: Picture) -> Path:
-        """The file of a picture."""
-        return self.folder / f"{picture.name}.png"
-
-    @property
-    def _file(self) -> Path:
-        return self.folder / f"{self.part}.json"
+def judged(text: str, agrees: object, nearly: object = False) -> Finding:
+    """A finding whose verdict follows from whether it agrees, or nearly does."""
+    verdict = Verdict.AGREES if agrees else Verdict.NEARLY if nearly else Verdict.DIFFERS
+    return Finding(text, verdict)
 
 
 @dataclass(frozen=True)
@@ -104,3 +68,61 @@ FULL = Settings(16, 400_000, 0.05, 7, 3e-3, 2_000_000, 10_000)
 
 QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)
 """Coarse numbers in under a minute."""
+
+
+class Picture(NamedTuple):
+    """A figure of the report."""
+
+    label: str
+    """Number of the figure in the paper, such as "2a"; empty for one of our own."""
+    name: str
+    """Of its files, without suffix."""
+    caption: str
+
+
+@dataclass
+class Notebook:
+    """Numbers and figures of one part; `close` writes its file last, so a rerun skips the part."""
+
+    folder: Path
+    """Of the figures, within that of all results."""
+    part: str
+    key: Mapping[str, Any]
+    """Everything that the results depend on; a notebook of another key is stale."""
+    numbers: dict[str, Any] = field(default_factory=dict)
+    """What JSON can hold."""
+    pictures: list[Picture] = field(default_factory=list)
+    seconds: float = 0.0
+
+    def draw(self, label: str, name: str, caption: str, figure: Any) -> None:
+        """Save a figure, or axes in it, as PNG and PDF, and close it."""
+        for suffix in ("png", "pdf"):
+            save_figure(figure, self.folder / f"{name}.{suffix}", overwrite=True)
+        pyplot().close(figure.get_figure(root=True))
+        self.pictures.append(Picture(label, name, caption))
+
+    def close(self, seconds: float) -> None:
+        """Write what was found."""
+        self.seconds = seconds
+        content = {name: value for name, value in vars(self).items() if name != "folder"}
+        with writing(self._file, overwrite=True) as file:
+            file.write(json.dumps(content, indent=1).encode())
+
+    @classmethod
+    def opened(cls, folder: Path, part: str, key: Mapping[str, Any]) -> Self | None:
+        """The finished notebook of a part, or None if there is none of that key."""
+        try:
+            book = cls(folder, **json.loads((folder / f"{part}.json").read_text(encoding="utf-8")))
+            book.pictures = [Picture(*picture) for picture in book.pictures]
+        except (OSError, ValueError, TypeError):
+            return None
+        whole = all(book.png(picture).is_file() for picture in book.pictures)
+        return book if whole and book.key == json.loads(json.dumps(dict(key))) else None
+
+    def png(self, picture: Picture) -> Path:
+        """The file of a picture."""
+        return self.folder / f"{picture.name}.png"
+
+    @property
+    def _file(self) -> Path:
+        return self.folder / f"{self.part}.json"

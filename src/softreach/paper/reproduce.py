@@ -6,10 +6,11 @@ import hashlib
 import json
 import os
 import platform
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.resources import files
@@ -18,23 +19,17 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from softreach.paper.claims import CLAIMS, Verdict
-from softreach.paper.notebook import FULL, QUICK, Notebook, Settings
-from softreach.paper.sections.misprints import misprints
-from softreach.paper.sections.model import model
-from softreach.paper.sections.redundancy import redundancy
-from softreach.paper.sections.sweep import sweep
-from softreach.paper.sections.uniqueness import uniqueness
-from softreach.paper.sections.volume import volume
+from softreach.paper.notebook import FULL, QUICK, Finding, Notebook, Numbers, Settings, Verdict
+from softreach.paper.sections import misprints, model, redundancy, sweep, uniqueness, volume
 from softreach.plot.style import pyplot
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import MARK, check_place, writing
 from softreach.support.files.formats import check_installed
 from softreach.support.report import Report, Section
 
-__all__ = ["PARTS", "reproduce_paper"]
+__all__ = ["CLAIMS", "PARTS", "Claim", "reproduce_paper"]
 
-PARTS: Mapping[str, Callable[[Settings, Notebook], None]] = {
+_SECTIONS = {
     "model": model,
     "misprints": misprints,
     "redundancy": redundancy,
@@ -42,7 +37,43 @@ PARTS: Mapping[str, Callable[[Settings, Notebook], None]] = {
     "sweep": sweep,
     "uniqueness": uniqueness,
 }
-"""Name -> what computes it, from the sizes and a notebook; short ones first."""
+
+PARTS: dict[str, Callable[[Settings, Notebook], dict[str, Any]]] = {
+    name: section.computed for name, section in _SECTIONS.items()
+}
+"""Name -> what draws its figures and returns its numbers; short ones first."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper and its check."""
+
+    section: str
+    """Its section of the paper."""
+    says: str
+    """The statement, in the paper's words or nearly so."""
+    how: str
+    """How it is checked."""
+    part: str
+    """The part of the report that computes the numbers."""
+    judge: Callable[[Numbers], Finding]
+    full: bool = False
+    """True if only the full sizes test it."""
+
+    def check(self, numbers: Mapping[str, Any]) -> Finding:
+        """Finding from the numbers of its part."""
+        return self.judge(Numbers(**numbers))
+
+
+def _claims() -> Iterator[Claim]:
+    text = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
+    for name, row in tomllib.loads(text).items():
+        part, function = name.split(".")
+        yield Claim(**row, part=part, judge=getattr(_SECTIONS[part], function))
+
+
+CLAIMS = tuple(_claims())
+"""Every statement that is checked, in the paper's order."""
 
 _PAPER = (
     "Kaczmarski, Moulton, Goriely, Kuhl: Minimal activation with maximal reach: Reachability "
@@ -77,29 +108,27 @@ def reproduce_paper(
         NotWritten: The folder cannot be written to.
     """
     # What is missing is reported now, not after a quarter of an hour.
-    check_installed(("matplotlib", "plot"), ("skimage", "surface"), ("jinja2", "paper"))
+    check_installed(("matplotlib", "plot"), ("skimage", "surface"), ("jinja2", "report"))
     pyplot()
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)
-    path = folder / "report.html"
+    path, pages = folder / "report.html", folder / "figures"
     check_place(path, overwrite=overwrite, name="out")
-    key = {**asdict(settings), "softreach": version("softreach"), "source": _source()}
-    _claim(folder / "figures", key, overwrite=overwrite)
+    code = b"".join(p.read_bytes() for p in sorted(Path(__file__).parents[1].rglob("*.py")))
+    source = hashlib.sha256(code).hexdigest()  # what other code computed is computed again
+    key = {**asdict(settings), "softreach": version("softreach"), "source": source}
+    _claim(pages, key, overwrite=overwrite)
     notebooks: dict[str, Notebook] = {}
-    for number, name in enumerate(PARTS, 1):
+    for number, (name, compute) in enumerate(PARTS.items(), 1):
         say(f"[{number}/{len(PARTS)}] {name}")
-        notebooks[name] = _computed(name, settings, folder / "figures", key)
-        say(f"      {notebooks[name].seconds:.1f} s")
-    report_of(notebooks, settings, quick).save(path, overwrite=overwrite)
+        if (notes := Notebook.opened(pages, name, key)) is None:
+            notes, start = Notebook(pages, name, key), perf_counter()
+            notes.numbers = json.loads(json.dumps(compute(settings, notes)))
+            notes.close(perf_counter() - start)
+        notebooks[name] = notes
+        say(f"      {notes.seconds:.1f} s")
+    _report(notebooks, settings, quick).save(path, overwrite=overwrite)
     return path
-
-
-def _source() -> str:
-    """A digest of the library's code: what other code computed is computed again."""
-    root = files("softreach")
-    assert isinstance(root, Path)
-    texts = [path.read_bytes() for path in sorted(root.rglob("*.py"))]
-    return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
 def _claim(pages: Path, key: Mapping[str, Any], *, overwrite: bool) -> None:
@@ -114,27 +143,9 @@ def _claim(pages: Path, key: Mapping[str, Any], *, overwrite: bool) -> None:
         file.write(json.dumps(dict(key), indent=1).encode())
 
 
-def _computed(name: str, settings: Settings, pages: Path, key: Mapping[str, Any]) -> Notebook:
-    """The notebook of a part: of an earlier run, or written now."""
-    if (done := Notebook.opened(pages, name, key)) is not None:
-        return done
-    notes, start = Notebook(pages, name, key), perf_counter()
-    PARTS[name](settings, notes)
-    notes.close(perf_counter() - start)
-    return notes
-
-
-def report_of(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) -> Report:
-    """What was found beside what the paper says.
-
-    Args:
-        notebooks: What each part found, by name.
-        settings: The sizes it was computed with.
-        quick: Whether these are small ones.
-    """
+def _report(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) -> Report:
     rows = list(_rows(notebooks, quick))
     counts = Counter(row[-1] for row in rows)
-    machine = f"{os.cpu_count()} cores, {platform.system()} on {platform.machine()}"
     facts = [
         _PAPER,
         f"Every number and every verdict is computed by softreach {version('softreach')}; only the "
@@ -148,6 +159,7 @@ def report_of(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool
             "Its numbers are coarse; what only the full sizes test is marked so"
         )
     times = [(name, f"{notes.seconds:.1f} s") for name, notes in notebooks.items()]
+    machine = f"{os.cpu_count()} cores, {platform.system()} on {platform.machine()}"
     note = f"{machine}, Python {platform.python_version()}. A first run compiles, too."
     head = ("Section", "The paper says", "softreach finds", "How", "Verdict")
     return Report(

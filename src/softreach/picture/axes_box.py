@@ -24,7 +24,7 @@ _FLAT = 0.25  # of its length, that a tick along the floor has at least in the p
 class Edge(NamedTuple):
     """The edge that carries the numbers of an axis."""
 
-    high: tuple[bool, bool, bool]
+    high: tuple[bool, ...]
     """True where it is at the high side, along x, y and z."""
     outward: int
     """The axis along which its ticks lead out of the box."""
@@ -33,13 +33,13 @@ class Edge(NamedTuple):
 class Side(NamedTuple):
     """Side from which a box is seen: all that its drawing depends on."""
 
-    visible: tuple[int, int, int]
+    visible: tuple[int, ...]
     """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""
-    edges: tuple[Edge | None, Edge | None, Edge | None]
+    edges: tuple[Edge | None, ...]
     """With the numbers of x, y and z; None of an axis that is seen end on."""
-    steps: tuple[float, float, float]
+    steps: tuple[float, ...]
     """From one number to the next [L]."""
-    names: tuple[float, float, float] = (_NAME_AT, _NAME_AT, _NAME_AT)
+    names: tuple[float, ...]
     """From an edge to the name of its axis, in ticks."""
 
 
@@ -62,11 +62,11 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
         focal: Focal length of the camera [pixel]: numbers have room between each other.
     """
     place = np.asarray(camera, float)
-    x, y, z = ((place > high).astype(int) - (place < low)).tolist()
+    visible = tuple(((place > high).astype(int) - (place < low)).tolist())
     toward = place - (low + high) / 2
     toward /= max(float(np.linalg.norm(toward)), 1e-12)
     picture = _picture(toward)
-    edges = [_outer_edge(axis, (x, y, z), toward, picture) for axis in range(3)]
+    edges = [_outer_edge(axis, visible, toward, picture) for axis in range(3)]
     usual = _round_step(float((high - low).max()))
     steps, names = [usual] * 3, [_NAME_AT] * 3
     for axis, edge in enumerate(edges):
@@ -80,12 +80,7 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
             tick = _seen(ends - place, toward, picture)
             away = np.ceil(_NUMBERS_AT + _room(tick, focal, (_BESIDE, _ABOVE)))
             names[axis] = float(np.clip(away, _NAME_AT, _FARTHEST))
-    return Side(
-        (x, y, z),
-        (edges[0], edges[1], edges[2]),
-        (steps[0], steps[1], steps[2]),
-        (names[0], names[1], names[2]),
-    )
+    return Side(visible, tuple(edges), tuple(steps), tuple(names))
 
 
 def _seen(ends: Array, toward: Array, picture: Array) -> Array:
@@ -111,9 +106,7 @@ def _picture(toward: Array) -> Array:
     return np.stack([right, np.cross(toward, right)])
 
 
-def _outer_edge(
-    axis: int, visible: tuple[int, int, int], toward: Array, picture: Array
-) -> Edge | None:
+def _outer_edge(axis: int, visible: tuple[int, ...], toward: Array, picture: Array) -> Edge | None:
     """The lowest edge in the outline, the leftmost of upright ones: one of its faces is seen."""
     if abs(toward[axis]) > _END_ON:
         return None
@@ -126,7 +119,7 @@ def _outer_edge(
     first = p * aims[b] > q * aims[c] if axis == 2 else reach[b] > _FLAT
     high = [False, False, False]
     high[b], high[c] = p > 0, q > 0
-    return Edge((high[0], high[1], high[2]), b if first else c)
+    return Edge(tuple(high), b if first else c)
 
 
 def axes_box(

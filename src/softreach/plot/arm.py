@@ -240,7 +240,7 @@ def plot_check(
         check: What `check` returned.
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
-        unit: Of the axes: "m", "cm", "mm" or "L"; None for L.
+        unit: Of the axes: "m", "cm", "mm" or "L"; None for that of the design, as in the report.
 
     Returns:
         The axes, in that unit.
@@ -253,7 +253,7 @@ def plot_check(
         raise InvalidInput("check", as_given(check), "what `check` returned")
     arm = check.arm
     ax, _ = panel_arguments(ax, view, None)
-    counted = unit_for(arm.length, unit)
+    counted = unit_for(arm.length, arm.length_unit if unit is None else unit)
     shapes = shapes_of(check.shapes(_POSES)) or [rest_configuration(arm)]
     with figure_style(ax):
         points = [arm_points(arm, shape, counted) for shape in shapes]

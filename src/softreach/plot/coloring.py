@@ -117,7 +117,11 @@ def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring
         key = BundleKey(names, lights, symbols)
         return Coloring(activation_colors(_comparable(activation.values, units)), key)
     if isinstance(color, str | int | np.integer) and not isinstance(color, bool):
-        bundle = _bundle(names, color)
+        known = f"a bundle ({', '.join(names)}) or its index"
+        if color not in names and color not in range(len(names)):
+            allowed = f'"rgb", "strongest", "effort", {known}, or an array'
+            raise InvalidInput("color", color, allowed)
+        bundle = names.index(color) if isinstance(color, str) else int(color)
         magnitude = np.abs(activation.values[:, bundle])
         unit = "" if units[bundle] == "1" else f" [{units[bundle]}]"
         return Coloring(*_scalar(magnitude, f"|{symbols[bundle]}| {names[bundle]}{unit}", 0.0))
@@ -166,10 +170,9 @@ def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
 def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
     """Names of the bundles, or their numbers from 1 up if the cloud has none."""
     activation = bundle_activations(cloud)
-    bundle = activation.dims[1]
-    if bundle in activation.coords:
-        return tuple(str(name) for name in activation[bundle].values)
-    return tuple(str(k + 1) for k in range(activation.shape[1]))
+    bundle, count = activation.dims[1], activation.shape[1]
+    named = bundle in activation.coords
+    return tuple(map(str, activation[bundle].values if named else range(1, count + 1)))
 
 
 def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
@@ -177,34 +180,26 @@ def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
     if isinstance(key, ScalarKey):
         bar = {"label": key.label, "fraction": 0.046, "pad": 0.03, "extend": key.extend}
         ax.figure.colorbar(color_map(key), ax=ax, **bar)
-    if key is not None:
-        _draw_legend(ax, key, _LINE, 2)
+    _draw_legend(ax, key, _LINE, 2)
 
 
 def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: float) -> None:
-    """Explain the colors once for a figure, at its upper edge.
-
-    Args:
-        figure: A figure with room there.
-        key: What to explain; None for nothing.
-        top: Height of that room, as a share of the figure.
-    """
+    """Explain the colors once for a figure, in the room at its upper edge of a share `top`."""
     place = (0.5, 1 - top / 2)
     if isinstance(key, ScalarKey):
         place = (0.88, 1 - 0.4 * top)
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
         figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=key.extend)
         bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
-    if key is not None:
-        _draw_legend(figure, key, _PAGE, 4, loc="center", bbox_to_anchor=place)
+    _draw_legend(figure, key, _PAGE, 4, loc="center", bbox_to_anchor=place)
 
 
 def _draw_legend(
-    owner: Axes | Figure, key: BundleKey | ScalarKey, room: int, columns: int, **place: Any
+    owner: Axes | Figure, key: BundleKey | ScalarKey | None, room: int, columns: int, **place: Any
 ) -> None:
     """Title and entries in one line where there is room, else in columns below the title."""
-    entries, title = key_entries(key), key.title if isinstance(key, BundleKey) else ""
-    names = key.names if isinstance(key, BundleKey) else ()
+    entries = key_entries(key)
+    title, names = (key.title, key.names) if isinstance(key, BundleKey) else ("", ())
     if len(title) + sum(len(name) + 6 for name in names) <= room:
         entries = [(title, "none"), *entries] if title else entries
         title, columns = "", len(entries)
@@ -214,11 +209,11 @@ def _draw_legend(
         draw_entries(owner, entries, **look | place)
 
 
-def key_entries(key: BundleKey | ScalarKey) -> list[tuple[str, Any]]:
+def key_entries(key: BundleKey | ScalarKey | None) -> list[tuple[str, Any]]:
     """Label and RGB from 0 to 1 of what has a color by itself; unstable samples are the last."""
     named = zip(key.labels, key.colors / 255, strict=True) if isinstance(key, BundleKey) else ()
     unstable = ("unstable", np.array(UNSTABLE) / 255)
-    return [*named, unstable] if key.unstable else [*named]
+    return [*named, unstable] if key is not None and key.unstable else [*named]
 
 
 def draw_entries(owner: Axes | Figure, entries: Iterable[tuple[str, Any]], **look: Any) -> None:
@@ -226,15 +221,6 @@ def draw_entries(owner: Axes | Figure, entries: Iterable[tuple[str, Any]], **loo
     from matplotlib.patches import Patch
 
     owner.legend(handles=[Patch(facecolor=color, label=label) for label, color in entries], **look)
-
-
-def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
-    if isinstance(color, str) and color in names:
-        return names.index(color)
-    if not isinstance(color, str) and 0 <= color < len(names):
-        return int(color)
-    known = f"a bundle ({', '.join(names)}) or its index"
-    raise InvalidInput("color", color, f'"rgb", "strongest", "effort", {known}, or an array')
 
 
 def _given(color: ArrayLike, samples: int) -> Coloring:
@@ -258,10 +244,9 @@ def _given(color: ArrayLike, samples: int) -> Coloring:
 def _scalar(
     values: Array, label: str, low: float | None = None
 ) -> tuple[NDArray[np.uint8], ScalarKey]:
-    finite = np.isfinite(values)
-    some = finite.any()
-    start = float(values.min(where=finite, initial=np.inf)) if low is None and some else low or 0.0
-    stop = float(values.max(where=finite, initial=start)) if some else start + 1.0
+    known = values[np.isfinite(values)]
+    start = low if low is not None else float(known.min()) if known.size else 0.0
+    stop = float(known.max(initial=start)) if known.size else start + 1.0
     return scale_colors(values, start, stop), ScalarKey(label, start, stop)
 
 

@@ -73,7 +73,7 @@ def plot_cross_section(
     arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
     half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
     if legend is None:  # where colors alone leave open what is what
-        plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.bundle_courses) == {"along"}
+        plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.fiber_directions) == {"along"}
         legend = not plain or len(_section_materials(arm.section)) > 1
     legend = as_flag("legend", legend)
     if not 0 <= z <= arm.length:
@@ -85,10 +85,9 @@ def plot_cross_section(
     )
     with figure_style(ax):
         entries = [*_materials(arm), *_bundles(arm, placed)] if legend else []
-        handles, labels = [artist for artist, _ in entries], [label for _, label in entries]
-        if len(labels) > _MOST:
-            labels[_MOST - 1] += f" and {len(labels) - _MOST} more"
-        labels = labels[:_MOST]
+        labels = [label for _, label in entries[:_MOST]]
+        if len(entries) > _MOST:
+            labels[-1] += f" and {len(entries) - _MOST} more"
         room = _HANDLE + _LETTER * max(map(len, labels), default=0) if legend else 0.0
         ax = small_axes(_SIZE + room, _SIZE) if ax is None else ax
         _draw_layers(ax, arm.section, outer)
@@ -100,7 +99,8 @@ def plot_cross_section(
         ax.locator_params(nbins=3)
         if legend:
             place = {"loc": "center left", "bbox_to_anchor": (1.02, 0.5), "borderaxespad": 0.0}
-            ax.legend(handles[:_MOST], labels, frameon=False, fontsize=7, **place)
+            handles = [artist for artist, _ in entries[:_MOST]]
+            ax.legend(handles, labels, frameon=False, fontsize=7, **place)
     return ax
 
 
@@ -131,17 +131,16 @@ def _bundles(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[tuple[Ar
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    symbols = [actuator.symbol for actuator in arm.bundle_actuators]
     for bundle in placed:
+        k, color = bundle.index, bundle.color
         if bundle.shape == "line":
-            handle: Artist = Line2D([], [], **_tendon_style(bundle.color))
+            handle: Artist = Line2D([], [], **_tendon_style(color))
         else:
             lumen = bundle.shape == "lumen"
-            handle = Patch(**_lumen_style(bundle.color)) if lumen else Patch(color=bundle.color)
+            handle = Patch(**_lumen_style(color)) if lumen else Patch(color=color)
         course = "" if bundle.course == "along" else f", {bundle.course}"
-        unit = arm.bundle_units[bundle.index].replace("1", "-")
-        name = arm.bundle_names[bundle.index]
-        yield handle, f"{name}{course}: {symbols[bundle.index]} [{unit}]"
+        symbol, unit = arm.bundle_actuators[k].symbol, arm.bundle_units[k].replace("1", "-")
+        yield handle, f"{arm.bundle_names[k]}{course}: {symbol} [{unit}]"
 
 
 def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
@@ -151,17 +150,16 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
     """
     from matplotlib.patches import Circle
 
-    line = {"edgecolor": _EDGE, "linewidth": 0.6}
-    ax.add_patch(Circle((0, 0), outer, facecolor="0.97", **line))
+    ax.add_patch(Circle((0, 0), outer, facecolor="0.97", edgecolor=_EDGE, linewidth=0.6))
     several = len(_section_materials(section)) > 1
     if several and section.inner_ratio > section.bore_ratio:
         _draw_material(ax, section, section.core_material, 0.0, outer * section.inner_ratio)
-    _draw_voids(ax, section, outer)
+    for low, high in _voids(section):
+        ax.add_patch(_annulus(outer * low, outer * high, "white"))
     for k, ring in enumerate(section.rings):
         low, high = ring.inner_ratio, ring.outer_ratio
-        over = any(
-            low < other.outer_ratio and other.inner_ratio < high for other in section.rings[:k]
-        )
+        below = section.rings[:k]
+        over = any(low < other.outer_ratio and other.inner_ratio < high for other in below)
         if several:
             alpha = 0.5 if over else 1.0
             _draw_material(ax, section, ring.material, outer * low, outer * high, alpha)
@@ -223,7 +221,7 @@ def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> lis
     outline = arm.outline(z)
     sizes = (outline.center[0], outline.extent, outline.inner_ratio[0], outline.outer_ratio[0])
     return [
-        _Placed(k, outline.shape[k], arm.bundle_courses[k], *(float(size[k]) for size in sizes))
+        _Placed(k, outline.shape[k], arm.fiber_directions[k], *(float(size[k]) for size in sizes))
         for k in bundles
         if outline.acts[0, k]
     ]
@@ -278,16 +276,15 @@ def _draw_material(
     ax.add_patch(_annulus(low, high, "none"))
 
 
-def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
-    reached = section.bore_ratio
-    voids = [(0.0, reached)] if reached > 0 else []
-    reached = max(reached, section.inner_ratio)
+def _voids(section: Section) -> Iterator[tuple[float, float]]:
+    """Bore and gaps between rings, from one ratio to another."""
+    if section.bore_ratio > 0:
+        yield 0.0, section.bore_ratio
+    reached = max(section.bore_ratio, section.inner_ratio)
     for ring in sorted(section.rings, key=lambda ring: ring.inner_ratio):
         if ring.inner_ratio > reached:
-            voids.append((reached, ring.inner_ratio))
+            yield reached, ring.inner_ratio
         reached = max(reached, ring.outer_ratio)
-    for low, high in voids:
-        ax.add_patch(_annulus(outer * low, outer * high, "white"))
 
 
 def _annulus(low: float, high: float, fill: Any) -> Patch:
@@ -310,25 +307,18 @@ def _draw_strokes(ax: Axes, bundle: _Placed, outer: float) -> None:
     """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
     from matplotlib.collections import LineCollection
 
-    lean = {"along": None, "radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[
-        bundle.course
-    ]
-    if lean is None:
+    if bundle.course == "along":
         return
+    lean = {"radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[bundle.course]
     half = 0.5 * (bundle.extent - abs(lean))
     if half <= 0:
         half, lean = 0.4 * bundle.extent, np.sign(lean) * min(abs(lean), 0.2 * bundle.extent)
     angles = bundle.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
-    ends = [
-        outer * ratio * np.column_stack([np.cos(at), np.sin(at)])
-        for ratio, at in (
-            (bundle.inner_ratio, angles - lean / 2),
-            (bundle.outer_ratio, angles + lean / 2),
-        )
-    ]
-    strokes = np.stack(ends, axis=1)
+    ends = ((bundle.inner_ratio, angles - lean / 2), (bundle.outer_ratio, angles + lean / 2))
+    points = [outer * r * np.column_stack([np.cos(at), np.sin(at)]) for r, at in ends]
     ink = "white" if np.dot(bundle.color, _LIGHTNESS) < 0.55 else "0.3"
-    ax.add_collection(LineCollection(list(strokes), colors=ink, linewidths=0.7))
+    strokes = LineCollection(list(np.stack(points, axis=1)), colors=ink, linewidths=0.7)
+    ax.add_collection(strokes)
 
 
 def _middle(bundle: _Placed, outer: float) -> tuple[list[float], list[float]]:

@@ -82,7 +82,8 @@ def plot_3d(
     kinds = [_kind(thing) for thing in things]
     view_angles(view)
     said = None if caption is None else as_text("caption", caption)
-    lengths = {length for thing in things if (length := _length(thing)) is not None}
+    pairs = zip(kinds, things, strict=True)
+    lengths = {_LENGTHS[kind](thing) for kind, thing in pairs if kind in _LENGTHS} - {None}
     shown_in = unit_for(lengths.pop() if len(lengths) == 1 else None, unit)
     scene = Scene(shown_in, color, kinds)
     scene.add(things)
@@ -152,7 +153,7 @@ class Scene:
         dots = Dots(tips, coloring.rgb[chosen])
         size = point_size(len(tips), np.array([tips.min(axis=0), tips.max(axis=0)]))
         self.parts.append(PagePart(name, dots, size=size))
-        self.keys += _page_keys(coloring.key)
+        self.keys += page_keys(coloring.key)
 
     def add_set(self, reached: Any) -> None:
         """A reachable set: its surface, or the points of a curve."""
@@ -180,12 +181,10 @@ class Scene:
         """Triangles, fewer of them if they are many."""
         mesh = a_surface("data", mesh)
         vertices, faces = self.unit.of(mesh.vertices), np.asarray(mesh.faces)
-        if len(faces) > self.detail.triangles:
-            every = len(faces)
+        instead = f" instead of {len(faces):,}" if len(faces) > self.detail.triangles else ""
+        if instead:
             vertices, faces = simplified(vertices, faces, self.detail.triangles)
-            self.notes.append(f"{len(faces):,} instead of {every:,} triangles")
-        else:
-            self.notes.append(f"{len(faces):,} triangles")
+        self.notes.append(f"{len(faces):,}{instead} triangles")
         name, number = self._name(word), sum(part.surface for part in self.parts)
         tint = _SURFACES[number % len(_SURFACES)]
         several = sum(kind in ("set", "hull", "surface") for kind in self.kinds) > 1
@@ -263,6 +262,14 @@ class Scene:
 
 
 _CLASSES = {"AllEquilibria": "equilibria", "ReachableSet": "set", "Hull": "hull"}
+_LENGTHS = {
+    "cloud": lambda thing: thing["tip"].attrs.get("length"),
+    "configuration": lambda thing: design_of(thing).length,
+    "arm": attrgetter("length"),
+    "set": attrgetter("arm.length"),
+    "equilibria": attrgetter("rod.arm.length"),
+}
+"""L [m] of the arm that a thing is of, by its kind."""
 
 
 def _kind(thing: Any) -> str:
@@ -284,23 +291,11 @@ def _kind(thing: Any) -> str:
     raise InvalidInput("data", as_given(thing), allowed)
 
 
-def _length(thing: Any) -> float | None:
-    """L [m] of the arm that a thing is of; None where it is not known."""
-    kind = _kind(thing)
-    if kind == "cloud":
-        return thing["tip"].attrs.get("length")
-    if kind == "configuration":
-        return design_of(thing).length
-    arms = {"arm": "length", "set": "arm.length", "equilibria": "rod.arm.length"}
-    return attrgetter(arms[kind])(thing) if kind in arms else None
-
-
-def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
-    if key is None:
-        return []
+def page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
+    """A key as pages have it: colors that stand for something each, and a scale of numbers."""
     marks = [(label, css_color(rgb)) for label, rgb in key_entries(key)]
-    if isinstance(key, BundleKey):
-        return [Swatches(marks, key.title)]
+    if not isinstance(key, ScalarKey):
+        return [] if key is None else [Swatches(marks, key.title)]
     scale = color_map(key)
     shares = np.linspace(0.0, 1.0, 17)
     colors = [css_color(rgb[:3]) for rgb in scale.cmap(shares)]

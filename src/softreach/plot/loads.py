@@ -215,13 +215,12 @@ def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:
+    """Where the tip of a ring of equilibria may be [m], shape (n, 3)."""
     assert equilibria.solver is not None
-    pose = equilibria.rod.pose
-    axis, tip = equilibria.solver.tables.axes[0], pose.to_base(equilibria.tips[k])
-    angle = np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
+    pose, axis = equilibria.rod.pose, equilibria.solver.tables.axes[0]
+    tip, angle = pose.to_base(equilibria.tips[k]), np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
     along, across = (tip @ axis) * axis, np.cross(axis, tip)
-    turned = along + np.cos(angle) * (tip - along) + np.sin(angle) * across
-    return pose.to_world(turned)
+    return pose.to_world(along + np.cos(angle) * (tip - along) + np.sin(angle) * across)
 
 
 def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
@@ -231,17 +230,13 @@ def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
     right, up = on_paper(equilibria.rod.pose.directions_to_world(tables.axes[0]), panel.view)
     if np.hypot(right, up) < _SHORTEST_ARROW:
         return
+    place = {"xycoords": "axes fraction", "textcoords": "offset points", "zorder": 4}
     panel.ax.annotate(
         "g" if any(tables.loads.gravity) else "force",
-        xy=(0.09, 0.86),
-        xycoords="axes fraction",
-        xytext=(-_ARROW * right, -_ARROW * up),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=8,
+        (0.09, 0.86),
+        (-_ARROW * right, -_ARROW * up),
+        **{"ha": "center", "va": "center", "fontsize": 8, **place},
         arrowprops={"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0},
-        zorder=4,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,14 +38,11 @@ _ABOVE, _LINE, _ENDS = 2.5, 0.24, 0.75  # heights of panels, of a parameter, and
 _COARSE: dict[str, Any] = {"marker": "o", "s": 14, "facecolors": "none", "linewidths": 0.7}
 _FINAL: dict[str, Any] = {"marker": "D", "s": 24, "color": BEST, "linewidths": 0, "zorder": 4}
 _OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": MISSED, "linewidths": 0.8, "zorder": 3}
+_BARS: dict[str, Any] = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zorder": 4}
 _MOST_LINES = 200
 
 
-class _HasDataset(Protocol):
-    def to_dataset(self) -> xr.Dataset: ...
-
-
-def _dataset_of(name: str, result: _HasDataset, maker: str, variable: str) -> xr.Dataset:
+def _dataset_of(name: str, result: Any, maker: str, variable: str) -> xr.Dataset:
     of_maker = hasattr(result, "to_dataset") and not isinstance(result, type)
     data = result.to_dataset() if of_maker else None
     if data is None or variable not in getattr(data, "variables", {}):
@@ -53,9 +50,7 @@ def _dataset_of(name: str, result: _HasDataset, maker: str, variable: str) -> xr
     return data
 
 
-def plot_calibration(
-    calibration: _HasDataset, *, view: View = "oblique", unit: Unit = None
-) -> Figure:
+def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = None) -> Figure:
     """Draw how far measured and predicted places of the markers are apart.
 
     In space, with a line from each measured place to the predicted one; the distances by marker, in
@@ -65,7 +60,7 @@ def plot_calibration(
     Args:
         calibration: What `calibrate` returned.
         view: The direction of sight of the picture in space, as in `plot_cloud`.
-        unit: Unit of lengths, m, cm, mm or L; None for mm, or m for arms from 1 m.
+        unit: Unit of lengths, m, cm, mm or L; None for that of the design, as in the report.
 
     Raises:
         InvalidInput: Unknown view or unit, or no calibration.
@@ -73,22 +68,20 @@ def plot_calibration(
     """
     data = _dataset_of("calibration", calibration, "calibrate", "residual")
     view_angles(view)
-    length = float(data.attrs["length"])
-    shown = _Errors(data, unit_for(length, handy_unit(length) if unit is None else unit))
+    arm = calibration.arm
+    shown = _Errors(data, unit_for(arm.length, arm.length_unit if unit is None else unit))
     inputs = shown.moving_inputs
     rows = math.ceil(len(inputs) / _COLUMNS)
     with figure_style():
-        size = (_WIDTH, _SPACE + _ROW * rows)
-        figure = pyplot().figure(figsize=size, layout="constrained")
-        heights = [_SPACE, _ROW * rows][: 1 + (rows > 0)]
+        heights = [_SPACE, *[_ROW * rows] * (rows > 0)]
+        figure = pyplot().figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
         parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-        upper = parts[0]
-        grid = upper.add_gridspec(2, 2, width_ratios=[1.25, 1.0])
-        _draw_places(upper.add_subplot(grid[:, 0]), shown, view)
-        _draw_markers(upper.add_subplot(grid[0, 1]), shown)
-        _draw_order(upper.add_subplot(grid[1, 1]), shown)
-        if rows:
-            axes = parts[1].subplots(rows, min(_COLUMNS, len(inputs)), sharey=True, squeeze=False)
+        grid = parts[0].add_gridspec(2, 2, width_ratios=[1.25, 1.0])
+        _draw_places(parts[0].add_subplot(grid[:, 0]), shown, view)
+        _draw_markers(parts[0].add_subplot(grid[0, 1]), shown)
+        _draw_order(parts[0].add_subplot(grid[1, 1]), shown)
+        for part in parts[1:]:
+            axes = part.subplots(rows, min(_COLUMNS, len(inputs)), sharey=True, squeeze=False)
             for ax, k in zip(axes.flat, inputs, strict=False):
                 _draw_input(ax, shown, k)
             for ax in axes[:, 0]:
@@ -132,17 +125,17 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
     from matplotlib.collections import LineCollection
 
     near = np.isfinite(shown.distance) & (shown.distance <= shown.top)
-    measured, predicted = shown.measured[near], shown.predicted[near]
-    box = bounding_box(measured, predicted)
+    places = shown.measured[near], shown.predicted[near]
+    box = bounding_box(*places)
     colors = [shown.colors[k] for k in np.nonzero(near)[1]]
-    here, there = on_paper(measured, view), on_paper(predicted, view)
-    lines = LineCollection(list(np.stack([here, there], axis=1)), colors=colors, linewidths=0.7)
-    lines.set_zorder(2)
-    ax.add_collection(lines)
-    size = 10 if len(here) < 1000 else 3
+    here, there = (on_paper(points, view) for points in places)
+    lines = np.stack([here, there], axis=1)
+    ax.add_collection(LineCollection(list(lines), colors=colors, linewidths=0.7, zorder=2))
+    size: Any = 10 if len(here) < 1000 else 3
+    hollow: dict[str, Any] = {"facecolors": "none", "linewidths": 0.7}
     ax.scatter(*here.T, s=size, color=_MEASURED, linewidths=0, zorder=3, label="measured")
-    ax.scatter(*there.T, s=size, facecolors="none", edgecolors=colors, linewidths=0.7, zorder=4)
-    ax.scatter([], [], s=10, facecolors="none", edgecolors="0.2", linewidths=0.7, label="predicted")
+    ax.scatter(*there.T, s=size, edgecolors=colors, zorder=4, **hollow)
+    ax.scatter([], [], s=10, edgecolors="0.2", label="predicted", **hollow)
     left, right, low, high = view_extent(box, view)
     mirror = -1 if is_mirrored(view) else 1
     ax.set(xlim=(mirror * left, mirror * right), ylim=(low, high), aspect="equal")
@@ -191,7 +184,7 @@ def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
     shown.frame(ax)
 
 
-def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
+def plot_search(search: Any, *, unit: Unit = None) -> Figure:
     """Draw what a search came to: designs that were judged, and the best in their ranges.
 
     Of one objective, its value against the designs that were looked at, with the best so far, and
@@ -200,7 +193,8 @@ def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
 
     Args:
         search: What `search` returned.
-        unit: Unit of lengths and volumes, m, cm, mm or L; None for mm, or m for arms from 1 m.
+        unit: Unit of lengths and volumes, m, cm, mm or L; None for that of the design, as in the
+            report.
 
     Raises:
         InvalidInput: Unknown unit, or no search.
@@ -214,17 +208,12 @@ def plot_search(search: _HasDataset, *, unit: Unit = None) -> Figure:
     with figure_style():
         figure = pyplot().figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
         grid = figure.add_gridspec(2, 2, height_ratios=[_ABOVE, below], width_ratios=[1.6, 1.0])
-        if goals == 1:
-            _draw_progress(figure.add_subplot(grid[0, 0]), shown)
-            _draw_fidelities(figure.add_subplot(grid[0, 1]), shown)
-        elif goals:
-            beside = bool((~shown.feasible & ~shown.final).any())
-            ax = figure.add_subplot(grid[0, 0] if beside else grid[0, :])
-            (_draw_front if goals == 2 else _draw_objectives)(ax, shown)
-            if beside:
-                _draw_missed(figure.add_subplot(grid[0, 1]), shown)
-        else:
-            _draw_missed(figure.add_subplot(grid[0, :]), shown)
+        beside = goals == 1 or bool(goals and (~shown.feasible & ~shown.final).any())
+        draw = (_draw_missed, _draw_progress, _draw_front, _draw_objectives)[min(goals, 3)]
+        draw(figure.add_subplot(grid[0, 0] if beside else grid[0, :]), shown)
+        if beside:
+            other = _draw_fidelities if goals == 1 else _draw_missed
+            other(figure.add_subplot(grid[0, 1]), shown)
         _draw_ranges(figure.add_subplot(grid[1, :]), shown)
     return figure
 
@@ -259,8 +248,7 @@ def _draw_progress(ax: Axes, shown: _Designs) -> None:
         ends = [*at[way], shown.looked_at[-1]], [*so_far, so_far[-1]]
         ax.step(*ends, where="post", color="0.35", lw=0.9, zorder=2, label="best so far")
     if final.any():
-        bars = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "capsize": 2, "zorder": 4}
-        ax.errorbar(at[final], value[final], shown.errors[final, 0], **bars)
+        ax.errorbar(at[final], value[final], shown.errors[final, 0], capsize=2, **_BARS)
         ax.scatter(at[final], value[final], label="full accuracy", **_FINAL)
     out = ~shown.feasible & ~shown.final
     if out.any():  # which have no value
@@ -280,7 +268,7 @@ def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
         ax.set_axis_off()
         return
     errors = shown.errors[rows[known], 0], shown.errors[before[known], 0]
-    bars = {"fmt": "none", "ecolor": "0.5", "elinewidth": 0.7, "capsize": 2, "zorder": 2}
+    bars = {**_BARS, "ecolor": "0.5", "elinewidth": 0.7, "capsize": 2, "zorder": 2}
     ax.errorbar(coarse[known], full[known], *errors, **bars)
     ax.scatter(coarse[known], full[known], **_FINAL)
     first = float(full[known][0])
@@ -295,14 +283,12 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
     ax.scatter(*shown.values[way].T, edgecolors=MET, label="on the way", zorder=3, **_COARSE)
     rows = np.flatnonzero(shown.front & shown.feasible)
     if len(rows):
-        points = shown.values[rows]
-        points = points[np.argsort(points[:, 0])]
+        points, errors = shown.values[rows].T, shown.errors[rows].T
         # Between two designs nothing is known to be better than the worse one of each value.
         where = "post" if shown.senses[0] < 0 else "pre"
-        ax.step(*points.T, where=where, color=BEST, lw=0.9, zorder=2)
-        bars = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zorder": 4}
-        ax.errorbar(*shown.values[rows].T, *shown.errors[rows].T[::-1], **bars)
-        ax.scatter(*shown.values[rows].T, label="front, full accuracy", **_FINAL)
+        ax.step(*points[:, points[0].argsort()], where=where, color=BEST, lw=0.9, zorder=2)
+        ax.errorbar(*points, *errors[::-1], **_BARS)
+        ax.scatter(*points, label="front, full accuracy", **_FINAL)
     words = [
         f"{label} ({'large' if sense > 0 else 'small'} is better)"
         for label, sense in zip(shown.labels, shown.senses, strict=True)
@@ -313,18 +299,16 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
 
 def _draw_missed(ax: Axes, shown: _Designs) -> None:
     """Excess of each design, in their order; infinite ones stand at the upper edge."""
-    way = ~shown.final
     excess, at = shown.data["excess"].values, shown.looked_at
-    met, never = way & shown.feasible, way & ~np.isfinite(excess)
-    out = way & ~met & ~never
+    met, never = shown.feasible & ~shown.final, ~np.isfinite(excess) & ~shown.final
+    out = ~(met | never | shown.final)
     if met.any():
         ax.scatter(at[met], excess[met], edgecolors=MET, label="met", **_COARSE)
     if out.any():
         ax.scatter(at[out], excess[out], label="missed", **_OUT)
     if never.any():
-        top = {"transform": ax.get_xaxis_transform(), "clip_on": False}
-        style = {**_OUT, "marker": "v"}
-        ax.scatter(at[never], np.ones(never.sum()), label="no such arm", **top, **style)
+        style = {**_OUT, "marker": "v", "transform": ax.get_xaxis_transform(), "clip_on": False}
+        ax.scatter(at[never], np.ones(never.sum()), label="no such arm", **style)
     ax.set(xlabel="designs looked at", ylabel="requirements missed, sum [-]")
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]), top=None if out.any() else 1.0)
     legend_above(ax, handletextpad=0.3)
@@ -355,31 +339,30 @@ def _draw_objectives(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_ranges(ax: Axes, shown: _Designs) -> None:
-    data = shown.data
+    data, way, small = shown.data, ~shown.final, {"s": 9, "linewidths": 0.5, "alpha": 0.6}
     low, high = data["low"].values, data["high"].values
     shares = (data["value"].values - low) / np.where(high > low, high - low, 1.0)
-    way, rows = ~shown.final, np.flatnonzero(shown.front)
-    count = len(low)
-    for k in range(count):
+    styles = (
+        (way & shown.feasible, {"edgecolors": MET, **_COARSE, **small}),
+        (way & ~shown.feasible, {**_OUT, **small}),
+        (shown.front, _FINAL),
+    )
+    for k in range(len(low)):
         ax.hlines(k, 0.0, 1.0, color="0.85", lw=0.8, zorder=0)
-        met, out = way & shown.feasible, way & ~shown.feasible
-        small = {"s": 9, "linewidths": 0.5, "alpha": 0.6}
-        ax.scatter(shares[met, k], np.full(met.sum(), k), edgecolors=MET, **{**_COARSE, **small})
-        ax.scatter(shares[out, k], np.full(out.sum(), k), **{**_OUT, **small})
-        ax.scatter(shares[rows, k], np.full(len(rows), k), **_FINAL)
+        for rows, style in styles:
+            ax.scatter(shares[rows, k], np.full(rows.sum(), k), **style)
         for place, end, across in ((-0.01, low[k], "right"), (1.01, high[k], "left")):
             text = _end_text(shown, k, float(end))
             ax.text(place, k, text, ha=across, va="center", fontsize=7, color="0.25")
-    ax.set_yticks(range(count), [str(name) for name in data["parameter"].values])
+    ax.set_yticks(range(len(low)), [str(name) for name in data["parameter"].values])
     ax.tick_params(axis="y", length=0, pad=42)
-    ax.set(xlim=(-0.02, 1.1), ylim=(count - 0.4, -0.6), xticks=[])
-    word = "the best" if len(rows) < 2 else "the front"
+    ax.set(xlim=(-0.02, 1.1), ylim=(len(low) - 0.4, -0.6), xticks=[])
+    word = "the best" if shown.front.sum() < 2 else "the front"
     remark(ax, f"free parameters in their ranges, {word} ◆")
     ax.spines[:].set_visible(False)
 
 
 def _end_text(shown: _Designs, k: int, end: float) -> str:
-    choices = str(shown.data["choices"].values[k])
-    if choices:
+    if choices := str(shown.data["choices"].values[k]):
         return choices.split(", ")[round(end)]
     return readable(end, str(shown.data["parameter_unit"].values[k]), shown.unit)

@@ -169,9 +169,8 @@ def plot_slice(
     at = _middle(grid, axis) if at is None else as_number("at", at, PLACE)
     centers, half = grid[axis].values, grid.attrs["cell"] / 2
     if not centers[0] - half <= at <= centers[-1] + half:
-        raise InvalidInput(
-            "at", at, f"between {centers[0]:.4g} and {centers[-1]:.4g} m along {axis}"
-        )
+        allowed = f"between {centers[0]:.4g} and {centers[-1]:.4g} m along {axis}"
+        raise InvalidInput("at", at, allowed)
     layer = grid.sel({axis: at}, method="nearest")
     with figure_style(ax):
         ax = small_axes(3.4, 4.2) if ax is None else ax
@@ -225,22 +224,14 @@ def _middle(grid: xr.Dataset, axis: str) -> float:
 def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
     from matplotlib.colors import ListedColormap
 
-    plane = plane_of(view)
-    assert plane is not None  # the view is along an axis
-    across, up = plane
+    across, up = plane_of(view) or ("x", "z")  # the view is along an axis
     name = "count" if "count" in layer else "occupied"
     shown = np.minimum(layer[name].transpose(up, across).values.astype(int), len(_COLORS) - 1)
     x, y = unit.of(layer[across].values), unit.of(layer[up].values)
     half = float(unit.of(layer.attrs["cell"])) / 2
-    ax.imshow(
-        shown,
-        origin="lower",
-        extent=(x[0] - half, x[-1] + half, y[0] - half, y[-1] + half),
-        cmap=ListedColormap(_COLORS),
-        vmin=-0.5,
-        vmax=len(_COLORS) - 0.5,
-        interpolation="nearest",
-    )
+    extent = (x[0] - half, x[-1] + half, y[0] - half, y[-1] + half)
+    scale = {"cmap": ListedColormap(_COLORS), "vmin": -0.5, "vmax": len(_COLORS) - 0.5}
+    ax.imshow(shown, origin="lower", extent=extent, interpolation="nearest", **scale)
     if "degree" in layer:
         folded = (layer["count"] > abs(layer["degree"])).transpose(up, across).values
         if folded.any():

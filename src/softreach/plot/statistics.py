@@ -246,10 +246,9 @@ def plot_curvature(
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
     as_one_of("quantity", quantity, _SYMBOLS)
-    units = [unit_of(data, unit) for data in statistics.values()]
-    counted = common_unit(units)
-    every = zip(units, statistics.values(), strict=True)
-    places, *others = [own.of(data["Z"].values) for own, data in every]
+    units = {label: unit_of(data, unit) for label, data in statistics.items()}
+    counted = common_unit([*units.values()])
+    places, *others = (units[label].of(data["Z"].values) for label, data in statistics.items())
     for other in others:
         if other.shape != places.shape or not np.allclose(other, places):
             raise InvalidInput("stations", other.tolist(), f"those of the first: {places.tolist()}")
@@ -259,9 +258,8 @@ def plot_curvature(
     with figure_style(ax):
         ax = small_axes() if ax is None else ax
         sides = (-1, 1) if len(statistics) == 2 else (0,)
-        both = zip(statistics.items(), sides, _COLORS, units, strict=False)
-        for (label, data), side, color, own in both:
-            scale = own.size if per_length else 1.0
+        for (label, data), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
+            scale = units[label].size if per_length else 1.0
             _draw_side(ax, data, quantity, side, color, label, scale)
         ax.set(xlabel=counted.label("station Z"), ylabel=symbol)
         digits = ".2g" if counted.relative else ".4g"
@@ -274,14 +272,12 @@ def _draw_side(
     ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str, scale: float
 ) -> None:
     medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
+    style: dict[str, Any] = {"color": color, "alpha": 0.75, "lw": 0.3, "ec": "w"}
     for k in range(len(medians)):
-        edges, density = _coarse(data.isel(station=k), quantity)
+        values, density = _coarse(data.isel(station=k), quantity)
         reach = 0.46 * density / density.max()
         low, high = (k - reach if side <= 0 else k), (k + reach if side >= 0 else k)
-        name = label if k == 0 else None
-        ax.fill_betweenx(
-            edges * scale, low, high, color=color, alpha=0.75, lw=0.3, ec="w", label=name
-        )
+        ax.fill_betweenx(values * scale, low, high, label=None if k else label, **style)
     ax.plot(np.arange(len(medians)) + 0.1 * side, medians, ".", color="k", ms=3, zorder=3)
 
 
@@ -291,7 +287,5 @@ def _coarse(data: xr.Dataset, quantity: str) -> tuple[Array, Array]:
     used = np.flatnonzero(count)
     first, last = used[0], used[-1] + 1
     ends = np.unique(np.linspace(first, last, _COARSE + 1).astype(int))
-    sums = np.add.reduceat(count, ends[:-1])
-    sums[-1] = count[ends[-2] : last].sum()
-    centers = (edges[ends[:-1]] + edges[ends[1:]]) / 2
-    return centers, sums / np.diff(edges[ends])
+    sums = np.add.reduceat(count[:last], ends[:-1])
+    return (edges[ends[:-1]] + edges[ends[1:]]) / 2, sums / np.diff(edges[ends])

@@ -18,7 +18,7 @@ from softreach.picture.page import Figure3D
 from softreach.picture.projection import View, view_angles
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
-from softreach.support.errors import InvalidInput, MissingExtra, Range, check_date
+from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
 
@@ -61,9 +61,8 @@ def pyplot() -> Any:
 
     Raises:
         MissingExtra: matplotlib is not installed.
-        InvalidInput: The environment names a backend that it does not have, or no date.
+        InvalidInput: The environment names a backend that it does not have.
     """
-    check_date()
     try:
         from matplotlib import pyplot as plt
     except ModuleNotFoundError as error:
@@ -101,18 +100,24 @@ def place_panels(
         around: Left, right, bottom and top of all panels [inch].
         gaps: Between columns, and between rows [inch].
     """
-    left, right, bottom, top = around
-    scale = (width - left - right - gaps[0] * (len(columns) - 1)) / sum(columns)
-    wide, high = scale * np.array(columns), scale * np.array(rows)
-    height = bottom + high.sum() + gaps[1] * (len(rows) - 1) + top
+    (left, right, bottom, top), (beside, between) = around, gaps
+    scale = (width - left - right - beside * (len(columns) - 1)) / sum(columns)
+    wide, high = scale * sum(columns), scale * sum(rows)
+    height = bottom + high + between * (len(rows) - 1) + top
     figure = pyplot().figure(figsize=(width, height))
-    panels = np.empty((len(rows), len(columns)), object)
-    for row, column in np.ndindex(panels.shape):
-        x = left + wide[:column].sum() + column * gaps[0]
-        y = bottom + high[row + 1 :].sum() + (len(rows) - 1 - row) * gaps[1]
-        place = np.array([x, y, wide[column], high[row]]) / [width, height, width, height]
-        panels[row, column] = figure.add_axes(tuple(place))
-    return figure, panels
+    grid = figure.add_gridspec(
+        len(rows),
+        len(columns),
+        height_ratios=rows,
+        width_ratios=columns,
+        left=left / width,
+        right=1 - right / width,
+        bottom=bottom / height,
+        top=1 - top / height,
+        wspace=beside * len(columns) / wide,
+        hspace=between * len(rows) / high,
+    )
+    return figure, grid.subplots(squeeze=False)
 
 
 def save_figure(

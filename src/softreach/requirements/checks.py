@@ -11,7 +11,6 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.requirements.advice import advice
-from softreach.requirements.chosen_poses import TOL, Chooser, Posed, chosen, descended, solved
 from softreach.requirements.findings import (
     Finding,
     Verdict,
@@ -22,7 +21,16 @@ from softreach.requirements.findings import (
     verdict_of,
 )
 from softreach.requirements.parts import Keep, Target
-from softreach.requirements.poses import PoseRules, worst_pose
+from softreach.requirements.poses import (
+    TOL,
+    Chooser,
+    Posed,
+    PoseRules,
+    chosen,
+    descended,
+    solved,
+    worst_pose,
+)
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.bending import bending_over_bounds
@@ -34,7 +42,7 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidInput, NotPossible, Range, no_warnings
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
-from softreach.support.report import Report, Section
+from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSet, ReachableSolid, reachable_set
 
@@ -65,7 +73,7 @@ class Coverage(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Check:
+class Check(Reported):
     """A design against requirements."""
 
     arm: Manipulator
@@ -151,15 +159,16 @@ class Check:
         from softreach.plot.arm import plot_check
 
         own = [finding.verdict for finding in self.findings]
-        parts = [f"{word}, {own.count(word)} of {len(own)}" for word in ("missed", "undecided")]
-        kept = [part for part in parts if part.split(",")[0] in own] or [f"met, all {len(own)}"]
+        words = [word for word in ("missed", "undecided") if word in own]
+        counts = [f"{word}, {own.count(word)} of {len(own)}" for word in words]
+        counts = counts or [f"met, all {len(own)}"]
         size = self.arm.length_unit.text(self.arm.length)
         space = 9 if "undecided" in own else 6
         rows = [(f.word.ljust(space), f.name, f.text) for f in self.findings]
         caption = "The arm at the places that it must reach."
         return Report(
             title="Requirements of an arm",
-            verdict=f"Requirements of an arm of {size}: {'; '.join(kept)}",
+            verdict=f"Requirements of an arm of {size}: {'; '.join(counts)}",
             state=self.verdict,
             sections=[
                 Section(title="Requirements", rows=rows, printed=max(1, len(rows))),
@@ -171,9 +180,6 @@ class Check:
                 Section(title="The requirements", text=self.requirements.to_toml()),
             ],
         )
-
-    def __repr__(self) -> str:
-        return str(self.report())
 
     def to_dataset(self) -> xr.Dataset:
         """Places with their gaps, poses and efforts, and the findings, labeled."""
@@ -267,14 +273,8 @@ def quick_check(
 
 
 def sets_to(accuracy: float, *, quiet: bool = False) -> Sets:
-    """Reachable sets to a relative error of volumes, each computed once; `quiet` without warnings.
-
-    Those on the way of a search are quiet.
-    """
-
-    def set_of(arm: Manipulator) -> ReachableSet:
-        return reachable_set(arm, accuracy=accuracy)
-
+    """Reachable sets to a relative error of volumes, each computed once."""
+    set_of = partial(reachable_set, accuracy=accuracy)
     return cache(no_warnings()(set_of) if quiet else set_of)
 
 
@@ -287,23 +287,14 @@ def checked(
     *,
     choose: Chooser = chosen,
 ) -> Check:
-    """A design against requirements, with poses that are chosen for blocks of places.
-
-    Args:
-        arm: The design.
-        needs: The requirements.
-        accuracy: As for `check`.
-        sets: Reachable sets to this accuracy.
-        step: Called with the number of places done since its last call.
-        choose: Source of the poses.
-    """
+    """As `check`, with reachable sets to its accuracy, and poses that are chosen for places."""
     payloads = needs.payloads or (None,)
-    keeps = [keep for keep in needs.keeps if keep.when == "targets" and needs.targets]
+    keeps = tuple(keep for keep in needs.keeps if keep.when == "targets" and needs.targets)
     every: list[PoseRules] = []
     posed: list[Posed] = []
     coverages: list[Coverage] = []
     for payload, loaded in zip(payloads, needs.under_payloads(arm), strict=True):
-        rules = PoseRules.of(loaded, keeps, needs.limits, 0.1 * accuracy * arm.length)
+        rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
         if choose is descended:  # on the way, with shapes in no more steps than tips
             rod = as_tip_map(loaded, _ROUGH_TOL)
@@ -313,18 +304,8 @@ def checked(
             if target.region is not None:
                 coverages.append(_coverage(rules, target, payload, accuracy, sets, step))
     joined = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
-    made = Check(
-        arm=arm,
-        requirements=needs,
-        payloads=payloads,
-        findings=(),
-        coverages=tuple(coverages),
-        accuracy=accuracy,
-        gaps=joined.gaps,
-        poses=joined.poses,
-        effort=joined.effort,
-        nearest=joined.nearest,
-    )
+    numbers = (joined.gaps, joined.poses, joined.effort, joined.nearest)
+    made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *numbers)
     findings = (
         *_reach_findings(made, every),
         *_cover_findings(made),
@@ -355,14 +336,13 @@ def _coverage(
         inside = np.zeros(count, bool)
         try:
             reached = sets(rules.arm)
-            if not isinstance(reached, ReachableSolid):  # without a volume
-                inside = reached.distance(places) <= max(
-                    target.within, reached.tip_map.tol * reached.tip_map.length
-                )
-            elif target.within > 0.0:
-                inside = reached.distance(places) <= target.within
-            else:
+            if isinstance(reached, ReachableSolid) and not target.within:
                 inside = reached.contains(places)
+            else:
+                rod = reached.tip_map
+                flat = not isinstance(reached, ReachableSolid)
+                least = rod.tol * rod.length if flat else 0.0
+                inside = reached.distance(places) <= max(target.within, least)
         except InvalidInput as error:
             if error.name != "loads":
                 raise

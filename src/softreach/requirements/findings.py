@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from softreach.arm.body import load_number, mass
 from softreach.arm.driving import inner_arm
-from softreach.arm.load_number import load_number, mass
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import ends_over, quadrature, tables
 from softreach.atlas.intermediates import Intermediates
@@ -30,15 +30,6 @@ Verdict = Literal["met", "missed", "undecided"]
 _SAMPLES, _FEWER = 2**15, 8
 """Samples of clouds, and how many times fewer another has, which is farther off by as much at least
 as this one is: errors of extents and hulls fall with the cube root of their number or faster."""
-_ERRORS: dict[str, Callable[[ReachableSet], float]] = {
-    "exact_volume": lambda reached: reached.volume_error,
-    "exact_convex_volume": lambda reached: reached.convex_volume_error,
-    "exact_unreachability": lambda reached: reached.unreachability_error,
-    "multiplicity": lambda reached: getattr(reached, "multiplicity_error", 0.0) / reached.volume,
-    "multiple_volume": lambda reached: getattr(reached, "multiplicity_error", 0.0),
-    "fold_volume": lambda reached: getattr(reached, "fold_volume_error", 0.0),
-}
-"""Metrics of the reachable set with their errors; of others of it none are known."""
 _PIECES = 8
 _ROUNDING = 1e-9
 _WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": "actuators"}
@@ -178,10 +169,17 @@ def measure_findings(
         for metric in metrics:
             value = float(metric.value(fine, {}))
             if Need.REACHABLE_SET in metric.needs:
-                error = _ERRORS.get(metric.name, lambda _: 0.0)(known())
+                error = _error_of(metric.name, known())
             else:
                 error = abs(value - float(metric.value(coarse, {})))
             yield _measure(metric.name, metric.unit, value, error, *needs.measures[metric.name])
+
+
+def _error_of(metric: str, reached: ReachableSet) -> float:
+    """Error of a metric of the reachable set, 0 where none is known."""
+    size = reached.volume if metric == "multiplicity" else 1.0
+    own = "multiplicity" if metric == "multiple_volume" else metric.removeprefix("exact_")
+    return getattr(reached, f"{own}_error", 0.0) / size
 
 
 def _measure(

@@ -159,9 +159,13 @@ class Limits:
         """Those that there are, by name."""
         return {name: value for name, value in vars(self).items() if value is not None}
 
+    @property
+    def of_poses(self) -> dict[str, float]:
+        """Those of them that poses are judged by."""
+        return {name: value for name, value in self.given.items() if name in _OF_POSES}
 
-POSE_LIMITS = ("shortening", "force", "pressure", "stroke", "bending")
-"""Limits of poses."""
+
+_OF_POSES = ("shortening", "force", "pressure", "stroke", "bending")
 LIMIT_UNITS = dict.fromkeys((field.name for field in dataclasses.fields(Limits)), "") | {
     "force": "N",
     "pressure": "Pa",

@@ -112,7 +112,6 @@ class Region(ABC):
             tangent: Unit vectors across the sections, d3 [-], shape (..., 3).
             radius: Radii [m], shape (...).
         """
-        del tangent
         distance = self._distances(center)
         return distance - radius, distance + radius
 
@@ -165,11 +164,9 @@ class Box(Region):
         return np.maximum(ball, (beyond - reach).max(axis=-1)), (beyond + reach).max(axis=-1)
 
     def wireframe(self, around: Array) -> list[Array]:
-        del around
         corners = np.array(list(np.ndindex(2, 2, 2)))
         ends = [(a, b) for a in corners for b in corners if (b - a).sum() == 1 and (b >= a).all()]
-        pick = self.bounds
-        return [np.stack([pick[end, range(3)] for end in pair]) for pair in ends]
+        return [self.bounds[np.stack(pair), range(3)] for pair in ends]
 
 
 @dataclass(frozen=True)
@@ -211,7 +208,6 @@ class Sphere(Region):
         return np.hypot(height, least) - self.radius, np.hypot(height, most) - self.radius
 
     def wireframe(self, around: Array) -> list[Array]:
-        del around
         flat = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE), 0.0 * _CIRCLE], axis=1)
         return [self.center + self.radius * np.roll(flat, k, axis=1) for k in range(3)]
 
@@ -231,8 +227,8 @@ class HalfSpace(Region):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", _triple("point", self.point))
-        unit = as_directions("normal", _triple("normal", self.normal))
-        object.__setattr__(self, "normal", tuple(unit.tolist()))
+        (normal,) = as_directions("normal", self.normal, 1).tolist()
+        object.__setattr__(self, "normal", tuple(normal))
 
     @property
     def volume(self) -> float:
@@ -369,7 +365,6 @@ class Mesh(Region):
         return out
 
     def wireframe(self, around: Array) -> list[Array]:
-        del around
         edges, beside = self._edges[:2]
         first, second = self._face_normals[beside].swapaxes(0, 1)
         sharp = (first * second).sum(axis=1) < _CREASE
@@ -470,8 +465,7 @@ def _triple(name: str, value: object) -> Triple:
     numbers = check_finite(name, as_floats(name, value, allowed))
     if numbers.shape != (3,):
         raise InvalidInput(name, value, allowed)
-    x, y, z = numbers.tolist()
-    return x, y, z
+    return tuple(numbers.tolist())
 
 
 def _check_closed(faces: Any, name: str) -> None:
@@ -482,9 +476,7 @@ def _check_closed(faces: Any, name: str) -> None:
     if number := int((counts == 1).sum()):
         raise NotPossible(f"{name} has holes: close its {counted(number, 'open edge')}")
     if number := int((counts != 2).sum()):
-        many = counted(number, "edge")
-        raise NotPossible(
-            f"the surface of {name} branches: it has {many} of more than two triangles"
-        )
+        many = f"{counted(number, 'edge')} of more than two triangles"
+        raise NotPossible(f"the surface of {name} branches: it has {many}")
     if len(np.unique(ways, axis=0)) < len(ways):
         raise NotPossible(f"some triangles of {name} face out and others in: turn them one way")

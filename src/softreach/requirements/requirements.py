@@ -1,4 +1,4 @@
-"""Requirements of an arm: what it is for, as a frozen value and a file."""
+"""Requirements of an arm: what it is for, as a frozen value and as TOML with units."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ import numpy as np
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
-from softreach.requirements.parts import LONGEST, MOST_PLACES, Keep, Limits, Target
-from softreach.requirements.requirements_file import read, written
+from softreach.inverse.request import positions_in
+from softreach.requirements.parts import LIMIT_UNITS, LONGEST, MOST_PLACES, Keep, Limits, Target
+from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import (
     POSITIVE,
     as_given,
@@ -26,8 +27,41 @@ from softreach.support.arguments import (
     as_text,
 )
 from softreach.support.arrays import Array, as_floats
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
+from softreach.support.errors import (
+    Fault,
+    InvalidDesign,
+    InvalidInput,
+    NotPossible,
+    Range,
+    SoftreachError,
+)
 from softreach.support.files.text import read_text, write_text
+from softreach.support.files.toml import (
+    WRONG,
+    FaultReader,
+    document_of,
+    inline_table,
+    key_text,
+    value_text,
+)
+from softreach.support.quantity import read_quantity, unit_names
+from softreach.support.units import read_length
+
+_KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
+"""At the top, beside payloads; `search` is read by the search of designs."""
+_EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa"}
+"""SI unit of numbers that have one -> how such a number may be written."""
+_SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
+    "box": (Box, {"low": "m", "high": "m"}),
+    "sphere": (Sphere, {"center": "m", "radius": "m"}),
+    "half_space": (HalfSpace, {"point": "m", "normal": ""}),
+    "mesh": (Mesh, {"vertices": "m", "faces": ""}),
+}
+"""Regions, with their numbers and the units of these."""
+_LISTS = {"payloads", "places", *(n for _, own in _SHAPES.values() for n in own)} - {"radius"}
+_BALL = {"region": Sphere((0.0, 0.0, 0.0), 1.0)}
+_INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}
+"""In place of faulty parts, so that the others can be judged."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -128,19 +162,21 @@ class Requirements:
         """
         text, folder = as_text("text", text), as_path("folder", folder)
         size = None if length is None else as_number("length", length, POSITIVE)
-        source = as_text("source", source)
-        parts = read(text, Path(folder), size, source)
-        try:
-            return cls(**parts)
-        except InvalidInput as error:
-            fault = Fault(error.name, error.value, f"must be {error.allowed}")
-            raise InvalidDesign([fault], source) from None
-        except InvalidDesign as error:
-            raise InvalidDesign(error.faults, source) from None
+        reader = _Reader(Path(folder), size)
+        parts = reader.parts(document_of(text, LONGEST, as_text("source", source)))
+        faults: Sequence[Fault] = reader.faults
+        if not faults:
+            try:
+                return cls(**parts)
+            except InvalidInput as error:
+                faults = [Fault(error.name, error.value, f"must be {error.allowed}")]
+            except InvalidDesign as error:
+                faults = error.faults
+        raise InvalidDesign(faults, source)
 
     def to_toml(self) -> str:
         """The text of a file, from which `from_toml` makes the same."""
-        return written(**vars(self))
+        return _written(self)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a TOML file.
@@ -226,3 +262,245 @@ def _contradictions(needs: Requirements) -> Iterator[Fault]:
                 beyond = f"by {missed[wrong[0]]:.4g} m, clearance counted"
                 allowed = f"lies {where} {keep.name} {beyond}{more}: {keep.kind} forbids it"
                 yield Fault(f"{target.name}, place {wrong[0] + 1}", place, allowed)
+
+
+class _Reader(FaultReader):
+    def __init__(self, folder: Path, length: float | None) -> None:
+        super().__init__()
+        self.folder, self.length = folder, length
+
+    def parts(self, document: dict[str, Any]) -> dict[str, Any]:
+        """Fields of the requirements; of no use where there are faults."""
+        payloads = self._numbers(document, "", {"payloads": "kg"}, _KEYS)
+        limits = self._table(document, "limits")
+        if document.get("version", 1) != 1:
+            self._refuse("version", document["version"], "must be 1")
+        return payloads | {
+            "targets": [self._target(*each) for each in self._tables(document, "reach")],
+            "keeps": [
+                self._keep(*each, kind == "stay_inside")
+                for kind in ("stay_inside", "avoid")
+                for each in self._tables(document, kind)
+            ],
+            "limits": self._made(
+                Limits, limits, "limits", self._numbers(limits, "limits", LIMIT_UNITS)
+            ),
+            "measures": self._measures(self._table(document, "measures")),
+        }
+
+    def _target(self, raw: dict[str, Any], path: str) -> Any:
+        numbers = {"within": "m", "share": "", "places": "m"}
+        values = self._part(raw, path, numbers, ("name", "file"))
+        file = values.pop("file", None)
+        sources = [x for x in (values.get("places"), file, values.get("region")) if x is not None]
+        if len(sources) != 1:
+            allowed = f"needs one of places, file, {', '.join(_SHAPES)}, and has {len(sources)}"
+            return self._refuse(path, None, allowed)
+        if file is not None:
+            try:
+                text = read_text("file", self.folder / as_text("file", file), LONGEST)
+                values["places"] = np.array(positions_in(text, file, self.length))
+            except InvalidInput as error:
+                allowed = f"must be {error.allowed} ({error.name} = {error.value})"
+                values["places"] = self._refuse(f"{path}.file", file, allowed)
+        return self._made(Target, raw, path, values)
+
+    def _keep(self, raw: dict[str, Any], path: str, inside: bool) -> Any:
+        values = self._part(raw, path, {"clearance": "m"}, ("name", "of", "when"))
+        if "region" not in values:
+            return self._refuse(path, None, f"needs one of {', '.join(_SHAPES)}")
+        return self._made(Keep, raw, path, values | {"inside": inside})
+
+    def _part(
+        self, raw: dict[str, Any], path: str, numbers: Mapping[str, str], words: tuple[str, ...]
+    ) -> dict[str, Any]:
+        """Values of a table by field: numbers, words, and the region that it has."""
+        values = self._numbers(raw, path, numbers, (*words, *_SHAPES, "mesh_unit"))
+        values |= {name: raw[name] for name in words if name in raw}
+        shapes = [name for name in _SHAPES if name in raw]
+        if len(shapes) > 1:
+            values["region"] = self._refuse(path, None, f"has {' and '.join(shapes)}: give one")
+        elif shapes:
+            values["region"] = self._region(raw, shapes[0], f"{path}.{shapes[0]}")
+        if "mesh_unit" in raw and "mesh" not in raw:
+            self._refuse(f"{path}.mesh_unit", raw["mesh_unit"], "needs a mesh")
+        return values
+
+    def _region(self, raw: dict[str, Any], shape: str, path: str) -> Any:
+        table = raw[shape]
+        if shape == "mesh" and isinstance(table, str):
+            try:
+                return Mesh.load(self.folder / table, unit=raw.get("mesh_unit"))
+            except InvalidInput as error:
+                of_unit = error.name == "unit"
+                place, value = (f"{path}_unit", error.value) if of_unit else (path, table)
+                return self._refuse(place, value, f"must be {error.allowed}")
+            except SoftreachError as error:
+                return self._refuse(path, table, str(error))
+        if not isinstance(table, dict):
+            return self._refuse(path, table, "must be a table" + " or a file" * (shape == "mesh"))
+        kind, numbers = _SHAPES[shape]
+        values = self._numbers(table, path, numbers)
+        if lacking := [name for name in numbers if name not in values]:
+            key = [*_keys(lacking[0], numbers[lacking[0]])][numbers[lacking[0]] != ""]
+            return self._refuse(f"{path}.{key}", None, "required key is missing")
+        return self._made(kind, table, path, values)
+
+    def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
+        measures = {}
+        for name, table in raw.items():
+            path = f"measures.{key_text(name)}"
+            metric = known_metric(name)
+            if metric is None or metric.over:
+                self._refuse(path, None, "is no metric: softreach list metrics names them")
+            elif not isinstance(table, dict):
+                self._refuse(path, table, "must be a table with at_least, at_most or both")
+            else:
+                unit = metric.unit if metric.unit in _EXAMPLES else ""
+                ends: dict[str, str] = {"at_least": unit, "at_most": unit}
+                values = self._numbers(table, path, ends, plain=True)
+                measures[name] = tuple(map(values.get, ends))
+        return measures
+
+    def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
+        """A part of checked numbers; `WRONG` and a fault where it refuses them."""
+        wrong = {name for name, value in values.items() if value is WRONG}
+        if wrong and kind not in _INSTEAD:
+            return WRONG
+        values = {name: value for name, value in values.items() if name not in wrong}
+        if wrong & {"region", "places"}:
+            values = _INSTEAD[kind] | values
+        try:
+            made = kind(**values)
+            return WRONG if wrong else made
+        except NotPossible as error:
+            return self._refuse(path, None, str(error))
+        except InvalidInput as error:
+            field = error.name.partition(" ")[0].partition("[")[0]
+            key = next((key for key in raw if key.startswith(field)), "")
+            value = raw[key] if key else error.value
+            said = "" if key or error.name == field else f"{error.name} "
+            place = f"{path}.{key}" if key else path
+            return self._refuse(place, value, f"{said}must be {error.allowed}")
+
+    def _numbers(
+        self,
+        raw: dict[str, Any],
+        path: str,
+        numbers: Mapping[str, str],
+        others: Sequence[str] = (),
+        *,
+        plain: bool = False,
+    ) -> dict[str, Any]:
+        """Numbers of a table in SI units by field; keys beside these and `others` are refused.
+
+        `plain` ones may go without their unit.
+        """
+        known = {name: _keys(name, unit) for name, unit in numbers.items()}
+        self._check_keys(
+            raw, path, (*numbers, *others), [key for own in known.values() for key in own]
+        )
+        start, values = f"{path}." if path else "", {}
+        for name, unit in numbers.items():
+            keys = [key for key in known[name] if key in raw]
+            if len(keys) > 1:
+                allowed = f"has {' and '.join(keys)}: give one"
+                values[name] = self._refuse(start + name, None, allowed)
+            for key in keys if len(keys) == 1 else ():
+                symbol, value = known[name][key], raw[key]
+                if name in _LISTS and not isinstance(value, list | str):
+                    values[name] = self._refuse(start + key, value, "must be a list")
+                    continue
+                try:
+                    values[name] = self._read(value, unit, symbol, plain or not unit)
+                except ValueError:
+                    allowed = self._allowed(unit, symbol, name)
+                    values[name] = self._refuse(start + key, value, allowed)
+        return values
+
+    def _read(self, value: Any, unit: str, symbol: str, plain: bool) -> Any:
+        """Numbers in SI units, however nested.
+
+        Raises:
+            ValueError: Anything else.
+        """
+        if isinstance(value, list):
+            return [self._read(item, unit, symbol, plain) for item in value]
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError(value)
+        if isinstance(value, str):
+            if symbol or not unit:
+                raise ValueError(value)
+            if "," in value:
+                return [self._read(item, unit, symbol, plain) for item in value.split(",")]
+            return self._quantity(value, unit)
+        if not symbol and not plain and value != 0:
+            raise ValueError(value)
+        if symbol in ("", unit):
+            return value
+        return self._quantity(f"{value!r}{symbol}", unit)
+
+    def _quantity(self, text: str, unit: str) -> float:
+        is_relative = unit == "m" and text.strip().endswith("L")
+        return read_length(text, self.length) if is_relative else read_quantity(text, unit)
+
+    def _allowed(self, unit: str, symbol: str, name: str) -> str:
+        if symbol == "L" and self.length is None:
+            return "the length L of the arm is not known here: give m, cm or mm"
+        if symbol or not unit:
+            return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
+        units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
+        hint = "" if unit != "m" or self.length is not None else "; L is not known here"
+        return (
+            f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under '
+            f"{name}_{unit.lower()}{hint}"
+        )
+
+
+def _keys(name: str, unit: str) -> dict[str, str]:
+    units = {each.lower(): each for each in unit_names(unit) if each.isascii()} if unit else {}
+    units |= {"over_length": "L"} if unit == "m" else {}
+    return {name: ""} | {f"{name}_{suffix}": symbol for suffix, symbol in units.items()}
+
+
+def _written(needs: Requirements) -> str:
+    """The text of a file; lengths in m, masses in kg."""
+    head = {"version": 1} | ({"payloads_kg": needs.payloads} if needs.payloads else {})
+    blocks = [["# softreach requirements", *_lines(head)]]
+    for target in needs.targets:
+        lines = ["[[reach]]", *_lines({"name": target.name})]
+        if target.places is not None:
+            rows = (f"  {value_text(row)}," for row in target.places.tolist())
+            lines += ["places_m = [", *rows, "]"]
+        elif target.region is not None:
+            lines += [_region_line(target.region), *_lines({"share": target.share})]
+        blocks.append(lines + _lines({"within_m": target.within} if target.within else {}))
+    for keep in sorted(needs.keeps, key=lambda keep: not keep.inside):
+        words = {"of": keep.of, "when": keep.when}
+        words |= {"clearance_m": keep.clearance} if keep.clearance else {}
+        start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
+        blocks.append([*start, _region_line(keep.region), *_lines(words)])
+    if limits := needs.limits.given:
+        keys = (f"{name}_{LIMIT_UNITS[name].lower()}".rstrip("_") for name in limits)
+        blocks.append(["[limits]", *_lines(dict(zip(keys, limits.values(), strict=True)))])
+    blocks += [["[measures]"]] if needs.measures else []
+    for name, ends in needs.measures.items():
+        pairs = zip(("at_least", "at_most"), ends, strict=True)
+        table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
+        blocks[-1].append(f"{key_text(name)} = {table}")
+    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def _lines(values: Mapping[str, Any]) -> list[str]:
+    return [f"{key} = {value_text(value)}" for key, value in values.items()]
+
+
+def _region_line(region: Region) -> str:
+    if isinstance(region, Mesh) and region.source:
+        place = str(Path(region.source).resolve())
+        return "\n".join(_lines({"mesh": place, "mesh_unit": region.unit}))
+    shapes = _SHAPES.items()
+    shape, numbers = next((name, own) for name, (kind, own) in shapes if isinstance(region, kind))
+    keys = (f"{name}_{unit}".rstrip("_") for name, unit in numbers.items())
+    values = (value_text(np.asarray(getattr(region, name)).tolist()) for name in numbers)
+    return f"{shape} = {inline_table(zip(keys, values, strict=True))}"

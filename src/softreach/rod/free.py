@@ -105,14 +105,14 @@ class ArmRod(TipMap):
         least, most = np.empty((2, len(gamma)))
         with np.errstate(all="ignore"):  # what overflows is no arm
             for block in parallel.blocks(len(gamma), 1024):
-                extension = growth = 1.0 + gamma[block] @ table.extension.T
-                if table.growth is not table.extension:
-                    growth = 1.0 + gamma[block] @ table.growth.T
+                extension = eta = 1.0 + gamma[block] @ table.extension.T
+                if table.has_forces:
+                    eta = 1.0 + gamma[block] @ table.rest_length_factor.T
                 bend = np.linalg.norm(
                     np.einsum("scb,nb->nsc", table.curvature, gamma[block]), axis=-1
                 )
-                least[block] = np.minimum(extension, growth).min(axis=1)
-                most[block] = (growth * bend * step).max(axis=1)
+                least[block] = np.minimum(extension, eta).min(axis=1)
+                most[block] = (eta * bend * step).max(axis=1)
         return least, most
 
     def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
@@ -275,7 +275,7 @@ class LinearStrains(NamedTuple):
     """Uγ [1/m] in the directors, per length of η."""
     extension: Array
     """ζ = 1 + z·γ [-]."""
-    growth: Array
+    rest_length_factor: Array
     """η [-], what fibers and muscles make of the length of matter at rest: theory (7)."""
 
 
@@ -290,7 +290,7 @@ def linear_strains(table: Tables, gamma: Array) -> LinearStrains:
         gamma: Activations, shape (n, bundles).
     """
     parts = [table.curvature, table.extension[:, None]]
-    parts += [] if table.growth is table.extension else [table.growth[:, None]]
+    parts += [table.rest_length_factor[:, None]] if table.has_forces else []
     rows, bundles = np.concatenate(parts, axis=1), np.ascontiguousarray(gamma.T)
     columns = rows.shape[1]
     total, term = np.empty((len(rows), columns, len(gamma))), np.empty((columns, len(gamma)))
@@ -304,12 +304,12 @@ def linear_strains(table: Tables, gamma: Array) -> LinearStrains:
             out += np.multiply(row[:, j : j + 1], bundles[j], out=term)
     total[:, 3:] += 1.0
     extension = total[:, 3].T
-    growth = extension if table.growth is table.extension else total[:, 4].T
-    return LinearStrains(np.moveaxis(total[:, :3], 2, 0), extension, growth)
+    eta = total[:, 4].T if table.has_forces else extension
+    return LinearStrains(np.moveaxis(total[:, :3], 2, 0), extension, eta)
 
 
-def per_length(curvature: Array, extension: Array, growth: Array) -> Strains:
+def per_length(curvature: Array, extension: Array, eta: Array) -> Strains:
     """Strains with curvature per length as it is, from curvature per length of η."""
-    if growth is not extension:
-        curvature = curvature * (growth / extension)[..., None]
+    if eta is not extension:
+        curvature = curvature * (eta / extension)[..., None]
     return Strains(curvature, extension)

@@ -61,12 +61,12 @@ class _Terms(NamedTuple):
     """∫ ζ ∫ 2 |y·d| |U d|."""
 
     def sum(
-        self, longest: Array | float, grown: Array | float, bending: Array | float
+        self, longest: Array | float, eta: Array | float, bending: Array | float
     ) -> Array | float:
         """The bound where ζ, η and bending are these parts of their largest values."""
-        square = self.turned_twice * grown**2 + self.stretched_twice * bending**2
-        square += self.turned_and_stretched * grown * bending
-        linear = self.turned * grown + self.stretched * bending + self.mixed * longest
+        square = self.turned_twice * eta**2 + self.stretched_twice * bending**2
+        square += self.turned_and_stretched * eta * bending
+        linear = self.turned * eta + self.stretched * bending + self.mixed * longest
         return 0.5 * _SAFETY * (longest * square + linear)
 
 
@@ -85,11 +85,12 @@ class Linearization:
         self.extension, self.stretch = table.extension, np.abs(table.extension)
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths
         self.longest = 1.0 + table.extension @ middle + self.stretch @ half
-        self.has_forces = table.growth is not table.extension
-        self.growth, self.most_grown = self.stretch, self.longest
+        self.has_forces = table.has_forces
+        self.rest_length_factor, self.largest_eta = self.stretch, self.longest
         if self.has_forces:
-            self.growth = np.abs(table.growth)
-            self.most_grown = 1.0 + table.growth @ middle + self.growth @ half
+            self.rest_length_factor = np.abs(table.rest_length_factor)
+            self.largest_eta = 1.0 + table.rest_length_factor @ middle
+            self.largest_eta += self.rest_length_factor @ half
         self.size = np.linalg.norm(self.curvature, axis=1)
         self.bending = np.linalg.norm(self.curvature @ middle, axis=1) + self.size @ half
         self._known: dict[bytes, _Terms] = {}
@@ -112,8 +113,8 @@ class Linearization:
         bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
         longest, bending = np.minimum(longest, 1.0), np.minimum(bending, 1.0)
         square, terms = self._terms(half_widths)
-        grown = 1.0 if self.has_forces else longest
-        return square * np.asarray(terms.sum(longest, grown, bending))
+        eta = 1.0 if self.has_forces else longest
+        return square * np.asarray(terms.sum(longest, eta, bending))
 
     @lazy
     def _bending_inverse(self) -> Array:
@@ -143,11 +144,11 @@ class Linearization:
         if not len(free):
             return _Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         stretch, turned = self.stretch @ half_widths, self._turns(half_widths, free)
-        growth = self.growth @ half_widths
-        first = _integrals(self.most_grown * turned, z)
-        second = _integrals(growth * self.bending, z)
+        d_eta = self.rest_length_factor @ half_widths
+        first = _integrals(self.largest_eta * turned, z)
+        second = _integrals(d_eta * self.bending, z)
         most = turned.max(axis=0)
-        inner = self.longest * _integrals(2.0 * growth * most, z)
+        inner = self.longest * _integrals(2.0 * d_eta * most, z)
         # The square of a is convex in d, so that it is largest where all |dj| are.
         return _Terms(
             turned_twice=float(_integrals(self.longest * first**2, z)[:, -1].max()),
@@ -176,8 +177,8 @@ def _with_rigid_end(table: Tables, end: float, reach: float) -> Tables:
         return np.concatenate([values, np.zeros_like(values[:2])])
 
     extension = ending(table.extension)
-    growth = extension if table.growth is table.extension else ending(table.growth)
-    return Tables(z, extension, ending(table.curvature), growth)
+    resting = ending(table.rest_length_factor) if table.has_forces else extension
+    return Tables(z, extension, ending(table.curvature), resting)
 
 
 def _signs(count: int) -> Array:

@@ -61,7 +61,7 @@ class NodeTables:
     """dZ [m], shape (step, 3)."""
     extension: Array
     """z per activation [-], shape (step, 3, bundle)."""
-    growth: Array
+    rest_length_factor: Array
     """Its part in η, likewise."""
     curvature: Array
     """U [1/m], shape (step, 3, 3, bundle)."""
@@ -160,7 +160,7 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         stations=z,
         length=length,
         extension=table.extension.reshape(*shape, bundles),
-        growth=table.growth.reshape(*shape, bundles),
+        rest_length_factor=table.rest_length_factor.reshape(*shape, bundles),
         curvature=table.curvature.reshape(*shape, 3, bundles),
         compliance=soft,
         force=dead_force(arm, arm.base, z, length),
@@ -306,7 +306,7 @@ class _Changes(NamedTuple):
 
     stretch: Array
     """Of ζ̂ dZ, shape (step, 3, column, bundle + 1)."""
-    growth: Array
+    rest_length: Array
     """Of η dZ, likewise."""
     curvature: Array
     """Of U, shape (step, 3, 3, column, bundle)."""
@@ -332,7 +332,7 @@ def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) ->
 
     return _Changes(
         product("extension"),
-        product("growth"),
+        product("rest_length_factor"),
         stacked("curvature", -2),
         stacked("compliance", -1),
         stacked("force", -1),
@@ -348,33 +348,24 @@ def _per_arm(
     axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
     thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
     squeeze = axial * thrust  # n3/K0
-    growth = length * (1.0 + table.growth @ gamma)
-    stretch = length * (1.0 + table.extension @ gamma) + growth * squeeze
+    rest_length = length * (1.0 + table.rest_length_factor @ gamma)
+    stretch = length * (1.0 + table.extension @ gamma) + rest_length * squeeze
     bend = table.curvature @ gamma + bending * moment
     each = length[..., None]
-    grown, stretched = change.growth @ whole, change.stretch @ whole
+    grown, stretched = change.rest_length @ whole, change.stretch @ whole
     bent = change.curvature @ gamma + change.compliance[..., 1:, :] * moment[..., None]
-    turning = np.concatenate(
-        [
-            (each * table.growth)[:, :, None] * bend[..., None]
-            + growth[..., None, None] * table.curvature,
-            grown[:, :, None] * bend[..., None] + growth[..., None, None] * bent,
-        ],
-        axis=-1,
-    )
-    pushing = np.concatenate(
-        [
-            each * (table.extension + table.growth * squeeze[..., None]),
-            stretched
-            + grown * squeeze[..., None]
-            + growth[..., None] * change.compliance[..., 0, :] * thrust[..., None],
-        ],
-        axis=-1,
-    )
+    of_activations = (each * table.rest_length_factor)[:, :, None] * bend[..., None]
+    of_activations += rest_length[..., None, None] * table.curvature
+    of_changes = grown[:, :, None] * bend[..., None] + rest_length[..., None, None] * bent
+    turning = np.concatenate([of_activations, of_changes], axis=-1)
+    of_activations = each * (table.extension + table.rest_length_factor * squeeze[..., None])
+    of_changes = stretched + grown * squeeze[..., None]
+    of_changes += rest_length[..., None] * change.compliance[..., 0, :] * thrust[..., None]
+    pushing = np.concatenate([of_activations, of_changes], axis=-1)
     yielding = np.zeros((*table.force.shape, turning.shape[-1]))
     yielding[..., len(gamma) :] = change.force
     return (
-        growth,
+        rest_length,
         stretch,
         np.ascontiguousarray(bending),
         np.ascontiguousarray(axial),

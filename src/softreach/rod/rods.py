@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.base import UPRIGHT, Base
+from softreach.arm.body import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.driving import inner_arm
-from softreach.arm.load_number import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
 from softreach.kernels.rod.frames import move, turn

@@ -51,7 +51,7 @@ class Nodes(NamedTuple):
     """Length of the step as each node sees it [m], shape (step, node)."""
     stretch: Array
     """z [-], shape (step, node, bundle)."""
-    growth: Array
+    rest_length_factor: Array
     """Its part in η [-], shape (step, node, bundle)."""
     curvature: Array
     """U [1/m], shape (step, node, 3, bundle)."""
@@ -98,7 +98,7 @@ class StepRule:
         return Nodes(
             width * self.arm.profile.radius(z),  # dZ = R2 dS
             table.extension.reshape(*s.shape, self.arm.bundles),
-            table.growth.reshape(*s.shape, self.arm.bundles),
+            table.rest_length_factor.reshape(*s.shape, self.arm.bundles),
             table.curvature.reshape(*s.shape, 3, self.arm.bundles),
         )
 
@@ -206,7 +206,7 @@ class StepRule:
         z = both_sides(self.arm, profile.station(np.linspace(0.0, profile.slender_length, 65)))
         table = tables(self.arm, z)
         bend = np.linalg.norm(np.einsum("scb,nb->nsc", table.curvature, gamma), axis=-1)
-        rate = (1.0 + gamma @ table.growth.T) * bend * profile.radius(z)
+        rate = (1.0 + gamma @ table.rest_length_factor.T) * bend * profile.radius(z)
         return float(rate.max() * profile.slender_length)
 
     @lazy

@@ -13,18 +13,16 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import Extreme
-from softreach.arm.driving import extension_range
-from softreach.arm.linear_law import law_warning
-from softreach.arm.lines import line_strains
-from softreach.arm.load_number import (
+from softreach.arm.body import (
     VERIFIED_LOAD_NUMBER,
     is_overloaded,
     load_number,
     load_number_faults,
     mass,
-    scale_warnings,
 )
-from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.driving import extension_range
+from softreach.arm.lines import law_warning, line_strains
+from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, bending_over_bounds

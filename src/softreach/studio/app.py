@@ -6,28 +6,16 @@ import threading
 import time
 from contextlib import suppress
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.jobs.arm import DRAW_ARM, FOLLOW_CAMERA, SET_THEME
-from softreach.studio.jobs.beside import DRAW_FREE, DRAW_REFERENCE
-from softreach.studio.jobs.calibration import DRAW_SAMPLE, FIT_ARM
-from softreach.studio.jobs.inverse import DRAG_TIP, SOLVE_INVERSE
-from softreach.studio.jobs.needs import CHECK_NEEDS
-from softreach.studio.jobs.path import FOLLOW_PATH, PLAY_PATH
-from softreach.studio.jobs.plots import DRAW_SECTION, SWEEP_VOLUME
-from softreach.studio.jobs.reach import (
-    COMPUTE_REACH,
-    DIFFERENTIATE_VOLUME,
-    DRAW_CLOUD,
-    DRAW_SURFACE,
-)
-from softreach.studio.serve.guard import close_sockets
-from softreach.studio.serve.server import (
+from softreach.studio.jobs import JOBS
+from softreach.studio.serve import (
     LOOPBACK,
+    close_sockets,
     page_address,
     page_url,
     reachable_hosts,
@@ -38,6 +26,7 @@ from softreach.studio.serve.server import (
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, vector
+from softreach.studio.tabs import furnish
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import SoftreachError
 
@@ -46,22 +35,11 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["JOBS", "Studio"]
-
-JOBS = (
-    COMPUTE_REACH, DIFFERENTIATE_VOLUME, DRAW_CLOUD, DRAW_SURFACE,
-    DRAW_ARM, FOLLOW_CAMERA, SET_THEME,
-    DRAW_FREE, DRAW_REFERENCE,
-    SOLVE_INVERSE, DRAG_TIP,
-    FOLLOW_PATH, PLAY_PATH,
-    DRAW_SAMPLE, FIT_ARM,
-    CHECK_NEEDS,
-    DRAW_SECTION, SWEEP_VOLUME,
-)  # fmt: skip
-"""Every kind of work that a tab has done for it."""
+__all__ = ["Studio"]
 
 _CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
+_PATIENCE = 3.0  # [s] for tabs that are closed
 
 
 class Studio:
@@ -92,9 +70,9 @@ class Studio:
         self.start, self._token, self.work = start, token, work
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
-        self._notice = Latest(_ignored)
+        self._notice = Latest(lambda _: None)  # a tab that hears of it may be gone
         self._compilation = CompilationWatch(self._compiling)
-        self._libraries = threading.Thread(target=_load_libraries, daemon=True)
+        self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
         self.server = start_server(host, port, token)
         camera = start.state.camera or _camera_beside(start.state.design)
@@ -116,19 +94,15 @@ class Studio:
         return [with_token(page_address(name, port), self._token) for name in hosts]
 
     def stop(self) -> None:
-        """Stop serving."""
+        """Stop serving. Tabs go first: viser ends its pool before it reports their closing."""
         self._compilation.close()
         for session in list(self.sessions.values()):
             session.close()
-        self._disconnect_tabs()
-        stop_server(self.server)
-
-    def _disconnect_tabs(self, patience: float = 3.0) -> None:
-        """Close the tabs' connections first: viser ends its pool before it reports the closing."""
         close_sockets(self.server)
-        deadline = time.monotonic() + patience
+        deadline = time.monotonic() + _PATIENCE
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)
+        stop_server(self.server)
 
     def __enter__(self) -> Self:
         return self
@@ -142,13 +116,14 @@ class Studio:
         self.stop()
 
     def _compiling(self, running: bool) -> None:
-        """Tell every tab, on another thread: this one holds the compiler's lock."""
-        self._notice.submit(lambda _: self._tell(running))
+        """Notify every tab, on another thread: this one holds the compiler's lock."""
 
-    def _tell(self, running: bool) -> None:
-        for session in list(self.sessions.values()):
-            session.compiling, session.compiled = running, self._compilation.done
-            session.show()
+        def notify(_: object) -> None:
+            for session in list(self.sessions.values()):
+                session.compiling, session.compiled = running, self._compilation.done
+                session.show()
+
+        self._notice.submit(notify)
 
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start, JOBS, work=self.work)
@@ -160,7 +135,7 @@ class Studio:
             self.sessions[client.client_id] = session
         if left is not None:
             session.take_up(left)
-        _furnish(session)
+        furnish(session)
         session.camera.on_move(lambda: session.follow("camera"))
         session.begin()
         if left is None and self.start.state.camera is not None:
@@ -184,7 +159,7 @@ class Studio:
             session.keep()
 
 
-def _load_libraries() -> None:
+def load_libraries() -> None:
     """Load what several jobs of a tab use: two threads that import it at once see half of it."""
     import xarray  # noqa: F401
 
@@ -192,53 +167,7 @@ def _load_libraries() -> None:
         pyplot()
 
 
-def _ignored(error: Exception) -> None:
-    """A tab that is told may be gone."""
-    del error
-
-
 def _camera_beside(arm: Manipulator) -> Camera:
     look_at = arm.base.to_world(arm.length * np.array(_CAMERA.look_at)) / arm.length
     position = look_at + np.subtract(_CAMERA.position, _CAMERA.look_at)
     return Camera(position=vector(position), look_at=vector(look_at))
-
-
-def _furnish(session: Session) -> None:
-    from softreach.studio.tabs.activation import ActivationPanel
-    from softreach.studio.tabs.calibrate import CalibratePanel
-    from softreach.studio.tabs.compare import ComparePanel
-    from softreach.studio.tabs.design import DesignPanel
-    from softreach.studio.tabs.export import ExportPanel
-    from softreach.studio.tabs.inverse import DragPanel, InversePanel
-    from softreach.studio.tabs.loads import LoadsPanel
-    from softreach.studio.tabs.needs import NeedsPanel
-    from softreach.studio.tabs.parts import PartsPanel
-    from softreach.studio.tabs.path import PathPanel
-    from softreach.studio.tabs.plots import PlotsPanel
-    from softreach.studio.tabs.status import StatusPanel, add_history
-    from softreach.studio.tabs.view import ViewPanel
-
-    gui = session.client.gui
-    made: list[Any] = [StatusPanel(gui, session)]
-    add_history(gui, session)
-    tabs = gui.add_tab_group()
-    kinds = {
-        "Design": (DesignPanel,),
-        "Parts": (LoadsPanel, PartsPanel),
-        "Move": (DragPanel, ActivationPanel, InversePanel, PathPanel),
-        "View": (ViewPanel,),
-        "Plots": (PlotsPanel,),
-        "Compare": (ComparePanel,),
-        "Goals": (NeedsPanel, CalibratePanel),
-    }
-    for name, together in kinds.items():
-        tab = tabs.add_tab(name)
-        made += [kind(gui, tab, session) for kind in together]
-    ExportPanel(gui, tabs.add_tab("Export"), session)
-    session.panels = made
-    clickable = NeedsPanel | PathPanel | InversePanel
-    waiting = [panel for panel in reversed(made) if isinstance(panel, clickable)]
-
-    @session.client.scene.on_click()
-    def _(event: Any) -> None:
-        any(panel.click(event.ray_origin, event.ray_direction) for panel in waiting)

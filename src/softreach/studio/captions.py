@@ -10,7 +10,7 @@ import numpy as np
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.scene.clouds import FAINT
+from softreach.studio.scene.colors import FAINT
 from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
@@ -32,6 +32,12 @@ _SIZES = {
 }
 _FINEST = 1e-6  # [L^power]: the error of a size that is told at least
 _GAP = "\N{EN SPACE} "
+_MARKS = {
+    TipStatus.UNSTABLE: " unstable: {} of the samples",
+    TipStatus.SNAPS: "snaps on the way, not shown: {}",
+    TipStatus.NO_EQUILIBRIUM: "no equilibrium, not shown: {}",
+    TipStatus.UNDECIDED: "undecided, not shown: {}",
+}
 _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
     TipStatus.UNSTABLE: "an unstable equilibrium: a real arm leaves it",
@@ -45,7 +51,7 @@ def size_text(size: Size, arm: Manipulator) -> str:
     """Size with its error in the unit of the arm, to the first digit of the error."""
     if size.power == 0:
         return size.name
-    unit = _unit_of(size, arm)
+    unit = size_unit(size, arm)
     return f"{size.name} {unit.text(size.value, size.power, told_error(size, arm))}"
 
 
@@ -54,7 +60,7 @@ def told_error(size: Size, arm: Manipulator) -> float:
     return max(size.error, _FINEST * arm.length**size.power)
 
 
-def _unit_of(size: Size, arm: Manipulator) -> LengthUnit:
+def size_unit(size: Size, arm: Manipulator) -> LengthUnit:
     """The unit of the arm; for volumes of a liter and more that of liters in place of mL."""
     unit, liter = arm.length_unit, as_unit("cm")
     large = size.power == 3 and size.value >= liter.scale(3)
@@ -99,15 +105,11 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     if reach.arm.loads is None:
         return []
     parts: list[Part] = []
-    if unstable := reach.share(TipStatus.UNSTABLE):
-        parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples {_GAP}"]
-    if snaps := reach.share(TipStatus.SNAPS):
-        parts.append(f"snaps on the way, not shown: {_percent(snaps)} {_GAP}")
-    if lost := reach.share(TipStatus.NO_EQUILIBRIUM):
-        parts.append(f"no equilibrium, not shown: {_percent(lost)} {_GAP}")
-    if undecided := reach.share(TipStatus.UNDECIDED):
-        parts.append(f"undecided, not shown: {_percent(undecided)} {_GAP}")
-    if not (unstable or snaps or lost or undecided):
+    for status, words in _MARKS.items():
+        if share := reach.share(status):
+            marked = [Swatch(UNSTABLE)] if status == TipStatus.UNSTABLE else []
+            parts += [*marked, f"{words.format(_percent(share))} {_GAP}"]
+    if not parts:
         parts.append(f"every sample rests in a stable equilibrium {_GAP}")
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 
@@ -120,7 +122,7 @@ def loaded_share(found: Found, design: Manipulator) -> str:
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = _unit_of(free.size, free.arm).rounded(free.size.value, free.size.power)
+    whole = size_unit(free.size, free.arm).rounded(free.size.value, free.size.power)
     return f" under loads, {share} of {whole} without"
 
 

@@ -1,14 +1,20 @@
-"""Fields of a tab: widgets bound both ways to values of the state."""
+"""Fields of a tab: a panel declares once what it shows of the state and of what is known.
+
+What is declared names what it follows, as jobs do: "design" or "appearance.slice" of the state,
+"found.tip" of what is known, "tab.busy" of the session. It is shown again where that is another
+object. Fields are bound both ways: they follow the state, and write what a person changes into it.
+"""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from operator import attrgetter
+from operator import attrgetter, is_
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from softreach.studio.found import Found
+from softreach.studio.markup import Part
 from softreach.studio.state import StudioState
 from softreach.studio.widgets import (
     Line,
@@ -23,12 +29,21 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
+Change = Callable[[StudioState], StudioState]
+Options = Callable[[StudioState], Mapping[Any, str]]
+Shown = Callable[[StudioState, Found], Any]
+"""Something of the state and of what is known."""
+
+GRAY: Any = {"color": "gray"}
+"""Looks of a button that is not the first of its group."""
+
 
 class Attribute(NamedTuple):
-    """A value of the state that a field shows and changes."""
+    """A value of the state, or of what is found, that a field shows and changes."""
 
-    read: Callable[[StudioState], Any]
-    write: Callable[[StudioState, Any], StudioState]
+    read: Callable[[Any], Any]
+    write: Callable[[Any, Any], Any]
+    of: str = "state"
 
 
 def attribute(path: str) -> Attribute:
@@ -42,60 +57,118 @@ def _with(owner: Any, names: list[str], value: Any) -> Any:
     return replace(owner, **{first: _with(getattr(owner, first), rest, value) if rest else value})
 
 
+def of_design(read: Callable[[Any], Any], write: Callable[[Any, Any], Any]) -> Attribute:
+    """A value of the design, and the design with another one."""
+    return Attribute(
+        lambda state: read(state.design),
+        lambda state, value: state.replace(design=write(state.design, value)),
+    )
+
+
 class Fields:
-    """Fields of a panel: they show values of the state, and write into it what a person changes.
+    """Widgets of a panel. A refused value stays in its field, and the reason stands below it."""
 
-    A refused value stays in its field, and the reason stands below it.
-    """
-
-    def __init__(
-        self,
-        session: Session,
-        message: Line | None = None,
-        *,
-        words: Callable[[SoftreachError], str] = str,
-        dragged: bool = True,
-    ) -> None:
-        """Begin without a field; fields are added where the panel is being built.
-
-        Args:
-            session: Whose state it is.
-            message: Line for refusals of widgets that have none of their own; without one they are
-                shown above all tabs.
-            words: A refusal in words.
-            dragged: Whether fields are dragged. None follows the state then while a person moves
-                one of them, which would jump back to where it was a moment ago.
-        """
-        self._session, self._gui = session, session.client.gui
-        self.message, self._words, self._dragged = message, words, dragged
-        self._lock = threading.RLock()
-        self._bound: list[_Binding] = []
+    def __init__(self, session: Session, words: Callable[[SoftreachError], str] = str) -> None:
+        """Begin without a widget; `words` says a refusal in words."""
+        self.session, self.gui = session, session.client.gui
+        self.message: Line | None = None
+        """Where refusals of widgets stand that have no line of their own; else above all tabs."""
+        self._words = words
+        self._followers: list[_Follower] = []
+        self._bindings: list[_Binding] = []
+        self._groups: list[_Group] = []
         self._widgets: list[Any] = []
+        self._depth = 0
         self._refused: Any = None
-        self._shown: tuple[int, object] = (session.revision, session.state.design)
+
+    def show(self) -> None:
+        """Show again what has changed."""
+        session = self.session
+        for follower in self._followers:
+            now = follower.read(session)
+            if not all(map(is_, now, follower.known)):
+                follower.known = now
+                follower.show(session.state, session.found)
+        for group in self._groups:
+            group.fields.show()
+
+    def remove(self) -> None:
+        """Take all widgets away."""
+        for widget in self._widgets:
+            widget.remove()
+
+    def follow(self, *paths: str, show: Callable[[StudioState, Found], object]) -> None:
+        """Call this at first, and whenever what stands at one of these paths is another object."""
+        self._followers.append(_Follower(paths, show))
+
+    def say(self, *parts: Part) -> None:
+        """Text that stays."""
+        self.kept(Line(self.gui, *parts))
+
+    def text(self, *paths: str, content: Callable[[StudioState, Found], Sequence[Part]]) -> Line:
+        """A line of text that follows; without parts it takes no room."""
+        line = self.kept(Line(self.gui))
+        self.follow(*paths, show=lambda state, found: line.say(*content(state, found)))
+        return line
+
+    def html(self, *paths: str, content: Callable[[StudioState, Found], str]) -> None:
+        """Something of `markup` that follows."""
+        line = self.kept(Line(self.gui))
+        self.follow(*paths, show=lambda state, found: line.show(content(state, found)))
+
+    def picture(self, container: Any, *paths: str, image: Shown) -> None:
+        """A picture at the end of a container, once there is one."""
+        widget = None
+
+        def show(state: StudioState, found: Found) -> None:
+            nonlocal widget
+            pixels = image(state, found)
+            if pixels is not None and widget is not None:
+                widget.image = pixels
+            elif pixels is not None:
+                with container:
+                    widget = self.gui.add_image(pixels, format="png")
+
+        self.follow(*paths, show=show)
+
+    @contextmanager
+    def folder(
+        self, label: str, shown: Shown | None = None, *, expanded: bool = True
+    ) -> Iterator[Any]:
+        """A folder for what is declared inside the block."""
+        folder = self._seen_where(self.gui.add_folder(label, expand_by_default=expanded), shown)
+        self._depth += 1
+        with folder:
+            yield folder
+        self._depth -= 1
+
+    def anew(
+        self,
+        container: Any,
+        *paths: str,
+        key: Shown = lambda *_: object(),
+        build: Callable[[Fields, Any], object],
+        words: Callable[[SoftreachError], str] = str,
+    ) -> None:
+        """Fields at the end of a folder that are made anew where their key differs.
+
+        By default that is whenever what stands at one of the paths is another object.
+        """
+        group = _Group(lambda: Fields(self.session, words), container, build)
+        self._groups.append(group)
+        self.follow(*paths, show=lambda state, found: group.fit(key(state, found)))
 
     def checkbox(self, label: str, at: Attribute, hint: str) -> Any:
         """Add a check box."""
-        return self.bind(self._gui.add_checkbox(label, self._read(at), hint=hint), at)
+        return self.bind(self.gui.add_checkbox(label, self._read(at), hint=hint), at)
 
     def dropdown(
-        self,
-        label: str,
-        options: Mapping[Any, str] | Callable[[StudioState], Mapping[Any, str]],
-        at: Attribute,
-        hint: str,
+        self, label: str, options: Mapping[Any, str] | Options, at: Attribute, hint: str
     ) -> Any:
-        """Add a menu.
-
-        Args:
-            label: Before the menu.
-            options: What each value is called; in each state, if that depends on the design.
-            at: A value of the state that is among them.
-            hint: What it means.
-        """
+        """Add a menu; options say what each value is called, if need be in each state."""
         offered = options if callable(options) else lambda _: options
-        names = offered(self._session.state)
-        widget = self._gui.add_dropdown(
+        names = offered(self.session.state)
+        widget = self.gui.add_dropdown(
             label, tuple(names.values()), initial_value=names[self._read(at)], hint=hint
         )
         return self.bind(widget, at, offered)
@@ -105,145 +178,196 @@ class Fields:
     ) -> SliderField:
         """Add a slider beside a field for the same number."""
         kind = number_kind(unit_in(label), self._length)
-        return self.bind(SliderField(self._gui, label, ends, step, self._read(at), hint, kind), at)
+        return self.bind(SliderField(self.gui, label, ends, step, self._read(at), hint, kind), at)
 
     def number(self, label: str, at: Attribute, hint: str) -> TypedField:
         """Add a field for a number."""
         kind = number_kind(unit_in(label), self._length)
-        return self.bind(TypedField(self._gui, label, self._read(at), hint, kind), at)
+        return self.bind(TypedField(self.gui, label, self._read(at), hint, kind), at)
 
     def vector(self, label: str, at: Attribute, hint: str) -> TypedField:
         """Add a field for three numbers."""
         kind = vector_kind(unit_in(label), self._length)
-        return self.bind(TypedField(self._gui, label, self._read(at), hint, kind), at)
+        return self.bind(TypedField(self.gui, label, self._read(at), hint, kind), at)
+
+    def steps(
+        self,
+        label: str,
+        *paths: str,
+        at: Callable[[StudioState, Found], tuple[int, int]],
+        move: Callable[[int], object],
+        hint: str,
+    ) -> None:
+        """Add a slider over whole numbers, whose value and last number follow."""
+        slider = self.kept(self.gui.add_slider(label, 0, 1, 1, 0, hint=hint))
+
+        def show(state: StudioState, found: Found) -> None:
+            value, last = at(state, found)
+            slider.max = max(last, 1)
+            if slider.value != value:
+                slider.value = value
+
+        def moved(event: Any) -> None:
+            if event.client_id is not None:
+                last = at(self.session.state, self.session.found)[1]
+                attempt(self.session, lambda: move(min(int(slider.value), last)))
+
+        slider.on_update(moved)
+        self.follow(*paths, show=show)
 
     def button(
-        self, label: str, change: Callable[[StudioState], StudioState], hint: str, **looks: Any
+        self,
+        label: str,
+        action: Callable[[], object],
+        hint: str,
+        shown: Shown | None = None,
+        **looks: Any,
     ) -> Any:
-        """Add a button that changes the state."""
-        button = self._gui.add_button(label, hint=hint, **looks)
-        button.on_click(lambda _: self.apply(change))
-        self._widgets.append(button)
+        """Add a button that acts; it is there only where `shown` is true."""
+        button = self._seen_where(self.gui.add_button(label, hint=hint, **looks), shown)
+        button.on_click(lambda _: attempt(self.session, action))
         return button
 
-    def bind(
-        self,
-        widget: Any,
-        at: Attribute,
-        options: Callable[[StudioState], Mapping[Any, str]] | None = None,
+    def change(
+        self, label: str, change: Change, hint: str, shown: Shown | None = None, **looks: Any
     ) -> Any:
+        """Add a button that changes the state."""
+        return self.button(label, lambda: self.apply(change), hint, shown, **looks)
+
+    def choices(self, label: str, actions: Mapping[str, Callable[[], object]], hint: str) -> None:
+        """Add a row of buttons."""
+        row = self.kept(self.gui.add_button_group(label, tuple(actions), hint=hint))
+        row.on_click(lambda _: attempt(self.session, actions[row.value]))
+
+    def upload(self, label: str, read: Callable[[Any], object], hint: str, **looks: Any) -> None:
+        """Add a button that asks for a file."""
+        button = self.kept(self.gui.add_upload_button(label, hint=hint, **looks))
+        button.on_upload(lambda _: attempt(self.session, lambda: read(button.value)))
+
+    def bind(self, widget: Any, at: Attribute, options: Options | None = None) -> Any:
         """Bind a widget, and return it.
 
         Events run at once and in any order: each reads what the widget holds by then, so that the
         last one has it right. Widgets that we set ourselves also send events, without a client.
         """
-        binding = _Binding(widget, at, options)
+        binding = _Binding(self.session, widget, at, options)
+        act = self.session.learn if at.of == "found" else lambda change: self.apply(change, widget)
 
         def moved(event: Any) -> None:
             if event.client_id is not None:
-                self.apply(binding.write, widget)
+                attempt(self.session, lambda: act(binding.write))
 
         widget.on_update(moved)
-        self._bound.append(binding)
-        self._widgets.append(widget)
-        return widget
+        self._bindings.append(binding)
+        self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
+        return self.kept(widget)
 
-    def apply(self, change: Callable[[StudioState], StudioState], widget: Any = None) -> None:
+    def apply(self, change: Change, widget: Any = None) -> None:
         """Change the state, or say below the widget why that cannot be."""
-        place = widget if isinstance(widget, TypedField) else self.message
+        session, before = self.session, self._refused
+        place, refusal = widget if isinstance(widget, TypedField) else self.message, ""
+        dragged = isinstance(widget, SliderField)
         try:
-            self._update(change, by_widget=self._dragged and widget is not None)
-            refusal = ""
+            session.update(change, by_widget=widget is not None, goes_on=dragged)
         except SoftreachError as error:
             refusal = self._words(error)
             if place is None:
-                self._session.fail(error)
-        except Exception as error:  # whoever presses a button sees no log
-            self._session.fail(error)
-            return
-        with self._lock:
-            for line in {self._refused, place} - {None}:
+                session.fail(error)
+        with session.lock:
+            for line in {before, place} - {None}:
                 line.warn(refusal if line is place else "")
-            self._refused = place
-            if widget is None and not refusal:  # refused values of other fields are given up
-                for binding in self._bound:
-                    binding.follow(self._session.state, values=True)
+            self._refused = place if refusal else None
+            if not refusal and (widget is None or before not in (None, place)):
+                for binding in self._bindings:  # what was refused is given up
+                    binding.follow(anyway=True)
 
-    def _update(self, change: Callable[[StudioState], StudioState], *, by_widget: bool) -> None:
-        """Change the state, if that changes anything: a page reports what was only drawn anew."""
-
-        def changed(state: StudioState) -> StudioState:
-            new = change(state)
-            if new == state:
-                raise _Unchanged
-            return new
-
-        with suppress(_Unchanged):
-            self._session.update(changed, by_widget=by_widget)
-
-    def show(self, session: Session) -> bool:
-        """Bring the fields in line with the state; return whether there was anything to do."""
-        with self._lock:
-            revision, design = self._shown
-            state = session.state
-            if session.revision == revision and state.design is design:
-                return False
-            self._shown = session.revision, state.design
-            for binding in self._bound:
-                binding.follow(state, values=session.revision != revision or not self._dragged)
-            return True
-
-    def remove(self) -> None:
-        """Take all fields away."""
-        for widget in self._widgets:
-            widget.remove()
-        self._bound, self._widgets, self._refused = [], [], None
+    def _read(self, at: Attribute) -> Any:
+        return at.read(getattr(self.session, at.of))
 
     def _length(self) -> float:
         """L [m], which may be typed as a unit."""
-        return self._session.state.design.length
+        return self.session.state.design.length
 
-    def _read(self, at: Attribute) -> Any:
-        return at.read(self._session.state)
+    def kept(self, widget: Any) -> Any:
+        """Take this widget away with the others; return it."""
+        if not self._depth:  # a folder takes along what is in it
+            self._widgets.append(widget)
+        return widget
 
+    def _seen_where(self, widget: Any, shown: Shown | None) -> Any:
+        def follow(state: StudioState, found: Found) -> None:
+            if widget.visible != (wanted := bool(shown and shown(state, found))):
+                widget.visible = wanted
 
-class _Unchanged(Exception):
-    """A change that leaves the state as it is."""
-
-
-class _Binding(NamedTuple):
-    widget: Any
-    at: Attribute
-    options: Callable[[StudioState], Mapping[Any, str]] | None
-
-    def write(self, state: StudioState) -> StudioState:
-        value = self.widget.value
-        if self.options is not None:
-            values = {name: value for value, name in self.options(state).items()}
-            if value not in values:  # of a design before
-                return state
-            value = values[value]
-        return self.at.write(state, value)
-
-    def follow(self, state: StudioState, *, values: bool) -> None:
-        value = self.at.read(state)
-        if self.options is not None:
-            names = self.options(state)
-            if tuple(self.widget.options) != tuple(names.values()):
-                self.widget.options, values = tuple(names.values()), True
-            value = names[value]
-        if values and self.widget.value != value:
-            self.widget.value = value
+        if shown is not None:
+            self.follow("state", "found", show=follow)
+        return self.kept(widget)
 
 
-def bind_button(button: Any, session: Session, action: Callable[[], object]) -> None:
-    """Act whenever a person presses the button."""
-    button.on_click(lambda _: attempt(session, action))
+class _Follower:
+    def __init__(self, paths: Sequence[str], show: Callable[[StudioState, Found], object]) -> None:
+        roots = ("found", "state", "tab")
+        full = [path if path.split(".")[0] in roots else f"state.{path}" for path in paths]
+        self.read = attrgetter("client", *(path.removeprefix("tab.") for path in full))
+        self.known: Sequence[Any] = (object(), *paths)
+        self.show = show
+
+
+class _Group:
+    """Fields that are made anew for each key."""
+
+    def __init__(
+        self, make: Callable[[], Fields], container: Any, build: Callable[[Fields, Any], object]
+    ) -> None:
+        self.fields, self._key = make(), object()
+        self._make, self._container, self._build = make, container, build
+
+    def fit(self, key: Any) -> None:
+        if key != self._key:
+            self.fields.remove()
+            self.fields, self._key = self._make(), key
+            with self._container:
+                self._build(self.fields, key)
+
+
+class _Binding:
+    def __init__(
+        self, session: Session, widget: Any, at: Attribute, options: Options | None
+    ) -> None:
+        self._session, self._widget, self._at, self._options = session, widget, at, options
+        self._revision = session.revision
+        self._seen = at.read(getattr(session, at.of))
+        """Where widget and state last agreed; the hand may be ahead of both."""
+
+    def write(self, owner: Any) -> Any:
+        """The state with what the widget holds; what it only shows rounded is left as it is."""
+        value, known = self._widget.value, self._at.read(owner)
+        if self._options is not None:
+            names = self._options(self._session.state)
+            value = {name: value for value, name in names.items()}.get(value, known)
+        if value == known:  # as of a menu whose option is of a design before
+            return owner
+        new = self._at.write(owner, value)
+        self._seen = self._at.read(new)
+        return new
+
+    def follow(self, *, anyway: bool = False) -> None:
+        session, widget = self._session, self._widget
+        value = shown = self._at.read(getattr(session, self._at.of))
+        anyway = anyway or value != self._seen or session.revision != self._revision
+        if self._options is not None:
+            names = self._options(session.state)
+            shown = names[value]
+            if tuple(widget.options) != tuple(names.values()):
+                widget.options, anyway = tuple(names.values()), True
+        self._seen, self._revision = value, session.revision
+        if anyway and widget.value != shown:
+            widget.value = shown
 
 
 def attempt(session: Session, action: Callable[[], object]) -> None:
-    """Act, and show the reader what is wrong if that fails."""
+    """Act, and show the reader what is wrong if that fails: a person sees no log."""
     try:
         action()
-    except Exception as error:  # whoever presses a button sees no log
+    except Exception as error:
         session.fail(error)

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.export import export_cloud, export_mesh
+from softreach.plot.coloring import draw_figure_key
 from softreach.rod.kinematics import configuration
 from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
-from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.scene.colors import sample_values
+from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import Appearance, StudioState, design_of_text
 from softreach.support.errors import InvalidInput
@@ -26,7 +28,6 @@ from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from softreach.plot.coloring import BundleKey, ScalarKey
 
@@ -116,21 +117,17 @@ def _written(name: str, write: Callable[[Path], object]) -> bytes:
         return path.read_bytes()
 
 
-# What a tab shows as a picture that explains itself: key, numbers and design under the scene.
+# What a tab shows as a picture that explains itself: key over the scene, numbers and design below.
 
-
-_PAPER_AND_INK = {False: ("white", "#222"), True: ("#141414", "#ddd")}
+_PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
 """Of a light page and of a dark one."""
 _DPI = 100.0
-_KEY, _LINE, _EDGE = 46, 17, 14  # pixels: height of the key and of a line of text, margin
+_KEY, _LINE, _EDGE = 62, 17, 14  # pixels: height of the key and of a line of text, margin
 _CHARACTER = 6.4  # pixels
 
 
 def picture_file(
-    scene: NDArray[np.uint8],
-    state: StudioState,
-    reach: Reach,
-    key: BundleKey | ScalarKey | None,
+    scene: NDArray[np.uint8], state: StudioState, reach: Reach, key: BundleKey | ScalarKey | None
 ) -> bytes:
     """The picture as PNG.
 
@@ -141,22 +138,25 @@ def picture_file(
         key: To its colors.
     """
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
     height, width = (size / FINER for size in scene.shape[:2])
-    room = max(20, int((int(width) - 2 * _EDGE) / _CHARACTER))
+    room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
     lines = [line for text in _caption(state, reach) for line in textwrap.wrap(text, room)]
-    below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
-    total, dpi = height + below, _DPI * FINER
-    paper, ink = _PAPER_AND_INK[state.appearance.dark]
-    figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=dpi, facecolor=paper)
+    above, below = _KEY if key is not None else 0, 2 * _EDGE + _LINE * len(lines)
+    total, (paper, ink) = above + height + below, _PAPER_AND_INK[state.appearance.dark]
+    size = width / _DPI, total / _DPI
+    figure = Figure(figsize=size, dpi=_DPI * FINER, facecolor=paper)
     figure.figimage(scene, 0, below * FINER)
-    if key is not None:
-        _draw_key(figure, key, (1 - (height + 0.35 * _KEY) / total, _KEY / total), ink)
-    for k, line in enumerate(reversed(lines)):
-        at = (_EDGE + k * _LINE) / total
-        figure.text(_EDGE / width, at, line, fontsize=8.5, color=ink, va="bottom")
+    draw_figure_key(figure, key, above / total)
+    spacing, corner = _LINE / 8.5 * 72 / _DPI / 1.2, (_EDGE / width, _EDGE / total)
+    figure.text(*corner, "\n".join(lines), fontsize=8.5, va="bottom", linespacing=spacing)
+    for text in figure.findobj(Text):
+        text.set_color(ink)
+    for legend in figure.legends:
+        legend.set_frame_on(False)
     file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=dpi, facecolor=paper)
+    figure.savefig(file, format="png", facecolor=paper)
     return file.getvalue()
 
 
@@ -171,20 +171,3 @@ def _caption(state: StudioState, reach: Reach) -> list[str]:
     numbers = "".join(part for part in reach_text(reach) if isinstance(part, str))
     marks = "".join(part for part in legend_text(reach, free=False) if isinstance(part, str))
     return [numbers, *([marks.strip()] if marks else []), design_text(state)]
-
-
-def _draw_key(
-    figure: Figure, key: BundleKey | ScalarKey, place: tuple[float, float], ink: str
-) -> None:
-    from softreach.plot.coloring import BundleKey, color_map, draw_entries
-
-    top, height = place
-    if isinstance(key, BundleKey):
-        look = {"ncols": len(key.labels), "fontsize": 8.5, "frameon": False, "labelcolor": ink}
-        entries = zip(key.labels, key.colors / 255, strict=True)
-        draw_entries(figure, entries, loc="center", bbox_to_anchor=(0.5, top), **look)
-        return
-    bar = figure.add_axes((0.25, top, 0.5, 0.22 * height))
-    figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=key.extend)
-    bar.tick_params(labelsize=8, colors=ink)
-    bar.set_title(key.label, fontsize=8.5, color=ink, pad=3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,7 @@ if TYPE_CHECKING:
     from softreach.inverse.drag import Drag, Dragged
     from softreach.plot.coloring import BundleKey, ScalarKey
     from softreach.requirements import Check
-    from softreach.studio.plots.section import Picture
-    from softreach.studio.plots.sweep import Sweep
+    from softreach.studio.figures import Picture
     from softreach.studio.reach import Reach
     from softreach.studio.slopes import VolumeSlopes
 
@@ -33,50 +33,35 @@ Array = NDArray[np.float64]
 class Found:
     """What is known; each part may be of the design before, until that of the present one is."""
 
-    reach: Reach | None = None
-    """Of the design."""
-    refusal: str = ""
-    """Reason why nothing can be computed of the design."""
-    slopes: VolumeSlopes | None = None
-    """Change of its volume by each slider."""
-    free: Reach | None = None
-    """Reach of a loaded design without its loads."""
-    reference: Reach | None = None
-    """Reach of the design that is kept."""
-    key: BundleKey | ScalarKey | None = None
-    """To the colors of cloud or surface."""
+    reach: Reach | None = None  # of the design
+    refusal: str = ""  # reason why nothing can be computed of the design
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Ends of the sliders of a design, by the names of their parameters."""
+    slopes: VolumeSlopes | None = None  # change of its volume by each slider
+    free: Reach | None = None  # reach of a loaded design without its loads
+    reference: Reach | None = None  # reach of the design that is kept
+    key: BundleKey | ScalarKey | None = None  # to the colors of cloud or surface
     tip: Array | None = None
     """Place of the tip [L]; None before it is known, and without equilibrium."""
-    pointing: Array = field(default_factory=lambda: np.full(3, np.nan))
-    """Direction d3 of the tip."""
+    pointing: Array = field(default_factory=lambda: np.full(3, np.nan))  # direction d3 of the tip
     posture: TipStatus | None = None
     """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
-    answer: Solution | None = None
-    """Every activation that reaches the target."""
+    answer: Solution | None = None  # every activation that reaches the target
     takes_nearest: bool = False
     """True if the arm moves to the nearest of them, as after a click or a typed target."""
     pull: Pull | None = None
     """The latest order of a person who drags the tip; None once it is followed to its end."""
-    drag: Drag | None = None
-    """What follows a dragged tip of the design."""
-    lag: Lag | None = None
-    """How far the arm lags behind the pointer; None when nobody drags."""
-    held: tuple[Manipulator, Dragged] | None = None
-    """An arm, and how the last drag left it."""
-    bench: Bench | None = None
-    """Measured poses, and what was fitted to them."""
-    sample: Sample | None = None
-    """Markers of the pose that is shown."""
-    check: Check | None = None
-    """The design against its needs."""
-    check_refusal: str = ""
-    """Reason why it cannot be judged."""
-    section: Picture | None = None
-    """Of the reachable set by the plane of the slice."""
-    sweep: Sweep | None = None
-    """Volumes of designs that differ in one parameter."""
-    track: xr.Dataset | None = None
-    """Result of `track_path` for the path."""
+    drag: Drag | None = None  # what follows a dragged tip of the design
+    lag: Lag | None = None  # how far the arm lags behind the pointer; None when nobody drags
+    held: tuple[Manipulator, Dragged] | None = None  # an arm, and how the last drag left it
+    bench: Bench | None = None  # measured poses, and what was fitted to them
+    sample: Sample | None = None  # markers of the pose that is shown
+    check: Check | None = None  # the design against its needs
+    check_refusal: str = ""  # reason why it cannot be judged
+    part: int = 0  # number of the part whose numbers are typed, in the list of parts
+    section: Picture | None = None  # of the reachable set by the plane of the slice
+    sweep: Picture | None = None  # volumes of designs that differ in one parameter
+    track: xr.Dataset | None = None  # result of `track_path` for the path
 
     @property
     def is_dragged(self) -> bool:
@@ -98,8 +83,7 @@ class Pull:
     """Place where a person wants the tip [L]."""
 
     place: Array
-    rests: bool
-    """True once the drag has ended there."""
+    rests: bool  # true once the drag has ended there
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,12 +99,9 @@ class Bench:
     """Measured poses, the pose that is shown, and what was fitted to them."""
 
     data: Measurements
-    arm: Manipulator
-    """The design that they were read for."""
-    number: int = 0
-    """Of the pose that is shown."""
-    free: tuple[str, ...] = ("pose",)
-    """Numbers that a fit may change."""
+    arm: Manipulator  # the design that they were read for
+    number: int = 0  # of the pose that is shown
+    free: tuple[str, ...] = ("pose",)  # numbers that a fit may change
     result: Calibration | None = None
 
     def fits(self, arm: Manipulator) -> bool:
@@ -145,12 +126,9 @@ def _columns(arm: Manipulator) -> tuple[object, ...]:
 class Sample:
     """Markers of a measured pose."""
 
-    measured: Array
-    """[m], shape (marker, 3)."""
-    predicted: Array
-    """Of the calibrated arm, or of the design [m], shape (marker, 3)."""
-    arm: Manipulator
-    """The one that predicts."""
+    measured: Array  # [m], shape (marker, 3)
+    predicted: Array  # of the calibrated arm, or of the design [m], shape (marker, 3)
+    arm: Manipulator  # the one that predicts
 
     @property
     def distances(self) -> Array:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from operator import attrgetter
+from functools import cached_property
+from operator import attrgetter, is_
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.studio.found import Found
@@ -18,26 +19,20 @@ if TYPE_CHECKING:
     from softreach.studio.scene.camera import TabCamera
     from softreach.studio.scene.scene import Scene
 
-__all__ = ["Job", "Learned", "Page", "Tools", "forgotten", "what_follows"]
+__all__ = ["Given", "Job", "Learned", "forgotten", "what_follows"]
 
 
-class Page(NamedTuple):
-    """Where jobs draw."""
+class Given(NamedTuple):
+    """What a job has to work with."""
 
+    state: StudioState
+    found: Found
+    quality: Quality
+    check: StaleCheck  # raises if the work is no longer wanted; called between stages
+    report: Callable[[str], None]  # shows the reader what is being done
     client: ClientHandle
     scene: Scene
     camera: TabCamera
-
-
-class Tools(NamedTuple):
-    """Means of a computation."""
-
-    quality: Quality
-    check: StaleCheck
-    """Raises if the work is no longer wanted; called between stages."""
-    report: Callable[[str], None]
-    """Tells the reader what is being done."""
-    page: Page
 
 
 class Learned(NamedTuple):
@@ -47,26 +42,10 @@ class Learned(NamedTuple):
     """Fields of `Found` and their new values, or the next `Found` from the one before."""
     change: Callable[[StudioState], StudioState] | None = None
     """Change of the state that comes of it, such as that of an arm that follows its tip."""
-    ends_step: bool = False
-    """True if the next change is another step for who undoes it."""
+    ends_step: bool = False  # true if the next change is another step for who undoes it
 
 
 Results = Iterator[Learned]
-
-
-def _nothing(state: StudioState, found: Found, tools: Tools) -> Results:
-    del state, found, tools
-    yield from ()
-
-
-def _undrawn(page: Page, state: StudioState, found: Found) -> Mapping[str, Any]:
-    del page, state, found
-    return {}
-
-
-def _always(state: StudioState) -> object:
-    del state
-    return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +56,13 @@ class Job:
     depends_on: tuple[str, ...] = ()
     """Attributes that decide the result: "appearance.arm" of the state, "found.reach" of what is
     known; without any the work is done when it is asked for."""
-    compute: Callable[[StudioState, Found, Tools], Results] = _nothing
+    compute: Callable[[Given], Iterable[Learned]] = lambda _: ()
     """Results, each better than the one before."""
-    draw: Callable[[Page, StudioState, Found], Mapping[str, Any]] = _undrawn
-    """Draws what is known after each result, and takes away what is not; returns what only drawing
-    tells, as fields of `Found`."""
-    wanted: Callable[[StudioState], object] = _always
-    """False for states that have no use of it; it is done once more when that begins."""
+    draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
+    """Draws what is known after each result, and takes away what is not; returns what follows only
+    from drawing, as fields of `Found`."""
+    wanted: Callable[[StudioState, Found], object] = lambda *_: True
+    """False where there is no use of it; it is done once more when that begins."""
     makes: tuple[str, ...] = ()
     """Fields of `Found` that are forgotten where the work fails."""
     draws: tuple[str, ...] = ()
@@ -92,30 +71,25 @@ class Job:
     """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
     that what computes while it draws is sent piece by piece."""
     doing: str = ""
-    """What the reader is told meanwhile."""
+    """What the reader is shown meanwhile."""
 
-    def part_of(self, state: StudioState, found: Found) -> tuple[Any, ...] | None:
-        """What decides the result; None where there is nothing to do."""
-        if not self.wanted(state):
-            return None
-        return tuple(
-            _Known(attrgetter(path.removeprefix("found."))(found))
-            if path.startswith("found.")
-            else attrgetter(path)(state)
-            for path in self.depends_on
-        )
+    @cached_property
+    def _getters(self) -> tuple[attrgetter[Any], attrgetter[Any]]:
+        known = [path.removeprefix("found.") for path in self.depends_on if "found." in path]
+        seen = [path for path in self.depends_on if "found." not in path]
+        same = "__class__", "__class__"  # of two attributes and more there is a tuple
+        return attrgetter(*same, *seen), attrgetter(*same, *known)
 
-
-class _Known:
-    """A part of what is known: the same only if it is the same object."""
-
-    def __init__(self, part: object) -> None:
-        self._part = part
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Known) and self._part is other._part
-
-    __hash__ = None  # pyright: ignore[reportAssignmentType]
+    def is_stale(self, old: tuple[StudioState, Found], new: tuple[StudioState, Found]) -> bool:
+        """True if a change decides another result: of what is known, any other object."""
+        (before, known), (after, now) = old, new
+        was, wanted = bool(self.wanted(before, known)), bool(self.wanted(after, now))
+        if not (was and wanted):
+            return was != wanted
+        of_state, of_found = self._getters
+        if not all(map(is_, of_found(known), of_found(now))):
+            return True
+        return before is not after and of_state(before) != of_state(after)
 
 
 def what_follows(
@@ -125,9 +99,7 @@ def what_follows(
 ) -> list[Job]:
     """The jobs whose results a change makes stale; all that depend on anything if all is new."""
     following = [job for job in jobs if job.depends_on]
-    if old is None:
-        return following
-    return [job for job in following if job.part_of(*old) != job.part_of(*new)]
+    return following if old is None else [job for job in following if job.is_stale(old, new)]
 
 
 def forgotten(job: Job) -> dict[str, Any]:

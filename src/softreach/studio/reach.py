@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.picture.shading import vertex_normals
-from softreach.rod.tip_map import TipMap, TipStatus, has_tip
+from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.studio.state import TOL, solvable_rod
 from softreach.studio.work import (
     Budget,
@@ -24,7 +24,9 @@ from softreach.studio.work import (
     all_cores,
     level_in_memory,
 )
+from softreach.support import parallel
 from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.progress import Progress, silent
 from softreach.workspace import (
     ReachableCurve,
     ReachableSet,
@@ -37,10 +39,9 @@ from softreach.workspace.sheets import Sheets
 if TYPE_CHECKING:
     import xarray as xr
 
-
-_INSIDE = 2e-3
-"""Depth behind a boundary at which activations are counted [L]."""
-_NEIGHBORS = 8
+_INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
+_LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
+_BLOCK = 1 << 13  # targets solved at a time: a tenth of a second, after which others have a turn
 
 Rows = slice | NDArray[np.int64]
 
@@ -136,7 +137,7 @@ class Reach:
     def counts(self) -> NDArray[np.float64]:
         """Number of activations that reach the place of each sample; NaN where it is not known.
 
-        Filled by `studio.multiplicity`.
+        Filled by `count_activations`.
         """
         return np.full(self.samples, np.nan)
 
@@ -168,7 +169,8 @@ class Reach:
         inward = -_INSIDE * self.arm.length * vertex_normals(sheets.vertices, sheets.faces)
         activation = sheets.activation
         if activation is None:
-            activation = given.values[nearest_samples(self, sheets.vertices)].mean(axis=1)
+            shown = given.values[shown_rows(self, _LEVEL)]
+            activation = shown[nearest_samples(self, sheets.vertices)].mean(axis=1)
         cloud = (
             self.cloud[["tip", "activation"]]
             .drop_vars("status", errors="ignore")
@@ -198,14 +200,13 @@ def shown_rows(reach: Reach, level: int) -> NDArray[np.int64]:
     return np.arange(reach.samples)[shown_samples(reach, level)]
 
 
-def nearest_samples(reach: Reach, points: NDArray[np.float64], level: int = 15) -> Rows:
-    """Numbers of the samples nearest to each point [m], of the 2^level first, shape (n, k)."""
+def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Places among `shown_rows(reach, 15)` of the samples nearest to points [m], shape (n, k)."""
     from scipy.spatial import KDTree
 
-    rows = shown_rows(reach, level)
-    count = min(_NEIGHBORS, len(rows))
-    near = KDTree(reach.cloud.tip.values[rows]).query(points, count)[1]
-    return near.reshape(len(points), count)
+    tips = reach.cloud.tip.values[shown_rows(reach, _LEVEL)]
+    count = min(_NEIGHBORS, len(tips))
+    return KDTree(tips).query(points, count)[1].reshape(len(points), count)
 
 
 def unstable_samples(reach: Reach, level: int) -> NDArray[np.bool_]:
@@ -221,108 +222,91 @@ def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
 # Stages: coarse first and then fine, within a budget of time and memory.
 
 
-Report = Callable[[str], None]
-"""Told what is being computed, and how far it is."""
-
-
-def _silent(doing: str) -> None:
-    del doing
-
-
 def stages(
     arm: Manipulator,
     level: int,
     quality: Quality,
     check: StaleCheck,
-    report: Report = _silent,
+    report: Callable[[str], None] = lambda doing: None,
 ) -> Iterator[Reach]:
     """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
+
+    Where samples cost much, under loads and with more than three bundles, the first cloud comes
+    alone, and clouds are as large as there is time for.
 
     Args:
         arm: The design.
         level: The fine cloud has at least 2^level points, where there is time and memory for them.
         quality: How much is computed in each stage, and how long it may take.
         check: Called all the time; raises to stop.
-        report: Told what is being computed.
+        report: Called with words for what is being computed.
 
     Raises:
         InvalidInput: Loads that cannot be computed.
     """
-    work = _Work(arm, solvable_rod(arm), quality, check, report)
-    if arm.loads is not None or work.rod.box.dimension > 3:
-        yield from _slow_stages(work, level)
-        return
-    fine = max(level, quality.fine_level)
-    sizes = (quality.coarse_level, quality.coarse_accuracy), (fine, quality.fine_accuracy)
-    reach = None
-    for stage, (points, accuracy) in enumerate(sizes):
+    rod, work = solvable_rod(arm), _Work(arm, level, quality, check, report)
+    is_slow = arm.loads is not None or rod.box.dimension > 3
+    coarse, fine = quality.coarse_level, max(level, quality.fine_level)
+    if is_slow:
         check()
-        with all_cores:
-            reach = work.cloud(points, stage == 1, reach)
-            reach = work.measured(reach, accuracy)
+        coarse = affordable_level(rod, quality.coarse_seconds, min(level, coarse))
+        fine = affordable_level(rod, quality.fine_seconds, level)
+    rough, exact = quality.coarse_accuracy, quality.fine_accuracy
+    slowly, at_once = ((coarse, 0.0), (0, rough), (fine, exact)), ((coarse, rough), (fine, exact))
+    reach: Reach | None = None
+    for points, accuracy in slowly if is_slow else at_once:
+        check()
+        with all_cores:  # and not while it is drawn, which may take a turn
+            if reach is None or points:
+                reach = work.sampled(reach, points)
+            if accuracy:
+                reach = work.measured(reach, accuracy)
         yield reach
 
 
-def _slow_stages(work: _Work, level: int) -> Iterator[Reach]:
-    """First a cloud alone, as large as there is time for; the exact set takes much longer."""
-    work.check()
-    quality = work.quality
-    points = affordable_level(work.rod, quality.coarse_seconds, min(level, quality.coarse_level))
-    with all_cores:
-        first = replace(work.cloud(points, False), wanted=1 << level)
-    yield first
-    work.check()
-    with all_cores:
-        first = work.measured(first, quality.coarse_accuracy)
-    yield first
-    work.check()
-    points = affordable_level(work.rod, quality.fine_seconds, level)
-    with all_cores:
-        fine = replace(work.cloud(points, True, first), wanted=1 << level)
-        if fine.samples < fine.wanted:
-            note = f"fewer samples than asked: {fine.wanted:,} would take too long"
-            fine = replace(fine, notes=(*fine.notes, note))
-        if not first.refusal:
-            fine = work.measured(fine, quality.fine_accuracy)
-    yield fine  # outside of the turn: whoever draws it may take one
-
-
-class _Work(NamedTuple):
+@dataclass(frozen=True)
+class _Work:
     arm: Manipulator
-    rod: TipMap
+    level: int
     quality: Quality
     check: StaleCheck
-    report: Report
+    report: Callable[[str], None]
 
-    def cloud(self, level: int, fine: bool, known: Reach | None = None) -> Reach:
-        """A cloud of 2^level points, or of as many as memory holds, with what is known besides."""
-        budget = self._budget(f"computing the cloud of {1 << level:,} points", 1 << level)
-        fitting = level_in_memory(self.rod.box.bundles, budget.memory, level)
-        short = f"{1 << fitting:,} of {1 << level:,} samples: more do not fit into the free memory"
+    def sampled(self, known: Reach | None, at: int) -> Reach:
+        """A cloud of 2^at points, or of as many as memory holds, with what is known besides."""
+        budget = self._budget(f"computing the cloud of {1 << at:,} points", 1 << at)
+        count = 1 << level_in_memory(self.arm.inputs, budget.memory, at)
+        notes = ()
+        if count < 1 << at:
+            notes = (f"{count:,} of {1 << at:,} samples: more do not fit into the free memory",)
+        elif at < self.level and known is not None:
+            notes = (f"fewer samples than asked: {1 << self.level:,} would take too long",)
         tol = self.quality.tol
-        cloud = compute_cloud(self.arm, 1 << fitting, sampler="sobol", tol=tol, progress=budget)
-        return Reach(
-            arm=self.arm,
-            cloud=cloud,
-            exact=known and known.exact,
-            refusal=known.refusal if known else "",
-            fine=fine,
-            notes=(short,) if fitting < level else (),
-            wanted=1 << level,
-        )
+        cloud = compute_cloud(self.arm, count, sampler="sobol", tol=tol, progress=budget)
+        reach = known or Reach(arm=self.arm, cloud=cloud, exact=None, fine=False)
+        fine = known is not None
+        return replace(reach, cloud=cloud, fine=fine, notes=notes, wanted=1 << self.level)
 
     def measured(self, reach: Reach, accuracy: float) -> Reach:
         """With its exact set, or with why there is none, or none as accurate as wanted."""
+        if reach.refusal:
+            return reach
         budget = self._budget(f"computing the exact set to {100 * accuracy:g} %")
         try:
-            exact = _exact(reach.arm, accuracy, self.quality.tol, budget)
+            exact = exact_set(reach.arm, accuracy, self.quality.tol, budget)
         except InvalidInput as error:
-            if error.name == "memory":  # so many bundles that no search fits
-                return _without(reach, accuracy, MemoryError())
-            return replace(reach, exact=None, refusal=str(error))  # never at rest
+            if error.name != "memory":
+                return replace(reach, exact=None, refusal=str(error))  # never at rest
+            needed = "needs more memory than is free"  # so many bundles that no search fits
         except (OverBudget, MemoryError) as error:
-            return _without(reach, accuracy, error)
-        return replace(reach, exact=exact, refusal="")
+            is_counted = isinstance(error, OverBudget)
+            needed = f"needs {error if is_counted else 'more memory than is free'}"
+        else:
+            return replace(reach, exact=exact, refusal="")
+        needed = f"to {100 * accuracy:g} % it {needed}"
+        if reach.exact is None:
+            return replace(reach, refusal=needed)
+        return replace(reach, notes=(*reach.notes, f"exact set coarser than asked: {needed}"))
 
     def _budget(self, doing: str, total: int = 0) -> Budget:
         def report(done: int) -> None:
@@ -332,51 +316,68 @@ class _Work(NamedTuple):
         return Budget(self.check, self.quality.most_seconds, report)
 
 
-def _without(reach: Reach, accuracy: float, error: Exception) -> Reach:
-    """Reach with the exact set known before, and with the reason why no more is."""
-    needed = f"needs {error}" if isinstance(error, OverBudget) else "needs more memory than is free"
-    if reach.exact is None:
-        return replace(reach, refusal=f"to {100 * accuracy:g} % it {needed}")
-    note = f"exact set coarser than asked: to {100 * accuracy:g} % it {needed}"
-    return replace(reach, notes=(*reach.notes, note))
-
-
 def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
     """The reach that belongs to a cloud from a file."""
     ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
     shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
     reach = Reach(arm=design_of(cloud), cloud=cloud, exact=None, fine=True, order=shuffled)
-    work = _Work(reach.arm, solvable_rod(reach.arm), quality, lambda: None, _silent)
+    work = _Work(reach.arm, 0, quality, lambda: None, lambda doing: None)
     with all_cores:
         return work.measured(reach, quality.fine_accuracy)
 
 
-def exact_set(
-    arm: Manipulator, accuracy: float, tol: float, check: StaleCheck, seconds: float
-) -> ReachableSet:
+def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
     """The exact set alone.
 
     Args:
         arm: The design.
         accuracy: Relative error allowed in the volume.
         tol: Largest tip error, in L.
-        check: Called all the time; raises to stop.
-        seconds: What it may take [s].
+        budget: Time and memory that it may take.
 
     Raises:
         InvalidInput: Some activation never comes to rest.
         OverBudget: It takes more time or memory.
     """
-    return _exact(arm, accuracy, tol, Budget(check, seconds))
-
-
-def _exact(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
-    many = solvable_rod(arm).box.dimension > 3
+    memory = budget.memory if solvable_rod(arm).box.dimension > 3 else None
     with no_warnings():  # the error is shown beside the volume
-        return reachable_set(
-            arm,
-            accuracy=accuracy,
-            tol=tol,
-            memory=budget.memory if many else None,
-            progress=budget,
-        )
+        return reachable_set(arm, accuracy=accuracy, tol=tol, memory=memory, progress=budget)
+
+
+# Multiplicity: the number of activations that reach a place, as the inverse finds them. The grid of
+# the exact set counts too, but not near folds, where half of the samples of a folded set are.
+
+
+def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of the samples whose number of activations is not known yet."""
+    if isinstance(reach.exact, ReachableSolid) and reach.exact.route == "flux":
+        reach.counts[:] = 1.0  # proved one to one
+    return rows[np.isnan(reach.counts[rows])]
+
+
+def count_activations(
+    reach: Reach,
+    rows: NDArray[np.int64],
+    check: StaleCheck = lambda: None,
+    progress: Progress = silent,
+) -> NDArray[np.float64]:
+    """Number of stable activations that put the tip where that of each sample is, shape (n,).
+
+    Counts are kept with the reach, also if `check` raises.
+
+    Args:
+        reach: Of an arm with three free bundles.
+        rows: Numbers of the samples.
+        check: Called between blocks; raises to stop.
+        progress: Called with the number of samples done since its last call.
+    """
+    from softreach.inverse import solve_inverse
+
+    missing = uncounted(reach, rows)
+    for block in parallel.blocks(len(missing), _BLOCK):
+        check()
+        with all_cores:
+            targets = reach.cloud.tip.values[missing[block]]
+            reach.counts[missing[block]] = solve_inverse(solvable_rod(reach.arm), targets).counts
+        progress(len(targets))
+    return reach.counts[rows]

@@ -3,45 +3,36 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Pull
-from softreach.studio.job import Job, Learned, Page, Tools, forgotten, what_follows
+from softreach.studio.job import Given, Job, Learned, forgotten, what_follows
 from softreach.studio.reach import cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
-from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene, shows_cloud
+from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import Dropped, Latest, StaleCheck, return_memory_soon
+from softreach.studio.work import Dropped, Latest, StaleCheck, rest, return_memory_soon
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["Panel", "Session"]
+__all__ = ["Session"]
 
 Array = NDArray[np.float64]
 
 _CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 _REST = 0.5  # [s] without changes, after which the state is kept
-
-
-class Panel(Protocol):
-    """Widgets of one concept; they call `Session.update` and are notified of changes."""
-
-    def show(self, session: Session) -> None:
-        """Bring the widgets in line with the session; called from any thread, one at a time."""
-        ...
 
 
 class Session:
@@ -55,37 +46,27 @@ class Session:
         *,
         work: KeptWork | None = None,
     ) -> None:
-        """Begin a session; `panels` are added by the app before the first `update`.
-
-        Args:
-            client: The tab.
-            start: What it begins with.
-            jobs: Work that follows from its state.
-            work: Where its state is kept, if anywhere.
-        """
+        """Begin a session of a tab, whose state is kept in `work`; then it is furnished."""
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
+        self.lock = threading.RLock()
+        """Held while the state changes, and while that is shown."""
         self.history = History()
         self.is_touched = False
         """True once there is anything to keep."""
         self.state: StudioState = start.state
         self.found = Found(reach=start.reach)
-        """What jobs have found out."""
-        self.panels: list[Panel] = []
-        self.note = ""
-        """Text for the reader."""
+        self.panels: list[Callable[[], None]] = []
+        """Each shows again what has changed."""
         self.revision = 0
-        """Number of changes that widgets have to follow."""
+        """Number of changes that widgets have to follow, whatever they hold."""
+        self.note, self.doing = "", ""
+        """Texts for the reader, the second on the work that is being done."""
         self.canceled = False
         """True if the reader stopped what was being computed of this state."""
-        self.doing = ""
-        """Work that is being done, for the reader."""
-        self.compiling = False
-        """True while kernels are being compiled, for whichever tab."""
-        self.compiled = 0
-        """Number of kernels compiled since the studio was started."""
-        self._changing, self._showing = threading.RLock(), threading.RLock()
+        self.compiling, self.compiled = False, 0
+        """Whether kernels are being compiled, and how many were since the studio was started."""
         kept = () if work is None else (self._keeping(),)
         self._jobs = {job.name: job for job in (*jobs, *kept)}
         self._workers = {name: Latest(self.fail, self._rested) for name in self._jobs}
@@ -99,6 +80,8 @@ class Session:
         self._follow_change(None)
         self.show()
 
+    # The state, and what is known of it
+
     def update(
         self,
         change: Callable[[StudioState], StudioState],
@@ -110,22 +93,43 @@ class Session:
 
         Args:
             change: From the present state to the next.
-            by_widget: Whether the widgets show the change already. They are left alone then: one
-                that is being dragged would jump back to where it was a moment ago.
-            goes_on: Whether the change may be part of the step before, for who undoes it; what
-                widgets do may be.
+            by_widget: Whether a widget shows the change already. Others that hold something else
+                are left alone then: one that is dragged would jump back to where it was.
+            goes_on: Whether the change may be part of the step before, for who undoes it.
 
         Raises:
             SoftreachError: The change makes no valid state; nothing happens then.
         """
-        with self._changing:
-            old, self.state, self.note = self.state, change(self.state), ""
-            self.history = self.history.after(old, self.state, goes_on=goes_on or by_widget)
-            self.is_touched = self.is_touched or old != self.state
-            self.revision += not by_widget
-            self.canceled = False
-            self._follow_change((old, self.found))
+        with self.lock:
+            new = change(self.state)
+            if by_widget and new == self.state:  # a page reports what was only drawn anew
+                return
+            history = self.history.after(self.state, new, goes_on=goes_on)
+            self.is_touched = self.is_touched or new != self.state
+            self._become(new, history, by_widget=by_widget)
+
+    def _become(
+        self, state: StudioState, history: History, note: str = "", *, by_widget: bool = False
+    ) -> None:
+        old = self.state, self.found
+        self.state, self.history, self.note = state, history, note
+        self.revision += not by_widget
+        self.canceled = False
+        self._follow_change(old)
         self.show()
+
+    def step(self, *, back: bool) -> None:
+        """Undo the latest step of the work, or do again what was undone last."""
+        with self.lock:
+            history, state = (self.history.back if back else self.history.forth)(self.state)
+            stays = state is self.state
+            note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
+            self._become(state, history, note)
+
+    def reset(self) -> None:
+        """Go back to what the studio was opened on; can be undone."""
+        first = self.start.state
+        self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
 
     def restore(self, state: StudioState) -> None:
         """Take up a state that was saved, and its view."""
@@ -133,24 +137,99 @@ class Session:
         if state.camera is not None:
             self.look_as(state.camera)
 
+    def take_up(self, state: StudioState) -> None:
+        """Go on where a tab left off, before anything is shown."""
+        self.state, self.is_touched = state, True
+        if state.design != self.start.state.design:
+            self.found = Found()
+        if state.camera is not None:
+            self.look_as(state.camera)
+
+    def keep(self) -> None:
+        """Write the state to where the next tab or server finds it."""
+        if self.work is not None and self.is_touched:
+            self.work.keep(self.state_now())
+
+    def end_step(self) -> None:
+        """Make the next change a step of its own for who undoes it."""
+        with self.lock:
+            self.history = self.history.at_rest()
+
+    def state_now(self) -> StudioState:
+        """The state with the camera, as it is saved."""
+        return self.state.replace(camera=self.camera.actual())
+
+    def learn(
+        self, found: Mapping[str, Any] | Callable[[Found], Found] | None, *, quiet: bool = False
+    ) -> None:
+        """Replace some fields of `Found`, or all, and start what follows; panels may hear later."""
+        if not found:
+            return
+        with self.lock:
+            old = self.state, self.found
+            self.found = found(self.found) if callable(found) else replace(self.found, **found)
+            self._follow_change(old)
+        if not quiet:
+            self.show()
+
+    # What the reader is shown
+
+    def show(self) -> None:
+        """Let all panels show what has changed."""
+        with self.lock:
+            for show in self.panels:
+                show()
+
+    def say(self, note: str) -> None:
+        """Show text to the reader."""
+        self.note = note
+        self.show()
+
+    def report(self, doing: str) -> None:
+        """Say what is being done; "" for nothing."""
+        if doing != self.doing:
+            self.doing = doing
+            self.show()
+
+    @contextmanager
+    def working(self, doing: str) -> Iterator[None]:
+        """Say what is being done inside the block."""
+        self.report(doing)
+        try:
+            yield
+        finally:
+            self.report("")
+            return_memory_soon()
+
+    def fail(self, error: Exception) -> None:
+        """Show an error; one that is not ours is a bug and goes to the log too."""
+        ours = isinstance(error, SoftreachError | OSError)
+        text = str(error) if ours else f"{type(error).__name__}: {error}"
+        if isinstance(error, MemoryError):
+            text = "There is not enough memory for that: close other tabs."
+        elif not ours:
+            threading.excepthook(
+                threading.ExceptHookArgs((type(error), error, error.__traceback__, None))
+            )
+        self.say(text if len(text) <= _LONGEST_NOTE else f"{text[:_LONGEST_NOTE]} ...")
+
+    def send(self, name: str, content: bytes) -> None:
+        """Have the browser save a file."""
+        self.client.send_file_download(name, content, save_immediately=True)
+
+    # The scene
+
     def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
-        """Place of the tip [m] in the sample under the cursor, of those that can be seen.
+        """Place of the tip [m], shape (3,), in the sample that a ray from the camera [L] meets.
 
-        It is computed anew: a point is rounded, at the rim perhaps to out of reach.
-
-        Args:
-            origin: Of the ray through the pixel: where the camera is [L].
-            direction: Of the ray, any length.
-
-        Returns:
-            Shape (3,); None beside all samples.
+        None beside all. It is computed anew: a point is rounded, at the rim perhaps out of reach.
         """
         reach, look = self.found.reach, self.state.appearance
         shown = look.cloud or look.surface
         if reach is None or not shown or reach.arm != self.state.design:
             return None
         points = cloud_points(reach, look.level)
-        hidden = self.scene.clouds.hidden(points) & shows_cloud(reach, look)
+        hidden = self.scene.hidden(points) & shows_cloud(reach, look)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
         hit = picked_point(points[seen], origin, direction, _CLICK)
         if hit is None:
@@ -169,82 +248,6 @@ class Session:
             camera = framing(*self.scene.axes.corners, toward, self.camera.aspect)
         self.camera.look_from(camera)
 
-    def picture(self) -> NDArray[np.uint8]:
-        """Picture of the tab, RGBA, with `camera.FINER` pixels for each of the page a side.
-
-        Raises:
-            InvalidInput: As `TabCamera.picture`.
-        """
-        return self.camera.picture()
-
-    def step(self, *, back: bool) -> None:
-        """Undo the latest step of the work, or do again what was undone last."""
-        with self._changing:
-            old = self.state
-            walk = self.history.back if back else self.history.forth
-            self.history, self.state = walk(old)
-            stays = self.state is old
-            self.note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
-            self.revision += 1
-            self._follow_change((old, self.found))
-        self.show()
-
-    def reset(self) -> None:
-        """Go back to what the studio was opened on; can be undone."""
-        first = self.start.state
-        self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
-
-    def take_up(self, state: StudioState) -> None:
-        """Go on where a tab left off, before anything is shown."""
-        self.state, self.is_touched = state, True
-        if state.design != self.start.state.design:
-            self.found = Found()
-        if state.camera is not None:
-            self.look_as(state.camera)
-
-    def keep(self) -> None:
-        """Write the state to where the next tab or server finds it."""
-        if self.work is not None and self.is_touched:
-            self.work.keep(self.state_now())
-
-    def end_step(self) -> None:
-        """Make the next change a step of its own for who undoes it."""
-        with self._changing:
-            self.history = self.history.at_rest()
-
-    def state_now(self) -> StudioState:
-        """The state with the camera, as it is saved."""
-        return self.state.replace(camera=self.camera.actual())
-
-    def say(self, note: str) -> None:
-        """Show text to the reader."""
-        self.note = note
-        self.show()
-
-    def show(self) -> None:
-        """Notify all panels."""
-        with self._showing:
-            for panel in self.panels:
-                panel.show(self)
-
-    def learn(
-        self, found: Mapping[str, Any] | Callable[[Found], Found] | None, *, quiet: bool = False
-    ) -> None:
-        """Replace what is known, and start what follows from that.
-
-        Args:
-            found: Fields of `Found` and their new values, or the next `Found` from this one.
-            quiet: Whether panels hear of it later.
-        """
-        if not found:
-            return
-        with self._changing:
-            old = self.state, self.found
-            self.found = found(self.found) if callable(found) else replace(self.found, **found)
-            self._follow_change(old)
-        if not quiet:
-            self.show()
-
     def aim(self, target: ArrayLike) -> None:
         """Find every activation that reaches a target [m], and take the nearest to the present.
 
@@ -256,13 +259,13 @@ class Session:
         self.follow("inverse")  # also where the target is the one before
 
     def drag_to(self, phase: str, wanted: Array) -> None:
-        """Follow a drag of the tip; returns at once. Of its places only the latest is followed.
+        """Follow a drag of the tip to a place [L]; returns at once. Only the latest is followed.
 
-        Args:
-            phase: "start", "update" or "end".
-            wanted: Where the tip should be [L].
+        The phase is "start", "update" or "end".
         """
         self.learn({"pull": Pull(wanted, rests=phase == "end")}, quiet=True)
+
+    # Jobs
 
     @property
     def busy(self) -> bool:
@@ -286,22 +289,6 @@ class Session:
         self._follow_change(None)
         self.show()
 
-    def report(self, doing: str) -> None:
-        """Tell the reader what is being done; "" for nothing."""
-        if doing != self.doing:
-            self.doing = doing
-            self.show()
-
-    @contextmanager
-    def working(self, doing: str) -> Iterator[None]:
-        """Tell the reader what is being done inside the block."""
-        self.report(doing)
-        try:
-            yield
-        finally:
-            self.report("")
-            return_memory_soon()
-
     def follow(self, *names: str) -> None:
         """Do these jobs as soon as they are free, for the state there is by then."""
         for name in names:
@@ -316,15 +303,14 @@ class Session:
         check()
         if job.doing:
             self.report(job.doing)
-        tools = Tools(self.quality, check, self.report, self._page)
         is_drawn = False
         try:
-            for learned in job.compute(self.state, self.found, tools):
+            for learned in job.compute(self._given(check)):
                 check()
-                self._take(job, learned)
+                self._take(job, learned, check)
                 is_drawn = True
             if not is_drawn:
-                self._draw(job)
+                self._draw(job, check)
         except Dropped:
             raise
         except Exception:
@@ -335,33 +321,29 @@ class Session:
             if job.doing:
                 self.report("")
 
-    def _take(self, job: Job, learned: Learned) -> None:
+    def _given(self, check: StaleCheck) -> Given:
+        page = self.client, self.scene, self.camera
+        return Given(self.state, self.found, self.quality, check, self.report, *page)
+
+    def _take(self, job: Job, learned: Learned, check: StaleCheck) -> None:
         self.learn(learned.found, quiet=True)
         if learned.change is not None:
             self.update(learned.change, goes_on=True)
         if learned.ends_step:
             self.end_step()
-        self._draw(job)
+        self._draw(job, check)
 
-    def _draw(self, job: Job) -> None:
+    def _draw(self, job: Job, check: StaleCheck) -> None:
         with self.client.atomic() if job.at_once else nullcontext():
-            told = job.draw(self._page, self.state, self.found)
-        self.learn(told, quiet=True)
+            drawn = job.draw(self._given(check))
+        self.learn(drawn, quiet=True)
         self.show()
-
-    @property
-    def _page(self) -> Page:
-        return Page(self.client, self.scene, self.camera)
 
     def _keeping(self) -> Job:
         """Writes the state, once it rests for a moment, to where the next tab finds it."""
 
-        def keep(state: StudioState, found: Found, tools: Tools) -> Iterator[Learned]:
-            del state, found
-            for _ in range(10 if self.is_touched else 0):
-                tools.check()
-                time.sleep(_REST / 10)
-            tools.check()
+        def keep(given: Given) -> Iterator[Learned]:
+            rest(given.check, _REST if self.is_touched else 0.0)
             self.keep()
             yield from ()
 
@@ -369,7 +351,7 @@ class Session:
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that follows from the state is done; return whether it is."""
-        with self._changing:  # what changes it also asks for what follows
+        with self.lock:  # what changes it also asks for what follows
             pass
         # Work of one kind may order work of another.
         return all(worker.join(timeout) for _ in range(3) for worker in self._workers.values())
@@ -383,24 +365,8 @@ class Session:
         return_memory_soon()
 
     def _rested(self) -> None:
-        """A job has nothing left to do; if that is true of all, the reader is told."""
+        """Once all jobs have nothing left to do, nothing is said to be done."""
         if not self.busy:
             self.doing = ""
             self.show()
             return_memory_soon()
-
-    def fail(self, error: Exception) -> None:
-        """Show an error; one that is not ours is a bug and goes to the log too."""
-        if isinstance(error, SoftreachError | OSError):
-            self.say(_shortened(str(error)))
-        elif isinstance(error, MemoryError):
-            self.say("There is not enough memory for that: close other tabs.")
-        else:
-            self.say(_shortened(f"{type(error).__name__}: {error}"))
-            threading.excepthook(
-                threading.ExceptHookArgs((type(error), error, error.__traceback__, None))
-            )
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST_NOTE else f"{text[:_LONGEST_NOTE]} ..."

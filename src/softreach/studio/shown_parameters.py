@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -12,112 +12,98 @@ from softreach.arm.design_file import in_file_terms
 from softreach.arm.edits import ring_label
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
-from softreach.arm.parameters import Parameter, changed, parameters
+from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
+
+Ends = tuple[float, float]
 
 
 class ShownParameter(NamedTuple):
     """A parameter of a design in the unit that a person reads."""
 
-    name: str
-    """Of the parameter."""
-    label: str
-    """With the unit."""
-    hint: str
-    """Symbol, unit and meaning."""
-    scale: float
-    """Units of the parameter per shown unit."""
-    shown: float
-    """The value in the shown unit; NaN where the design leaves it out."""
+    name: str  # of the parameter
+    label: str  # with the unit
+    hint: str  # symbol, unit and meaning
+    scale: float  # units of the parameter per shown unit
+    shown: float  # the value in the shown unit; NaN where the design leaves it out
     low: float = math.nan
     """End of a slider in the shown unit, like all that follow; NaN without a slider."""
     high: float = math.nan
     step: float = math.nan
+    whole: bool = False  # it counts something
 
     @property
-    def limits(self) -> tuple[float, float]:
+    def limits(self) -> Ends:
         """Ends of the slider: wide enough for a design from a file."""
         return min(self.low, self.shown), max(self.high, self.shown)
 
+    def read(self, arm: Manipulator) -> float:
+        """The value of a design, in the shown unit; 0 where it leaves the number out."""
+        value = shown_value(known_parameters(arm)[self.name], arm, self.scale)
+        return 0.0 if math.isnan(value) else value
+
+    def write(self, arm: Manipulator, shown: float) -> Manipulator:
+        """The design with another value.
+
+        Raises:
+            InvalidDesign: No such arm can exist.
+        """
+        return with_values(arm, {known_parameters(arm)[self.name]: shown * self.scale})
+
 
 @lru_cache(maxsize=16)
-def slider_ends(arm: Manipulator) -> dict[str, tuple[float, float]]:
-    """Ends of the sliders of a design: as far as each alone can go, to three digits."""
-    return {
-        parameter.name: (
-            _end(arm, parameter, parameter.limits[0]),
-            _end(arm, parameter, parameter.limits[1]),
-        )
-        for parameter in slider_parameters(arm)
-    }
+def known_parameters(arm: Manipulator) -> dict[str, Parameter]:
+    """As `parameters`, kept for the next call."""
+    return parameters(arm)
 
 
-def _end(arm: Manipulator, parameter: ShownParameter, end: float) -> float:
-    if _exists(arm, parameter, end):
-        return end
-    inside, outside = parameter.shown, end
-    for _ in range(_HALVINGS):
-        middle = (inside + outside) / 2
-        inside, outside = (middle, outside) if _exists(arm, parameter, middle) else (inside, middle)
-    digits = max(0, 2 - math.floor(math.log10(abs(inside)))) if inside else 0
-    toward = math.floor if end > parameter.shown else math.ceil
-    rounded = toward(inside * 10**digits) / 10**digits
-    beyond = rounded < parameter.shown if end > parameter.shown else rounded > parameter.shown
-    return parameter.shown if beyond else rounded
+def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
+    """The value over a scale, to twelve digits."""
+    return float(f"{parameter.value(arm) / scale:.12g}")
 
 
-def _exists(arm: Manipulator, parameter: ShownParameter, shown: float) -> bool:
-    try:
-        changed(arm, {parameter.name: shown * parameter.scale})
-    except InvalidDesign:
-        return False
-    return True
+# Sliders
 
 
-class _Slider(NamedTuple):
-    label: str
-    low: float
-    high: float
-    step: float
-
-
-_OF_ARM = {
-    "revolution": _Slider("revolution Ω [deg]", 1, 360, 1),
-    "taper": _Slider("taper φ [deg]", -2, 5, 0.05),
-    "radius_ratio": _Slider("inner / outer radius", 0, 1, 0.01),
-    "outer_radius": _Slider("outer radius", 0.02, 0.12, 5e-4),  # of L
-    "extent": _Slider("extent σ [deg]", 2, 120, 1),
-    "lower": _Slider("lowest γ", -4, 0, 0.01),
-    "upper": _Slider("highest γ", -1, 2, 0.01),
+_Slider = tuple[str, float, float, float]
+"""Label, ends and step."""
+_OF_ARM: dict[str, _Slider] = {
+    "revolution": ("revolution Ω [deg]", 1, 360, 1),
+    "taper": ("taper φ [deg]", -2, 5, 0.05),
+    "radius_ratio": ("inner / outer radius", 0, 1, 0.01),
+    "outer_radius": ("outer radius", 0.02, 0.12, 5e-4),  # of L
+    "extent": ("extent σ [deg]", 2, 120, 1),
+    "lower": ("lowest γ", -4, 0, 0.01),
+    "upper": ("highest γ", -1, 2, 0.01),
 }
-_OF_PART = {
-    "bundles": _Slider("bundles of {owner}", 1, 6, 1),
-    "offset": _Slider("offset of {owner} [deg]", 0, 360, 1),
-    "distance_ratio": _Slider("distance of {owner} / outer radius", 0, 1, 0.01),
-    "radius_ratio": _Slider("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
-    "extent": _Slider("extent of {owner} [deg]", 2, 120, 1),
-    "revolution": _Slider("revolution of {owner} [deg]", -360, 360, 1),
+_OF_PART: dict[str, _Slider] = {
+    "bundles": ("bundles of {owner}", 1, 6, 1),
+    "offset": ("offset of {owner} [deg]", 0, 360, 1),
+    "distance_ratio": ("distance of {owner} / outer radius", 0, 1, 0.01),
+    "radius_ratio": ("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
+    "extent": ("extent of {owner} [deg]", 2, 120, 1),
+    "revolution": ("revolution of {owner} [deg]", -360, 360, 1),
 }
 _ONE_FOR_ALL = ("extent", "revolution", "lower", "upper")
 """Fields that have a slider of their own only where parts differ."""
 _AROUND_VALUE = ("lower", "upper", "young_modulus")
 """Fields of any magnitude: their sliders end at multiples of what the design has."""
 _MORE = {
-    "extent": "σ is the angle of the cross-section that the bundle covers",
-    "offset": "the angle around the axis at which the bundle starts at the base",
-    "revolution": "the angle that a fiber turns around the axis from base to tip",
-    "taper": "the angle between the axis and the side of the body",
-    "bundles": "how many equal bundles stand around the axis, each with its own activation",
-    "lower": "the most that a bundle contracts",
-    "upper": "the most that a bundle extends",
+    "extent": "; σ is the angle of the cross-section that the bundle covers",
+    "offset": "; the angle around the axis at which the bundle starts at the base",
+    "revolution": "; the angle that a fiber turns around the axis from base to tip",
+    "taper": "; the angle between the axis and the side of the body",
+    "bundles": "; how many equal bundles stand around the axis, each with its own activation",
+    "lower": "; the most that a bundle contracts",
+    "upper": "; the most that a bundle extends",
 }
-_HALVINGS = 14
 _NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
 """Words of symbols on sliders."""
-_IN_WORDS = {"R2(L)": "R₂ at the tip", "R2(0)": "R₂ at the base"}
+_HALVINGS = 14
 _Unit = tuple[str, float]
 """Name of a unit, and how many units of the parameter it is."""
+_Units = Mapping[str, _Unit]
 _DEGREES: _Unit = ("deg", math.radians(1))
 _KPA: _Unit = ("kPa", 1e3)
 
@@ -129,21 +115,32 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
     What the design leaves open, such as a modulus that cancels, has none; all that actuators and
     profiles outside softreach declare has one, but for a zero of unknown size.
     """
-    known = parameters(arm)
+    known = known_parameters(arm)
     own = {name for name, parameter in known.items() if _is_own(arm, parameter)}
-    sliders: list[ShownParameter] = []
+    units = {"rad": _DEGREES, "m": (arm.length_unit.name, arm.length_unit.size), "Pa": _KPA}
+    shown = []
     for owner in dict.fromkeys(parameter.owner for parameter in known.values()):
-        fields = dict.fromkeys((*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE))
+        fields = (*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE)
         names = [f"{owner}.{field}" if owner else field for field in fields]
         names += [name for name in known if name in own and known[name].owner == owner]
         for parameter in (known[name] for name in dict.fromkeys(names) if name in known):
+            slider = None
             if parameter.name in own:
-                slider = _own_slider(arm, parameter)
-            else:
-                offered = _is_offered(arm, known, parameter)
-                slider = _slider(arm, parameter) if offered else None
-            sliders += [_on_slider(arm, parameter, slider)] if slider else []
-    return tuple(sliders)
+                slider = _own_slider(arm, parameter, units)
+            elif _is_offered(arm, known, parameter):
+                slider = _slider(arm, parameter, units)
+            if slider is not None:
+                shown.append(_on_slider(arm, parameter, units, slider))
+    return tuple(shown)
+
+
+def _on_slider(
+    arm: Manipulator, parameter: Parameter, units: _Units, slider: _Slider
+) -> ShownParameter:
+    more = f"{parameter.meaning}{_MORE.get(parameter.field, '')} (parameter {parameter.name})"
+    shown, (label, low, high, step) = _shown(arm, parameter, units, parameter.symbol, ""), slider
+    label, hint = label.replace("{owner}", parameter.owner), f"{shown.label}: {more}"
+    return shown._replace(label=label, hint=hint, low=low, high=high, step=step)
 
 
 def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
@@ -153,12 +150,12 @@ def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
     return parameter.number.field in own_fields(type(parts_of(arm)[parameter.part]))
 
 
-def _own_slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
+def _own_slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | None:
     """From zero to twice the value, or all angles, within the range; None for a zero of no size.
 
     Where the range itself does not end at zero, the slider stays off it by a hundredth.
     """
-    unit, scale = _unit(parameter, _units_on_sliders(arm))
+    unit, scale = _unit(parameter, units)
     value, allowed = parameter.value(arm) / scale, parameter.range
     low, high = allowed.low / scale, allowed.high / scale
     size = 2 * abs(value) or high - low
@@ -173,43 +170,29 @@ def _own_slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
         min(ends[1], high - step * allowed.open_high),
     )
     owner = f" of {parameter.owner}" if parameter.owner else ""
-    return _Slider(_titled(f"{parameter.symbol}{owner}", unit), *ends, step)
+    return _titled(f"{parameter.symbol}{owner}", unit), *ends, step
 
 
-def _slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
+def _slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | None:
     """Ends and label; None for what the design leaves open, or for a zero of unknown size."""
     value = parameter.value(arm)
     fixed = (_OF_PART if parameter.owner else _OF_ARM).get(parameter.field)
     outside_arm = parameter.field == "distance_ratio" and value > 1
     if fixed and parameter.unit in ("1", "rad", "m") and not outside_arm:
         if parameter.unit == "m":
-            fixed = _in_unit_of(arm, fixed)
+            scale = float(f"{arm.length / arm.length_unit.size:.12g}")
+            low, high, step = (scale * end for end in fixed[1:])
+            fixed = arm.length_unit.label(fixed[0]), low, high, step
         return fixed if math.isfinite(value) else None
-    return None if value == 0 or math.isnan(value) else _around(arm, parameter, value)
-
-
-def _in_unit_of(arm: Manipulator, slider: _Slider) -> _Slider:
-    """A slider over lengths in L, in the unit of the arm."""
-    unit, scale = arm.length_unit, float(f"{arm.length / arm.length_unit.size:.12g}")
-    ends = (scale * end for end in (slider.low, slider.high, slider.step))
-    return _Slider(unit.label(slider.label), *ends)
-
-
-def _around(arm: Manipulator, parameter: Parameter, value: float) -> _Slider:
-    """From zero, or near it where it is not allowed, to twice the value."""
-    name = _NAMES.get(parameter.symbol, parameter.symbol)
-    owner = f" of {_owner_name(arm, parameter.owner)}" if parameter.owner else ""
-    unit, scale = _unit(parameter, _units_on_sliders(arm))
+    if value == 0 or math.isnan(value):
+        return None
+    name, label = _NAMES.get(parameter.symbol, parameter.symbol), owner_label(parameter.owner)
+    rings = {f"ring {k}": ring.name for k, ring in enumerate(arm.section.rings)}
+    owner = f" of {rings.get(label) or label}" if label else ""
+    unit, scale = _unit(parameter, units)
     size = value / scale
     ends = (0.01 if parameter.field == "young_modulus" else 0.0) * size, 2 * size
-    return _Slider(_titled(f"{name}{owner}", unit), min(ends), max(ends), abs(size) / 100)
-
-
-def _owner_name(arm: Manipulator, path: str) -> str:
-    """The part that owns a parameter, a ring by its own name if it has one."""
-    label = owner_label(path)
-    rings = {f"ring {k}": ring.name for k, ring in enumerate(arm.section.rings)}
-    return rings.get(label) or label
+    return _titled(f"{name}{owner}", unit), min(ends), max(ends), abs(size) / 100
 
 
 def owner_label(path: str) -> str:
@@ -222,52 +205,71 @@ def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Par
 
     Only what is helical has a revolution to change; only what is not, its number of bundles.
     """
-    of_all = (
-        known.get(parameter.field) if parameter.owner and parameter.field in _ONE_FOR_ALL else None
-    )
-    if of_all is not None and not math.isnan(of_all.value(arm)):
-        return False
+    if parameter.owner and parameter.field in _ONE_FOR_ALL:
+        of_all = known.get(parameter.field)
+        if of_all is not None and not math.isnan(of_all.value(arm)):
+            return False
     if parameter.field == "revolution":
         return parameter.value(arm) != 0
     turn = known.get(f"{parameter.owner}.revolution")
     return parameter.field != "bundles" or turn is None or turn.value(arm) == 0
 
 
-def _on_slider(arm: Manipulator, parameter: Parameter, slider: _Slider) -> ShownParameter:
-    unit, scale = _unit(parameter, _units_on_sliders(arm))
-    more = f"; {_MORE[parameter.field]}" if parameter.field in _MORE else ""
-    return ShownParameter(
-        parameter.name,
-        slider.label.replace("{owner}", parameter.owner),
-        f"{_titled(parameter.symbol, unit)}: {parameter.meaning}{more} "
-        f"(parameter {parameter.name})",
-        scale,
-        _value(parameter, arm, scale),
-        slider.low,
-        slider.high,
-        slider.step,
-    )
+def slider_ends(
+    arm: Manipulator,
+    before: Mapping[str, Ends] | None = None,
+    check: Callable[[], object] = lambda: None,
+) -> dict[str, Ends]:
+    """Ends of the sliders of a design: as far as each alone can go, to three digits.
+
+    They are looked for near those of a design before; the check is called often, and may raise.
+    """
+    known, before = known_parameters(arm), before or {}
+
+    def end(slider: ShownParameter, which: int) -> float:
+        def exists(shown: float) -> bool:
+            check()
+            try:
+                with_values(arm, {known[slider.name]: shown * slider.scale})
+            except InvalidDesign:
+                return False
+            return True
+
+        near = before.get(slider.name, slider.limits)[which]
+        return _last(slider.shown, slider.limits[which], near, exists)
+
+    return {each.name: (end(each, 0), end(each, 1)) for each in slider_parameters(arm)}
 
 
-def _units_on_sliders(arm: Manipulator) -> Mapping[str, _Unit]:
-    return {"rad": _DEGREES, "m": (arm.length_unit.name, arm.length_unit.size), "Pa": _KPA}
+def _last(start: float, limit: float, near: float, exists: Callable[[float], bool]) -> float:
+    """The last value from a start toward a limit that exists, rounded to three digits inward."""
+    if exists(limit):
+        return limit
+    inside, outside = start, limit
+    digits = max(0, 2 - math.floor(math.log10(abs(near)))) if near else 0
+    for tried in (near, near + math.copysign(10.0**-digits, limit - start)):
+        if near != limit and min(inside, outside) < tried < max(inside, outside):
+            inside, outside = (tried, outside) if exists(tried) else (inside, tried)
+    for _ in range(0 if inside == near else _HALVINGS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if exists(middle) else (inside, middle)
+    digits = max(0, 2 - math.floor(math.log10(abs(inside)))) if inside else 0
+    rounded = (math.floor if limit > start else math.ceil)(inside * 10**digits) / 10**digits
+    return start if (rounded - start) * (limit - start) < 0 else rounded
+
+
+# Parts
 
 
 class Part(NamedTuple):
     """One thing that an arm consists of."""
 
-    label: str
-    """Name in the list of parts."""
-    owners: tuple[str, ...]
-    """Owners of its parameters."""
-    name: str
-    """Its own name, which may be empty."""
-    ring: int | None = None
-    """Index of a ring; None for all else."""
-    actuator: str = ""
-    """Name of an actuator; "" for all else."""
-    home: int | str | None = None
-    """The ring that an actuator is in."""
+    label: str  # name in the list of parts
+    owners: tuple[str, ...]  # owners of its parameters
+    name: str  # its own name, which may be empty
+    ring: int | None = None  # index of a ring; None for all else
+    actuator: str = ""  # name of an actuator; "" for all else
+    home: int | str | None = None  # the ring that an actuator is in
 
 
 _BODY = Part("body", ("", "profile"), "")
@@ -298,12 +300,10 @@ def parts(arm: Manipulator) -> dict[str, Part]:
         owners = (f"rings[{k}]", f"rings[{k}].material")
         listed.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
     labels = {part.label for part in listed}
-    for actuator in arm.actuators:
-        home = actuator.ring if isinstance(actuator, SectorActuator) else None
-        label = f"{actuator.name} (actuator)" if actuator.name in labels else actuator.name
-        listed.append(
-            Part(label, (actuator.name,), actuator.name, actuator=actuator.name, home=home)
-        )
+    for each in arm.actuators:
+        home = each.ring if isinstance(each, SectorActuator) else None
+        label = f"{each.name} (actuator)" if each.name in labels else each.name
+        listed.append(Part(label, (each.name,), each.name, actuator=each.name, home=home))
     return {part.label: part for part in listed}
 
 
@@ -314,56 +314,43 @@ def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
     Of those of the whole arm, what its parts differ in is typed with each of them.
     """
     units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": _KPA}
-    known = [
-        parameter
-        for parameter in parameters(arm).values()
-        if parameter.owner in part.owners
-        and (parameter.owner or not math.isnan(parameter.value(arm)))
-    ]
     return tuple(
-        _shown(arm, parameter, units, parameter.symbol, f"{parameter.meaning}: {parameter.name}")
-        for parameter in known
+        _shown(arm, each, units, each.symbol, f"{each.meaning}: {each.name}")
+        for each in known_parameters(arm).values()
+        if each.owner in part.owners and (each.owner or not math.isnan(each.value(arm)))
     )
 
 
 def named_parameters(arm: Manipulator) -> list[ShownParameter]:
     """All parameters of an arm under their own names, angles in degrees."""
-    known = parameters(arm).values()
-    return [
-        _shown(arm, parameter, {"rad": _DEGREES}, parameter.name, parameter.meaning)
-        for parameter in known
-    ]
+    every = known_parameters(arm).values()
+    return [_shown(arm, each, {"rad": _DEGREES}, each.name, each.meaning) for each in every]
 
 
 def _shown(
-    arm: Manipulator, parameter: Parameter, units: Mapping[str, _Unit], name: str, hint: str
+    arm: Manipulator, parameter: Parameter, units: _Units, name: str, hint: str
 ) -> ShownParameter:
     unit, scale = _unit(parameter, units)
-    return ShownParameter(
-        parameter.name, _titled(name, unit), hint, scale, _value(parameter, arm, scale)
-    )
+    value, label = shown_value(parameter, arm, scale), _titled(name, unit)
+    return ShownParameter(parameter.name, label, hint, scale, value, whole=parameter.whole)
 
 
-def _unit(parameter: Parameter, units: Mapping[str, _Unit]) -> _Unit:
+def _unit(parameter: Parameter, units: _Units) -> _Unit:
     return units.get(parameter.unit, ("" if parameter.unit == "1" else parameter.unit, 1.0))
-
-
-def _value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
-    return float(f"{parameter.value(arm) / scale:.12g}")
 
 
 def _titled(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipulator) -> str:
-    """An error; of faults of a design each number by the label and in the unit of its field.
+# Refusals
 
-    Args:
-        error: What is wrong.
-        shown: The parameters that have fields.
-        arm: The design that was to be changed.
-    """
+
+_IN_WORDS = {"R2(L)": "R₂ at the tip", "R2(0)": "R₂ at the base"}
+
+
+def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipulator) -> str:
+    """An error; of faults of a design each number by the label and in the unit of its field."""
     if not isinstance(error, InvalidDesign):
         return str(error)
     known = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
@@ -16,11 +16,8 @@ from softreach.studio.work import Budget, OverBudget, StaleCheck
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.parallel import undivided
 from softreach.support.quantity import quantity
-from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSolid
 from softreach.workspace.gradient import gradient_of
-
-__all__ = ["NO_BAR", "PART", "Slope", "VolumeSlopes", "slope_bars", "volume_slopes"]
 
 PART = 0.01
 """Part of the range of a slider over which the change of the volume is told."""
@@ -65,44 +62,27 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
         or not solid.volume > 0
     ):
         return found  # what remains are differences between neighbors, which take minutes
-    scale = {
-        slider.name: slider.scale
-        for slider in slider_parameters(arm)
-        if not known[slider.name].whole
-    }
-
-    budget = Budget(check, quality.most_seconds)
-
-    def slopes_by(*names: str) -> dict[str, Slope]:
-        budget()
-        with no_warnings(), undivided():  # other cores are for who moves a slider
-            gradient = gradient_of(solid, names, quality.fine_accuracy, budget)
-        rows = zip(names, gradient.volume, gradient.volume_error, strict=True)
-        return {
-            name: Slope(float(value) * scale[name], float(error) * scale[name])
-            for name, value, error in rows
-        }
-
-    try:
-        return found._replace(slopes=slopes_by(*scale) if scale else {})
-    except SoftreachError:  # one of them, such as a bound at which a bundle is held
-        return found._replace(slopes=_one_by_one(slopes_by, scale))
-    except (OverBudget, MemoryError):
-        return found
-
-
-def _one_by_one(
-    slopes_by: Callable[[str], dict[str, Slope]], names: Iterable[str]
-) -> dict[str, Slope]:
-    slopes = dict[str, Slope]()
-    for name in names:
+    sliders = slider_parameters(arm)
+    scale = {each.name: each.scale for each in sliders if not known[each.name].whole}
+    budget, slopes = Budget(check, quality.most_seconds), dict[str, Slope]()
+    groups = [tuple(scale)] if scale else []
+    while groups:
+        names = groups.pop()
         try:
-            slopes |= slopes_by(name)
-        except SoftreachError:
-            continue
+            budget()
+            with no_warnings(), undivided():  # other cores are for who moves a slider
+                gradient = gradient_of(solid, names, quality.fine_accuracy, budget)
+        except SoftreachError:  # of one of them, such as a bound at which a bundle is held
+            groups += [(name,) for name in names if len(names) > 1]
         except (OverBudget, MemoryError):
             break
-    return slopes
+        else:
+            rows = zip(names, gradient.volume, gradient.volume_error, strict=True)
+            slopes |= {
+                name: Slope(float(value) * scale[name], float(error) * scale[name])
+                for name, value, error in rows
+            }
+    return found._replace(slopes=slopes)
 
 
 def slope_bars(
@@ -115,39 +95,23 @@ def slope_bars(
         sliders: By names of parameters, with their ranges.
         old: Whether they are of the design before.
     """
+    part = {name: PART * ends for name, (_, ends) in sliders.items() if name in found.slopes}
     changes = {
-        name: (100 * PART * ends / found.volume) * found.slopes[name].value
-        for name, (_, ends) in sliders.items()
-        if name in found.slopes
+        name: 100 * step / found.volume * found.slopes[name].value for name, step in part.items()
     }
-    most = max(map(abs, changes.values()), default=0.0) or 1.0
-    return {
-        name: markup.bar(
-            change / most,
-            _change_text(change, found.slopes[name], found.volume, sliders[name][1]),
-            _meaning(found.slopes[name], *sliders[name], found.arm.length_unit, old=old),
-            faded=old,
+    most, unit = max(map(abs, changes.values()), default=0.0) or 1.0, found.arm.length_unit
+    bars = {}
+    for name, change in changes.items():
+        slope, label = found.slopes[name], unit_in(sliders[name][0].label)
+        error = 100 * part[name] / found.volume * slope.error
+        text = quantity(change, "%", max(error, _FINEST))
+        text = f"+{text}" if change > 0 else text.replace("-", "\N{MINUS SIGN}")
+        per = f"{unit.symbol(3)} per {label}" if label else unit.symbol(3)
+        own = slope.error / unit.scale(3) if math.isfinite(slope.error) else math.nan
+        meaning = (
+            f"{'of the design before; ' if old else ''}change of V over one hundredth of this "
+            f"slider, {f'{part[name]:.3g} {label}'.rstrip()}; "
+            f"∂V/∂({name}) = {quantity(slope.value / unit.scale(3), per, own)}"
         )
-        for name, change in changes.items()
-    }
-
-
-def _change_text(change: float, slope: Slope, volume: float, ends: float) -> str:
-    error = 100 * PART * ends / volume * slope.error
-    text = quantity(change, "%", max(error, _FINEST))
-    return f"+{text}" if change > 0 else text.replace("-", "\N{MINUS SIGN}")
-
-
-def _meaning(
-    slope: Slope, slider: ShownParameter, ends: float, lengths: LengthUnit, *, old: bool
-) -> str:
-    unit, volumes = unit_in(slider.label), lengths.symbol(3)
-    per = f"{volumes} per {unit}" if unit else volumes
-    step = f"{PART * ends:.3g} {unit}".rstrip()
-    before = "of the design before; " if old else ""
-    error = slope.error if math.isfinite(slope.error) else math.nan
-    value, error = slope.value / lengths.scale(3), error / lengths.scale(3)
-    return (
-        f"{before}change of V over one hundredth of this slider, {step}; "
-        f"∂V/∂({slider.name}) = {quantity(value, per, error)}"
-    )
+        bars[name] = markup.bar(change / most, text, meaning, faded=old)
+    return bars

@@ -57,9 +57,6 @@ def start_on_cloud(path: str | PathLike[str], quality: Quality | None = None) ->
     return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
 
 
-# Folder of a user for the state of a program.
-
-
 def user_folder() -> Path:
     """The folder for the state of softreach; `XDG_STATE_HOME` moves it on every system."""
     if chosen := os.environ.get("XDG_STATE_HOME"):
@@ -71,59 +68,40 @@ def user_folder() -> Path:
     return Path.home() / ".local" / "state" / "softreach"
 
 
-# Work on a design that stays when its tab is reloaded or the server ends.
-#
-# The server keeps it: in the user's own folder, a folder for each design that the studio is opened
-# on. The file appears complete or not at all: of two tabs that write, the later state stays.
-
-
 class KeptWork:
-    """One folder; what in it cannot be read is left alone and named in `complaint`."""
+    """The latest state of a tab in a file, which stays when its tab is reloaded or the server ends.
+
+    A file that cannot be read is left alone and named in `complaint`. Of two tabs that write, the
+    later state stays.
+    """
 
     def __init__(self, folder: Path, *, goes_on: bool = True) -> None:
-        """Read what there is.
-
-        Args:
-            folder: Made when first written to.
-            goes_on: Whether to begin with the latest state.
-        """
-        self._folder, self._writing = folder, threading.Lock()
+        """Read what there is in a folder, made when first written to, if work goes on with it."""
+        self._path, self._writing = folder / "latest.json", threading.Lock()
         self.complaint = ""
         """Reason why something could not be read or written; one line."""
-        self.latest: StudioState | None = self._latest() if goes_on else None
+        self.latest: StudioState | None = None
         """The state that was kept last."""
+        try:
+            if goes_on and self._path.exists():
+                self.latest = StudioState.from_json(read_text("file", self._path, LARGEST))
+        except (SoftreachError, OSError) as error:
+            self._complain(error)
 
     def keep(self, state: StudioState) -> None:
-        """Keep the latest state."""
+        """Keep the latest state; a disk that is full or read-only costs the memory of the work."""
         self.latest = state
-        self._write("latest.json", state.to_json())
-
-    def _latest(self) -> StudioState | None:
-        path = self._folder / "latest.json"
         try:
-            return (
-                StudioState.from_json(read_text("file", path, LARGEST)) if path.exists() else None
-            )
+            with self._writing, replacing(self._path, overwrite=True) as partial:
+                partial.write_text(state.to_json(), encoding="utf-8")
         except (SoftreachError, OSError) as error:
-            self._complain(path, error)
-            return None
+            self._complain(error)
 
-    def _write(self, name: str, text: str) -> None:
-        """A disk that is full or read-only costs the memory of the work, not the work."""
-        try:
-            with (
-                self._writing,
-                replacing(self._folder / name, overwrite=True) as partial,
-            ):
-                partial.write_text(text, encoding="utf-8")
-        except (SoftreachError, OSError) as error:
-            self._complain(self._folder / name, error)
-
-    def _complain(self, path: Path, error: Exception) -> None:
-        self.complaint = f"Work is not kept: {path}: {' '.join(str(error).split())}"[:500]
+    def _complain(self, error: Exception) -> None:
+        self.complaint = f"Work is not kept: {self._path}: {' '.join(str(error).split())}"[:500]
 
 
 def work_on(design: Manipulator, *, goes_on: bool = True) -> KeptWork:
-    """Work that is kept of a design."""
+    """Work that is kept of a design, in a folder of its own."""
     digest = hashlib.sha256(design.to_toml().encode()).hexdigest()[:16]
     return KeptWork(user_folder() / "studio" / digest, goes_on=goes_on)

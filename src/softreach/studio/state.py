@@ -1,4 +1,4 @@
-"""State of a tab of the studio as a value, its tip map, and the history of states."""
+"""State of a tab of the studio as a value, what it is made of, and the history of states."""
 
 from __future__ import annotations
 
@@ -14,18 +14,15 @@ import numpy as np
 
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
+from softreach.requirements import Requirements
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.studio.needs import requirements_of
-from softreach.studio.settings import PlotSettings, TipPath
-from softreach.support.errors import InvalidDesign, InvalidInput, Range
+from softreach.support.arrays import as_floats
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
+from softreach.support.files.toml import tables_of
 
-# Tip map of a design, as the studio uses it.
-
-
-TOL = 1e-5
-"""Largest tip error, in L: far below a pixel."""
+TOL = 1e-5  # [L], the largest tip error: far below a pixel
 
 
 def rod_of(arm: Manipulator) -> TipMap:
@@ -51,6 +48,9 @@ def design_of_text(text: str, source: str) -> Manipulator:
     return arm
 
 
+_one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
+
+
 def solvable_rod(arm: Manipulator) -> TipMap:
     """The tip map of a design whose loads can be computed; slow the first time for a loaded arm.
 
@@ -58,15 +58,12 @@ def solvable_rod(arm: Manipulator) -> TipMap:
         InvalidInput: The arm is loaded so heavily that no number of steps suffices.
     """
     if arm.loads is not None:
-        with _one_at_a_time:  # jobs that draw and measure the same arm would both try for long
+        with _one_at_a_time:
             solvable = _is_solvable(arm)
         if not solvable:
             allowed = f"such that tips can be computed to {TOL:g} L"
             raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
     return rod_of(arm)
-
-
-_one_at_a_time = threading.Lock()
 
 
 @lru_cache(maxsize=64)
@@ -77,9 +74,59 @@ def _is_solvable(arm: Manipulator) -> bool:
         return False
 
 
+_MOST_PLACES = 300  # to reach, which are judged while a slider moves
+
+
+@lru_cache(maxsize=32)
+def requirements_of(text: str) -> Requirements:
+    """The requirements in the state of a tab; none for an empty text.
+
+    Raises:
+        InvalidDesign: The text is none of requirements, or names other files.
+        InvalidInput: It lists more places than can be shown.
+    """
+    return needs_of_text(text) if text else Requirements()
+
+
+def needs_of_text(text: str, *, length: float | None = None, source: str = "") -> Requirements:
+    """Requirements from the text of a file that comes from a page, as `Requirements.from_toml`.
+
+    Raises:
+        InvalidDesign: The text is none of requirements, or names other files: those that lie beside
+            it are not sent with it, and files of this machine are not for whoever has the page.
+        InvalidInput: It lists more places than can be shown.
+    """
+    if faults := [Fault(path, None, _allowed(path)) for path in _files_in(text)]:
+        raise InvalidDesign(faults, source)
+    needs = Requirements.from_toml(text, length=length, source=source)
+    if (count := len(needs.places)) > _MOST_PLACES:
+        allowed = f"at most {_MOST_PLACES} in the studio"
+        raise InvalidInput("places", f"{count:,}", allowed, "use softreach check")
+    return needs
+
+
+def _allowed(path: str) -> str:
+    instead = "places_m" if path.endswith("file") else "a table of vertices_m and faces"
+    return f"names another file, which is not sent along: write {instead} instead"
+
+
+def _files_in(text: str) -> list[str]:
+    """Where a text of tables names other files."""
+    try:
+        document = tables_of(text)
+    except ValueError:
+        return []  # which the reader refuses
+    return [
+        f"{key}[{k}].{name}"
+        for key, tables in document.items()
+        for k, table in enumerate(tables if isinstance(tables, list) else ())
+        for name in ("file", "mesh")
+        if isinstance(table, dict) and isinstance(table.get(name), str)
+    ]
+
+
 VERSION = 3
-LEVELS = range(12, 22)
-"""The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
+LEVELS = range(12, 22)  # 2^level points: every such prefix of a Sobol sequence is even
 
 MOUSE = {
     "tip": "drags the tip",
@@ -89,6 +136,8 @@ MOUSE = {
     "none": "turns the view alone",
 }
 """Uses of the mouse in the scene: name -> what the menu says."""
+
+MOST_POINTS = 2000  # of a path: each is followed, drawn and kept in the state
 
 Vector = tuple[float, float, float]
 
@@ -100,12 +149,9 @@ _FAR = 1e3  # [L], beyond which there is nothing to see
 class Slice:
     """A slab across the cloud; the rest is hidden."""
 
-    axis: str = "none"
-    """"x", "y" or "z" across the slab, or "none"."""
-    center: float = 0.0
-    """[L]."""
-    thickness: float = 0.05
-    """[L]."""
+    axis: str = "none"  # "x", "y" or "z" across the slab, or "none"
+    center: float = 0.0  # [L]
+    thickness: float = 0.05  # [L]
 
     def __post_init__(self) -> None:
         if self.axis not in _AXES:
@@ -115,23 +161,38 @@ class Slice:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlotSettings:
+    """Plots beside the scene; each is computed only while it is shown."""
+
+    shown: tuple[str, ...] = ()  # names of the plots, each once and in order
+    parameter: str = ""  # parameter against which the volume is plotted; "" for the first there is
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.parameter, str):
+            raise InvalidInput("plots.parameter", self.parameter, "a str")
+        if not all(isinstance(name, str) for name in self.shown):
+            raise InvalidInput("plots.shown", self.shown, "names of plots")
+        object.__setattr__(self, "shown", tuple(sorted(set(self.shown))))
+
+    def showing(self, name: str, on: bool = True, **changes: Any) -> Self:
+        """A copy with a plot, or without it, and other changes."""
+        shown = {*self.shown, name} if on else {*self.shown} - {name}
+        return replace(self, shown=tuple(shown), **changes)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Appearance:
     """Looks of a tab: what is drawn and how."""
 
     level: int = 17
-    color: str = "effort"
-    """One of `colors.color_names`."""
+    color: str = "effort"  # one of `colors.color_names`
     slice: Slice = field(default_factory=Slice)
-    half: bool = True
-    """The half of the cloud in front of the arm is cut away."""
-    dark: bool = False
-    """The page is dark."""
+    half: bool = True  # the half of the cloud in front of the arm is cut away
+    dark: bool = False  # the page is dark
     cloud: bool = False
     arm: bool = True
-    surface: bool = True
-    """The exact boundary of the reachable set."""
-    mouse: str = "tip"
-    """Use of the mouse in the scene, one of `MOUSE`; it turns the view besides."""
+    surface: bool = True  # the exact boundary of the reachable set
+    mouse: str = "tip"  # use of the mouse in the scene, one of `MOUSE`; it turns the view besides
     plots: PlotSettings = field(default_factory=PlotSettings)
 
     @property
@@ -156,14 +217,44 @@ class Camera:
 
     position: Vector
     look_at: Vector
-    aspect: float | None = None
-    """Width of its picture over the height; None if unknown."""
+    aspect: float | None = None  # width of its picture over the height; None if unknown
 
     def __post_init__(self) -> None:
         if self.aspect is not None:
             _check_number("camera.aspect", self.aspect, 0.0, _FAR)
         for value in (*self.position, *self.look_at):
             _check_number("camera", value, -_FAR, _FAR)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TipPath:
+    """A path of the tip, and how far along it the arm is."""
+
+    points: tuple[Vector, ...]  # [m], in order
+    start: tuple[float, ...] | None = None
+    """Activation to begin with; None for the best-conditioned solution at the first point."""
+    at: int = 0  # the point where the arm is
+
+    def __post_init__(self) -> None:
+        if not 2 <= len(self.points) <= MOST_POINTS:
+            raise InvalidInput("path", f"{len(self.points)} points", f"2 to {MOST_POINTS}")
+        if not np.isfinite(self.points).all():
+            raise InvalidInput("path", "not finite", "finite numbers [m]")
+        if not isinstance(self.at, int) or not 0 <= self.at < len(self.points):
+            raise InvalidInput("path.at", self.at, f"0 to {len(self.points) - 1}")
+
+    @classmethod
+    def through(cls, points: Any, start: Sequence[float] | None = None, at: int = 0) -> Self:
+        """A path through points [m], shape (k, 3).
+
+        Raises:
+            InvalidInput: Points of another shape, too few or too many, or not finite.
+        """
+        values = as_floats("path", points)
+        if values.ndim != 2 or values.shape[1] != 3:
+            raise InvalidInput("path.shape", values.shape, "of shape (k, 3)")
+        start = None if start is None else tuple(map(float, start))
+        return cls(points=tuple(map(vector, values)), start=start, at=at)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,12 +302,11 @@ class StudioState:
 
     def to_json(self) -> str:
         """The state as text, from which `from_json` makes an equal one."""
-        values = {name: getattr(self, name) for name in _PLAIN}
-        values["appearance"] = asdict(self.appearance)
-        values["camera"] = self.camera and asdict(self.camera)
-        values["path"] = self.path and asdict(self.path)
-        values["design"] = self.design.file_text
-        values["reference"] = self.reference and self.reference.file_text
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        for name in ("appearance", "camera", "path"):
+            values[name] = values[name] and asdict(values[name])
+        for name in ("design", "reference"):
+            values[name] = values[name] and values[name].file_text
         return json.dumps({"softreach_studio": VERSION, **values}, indent=1, ensure_ascii=False)
 
     @classmethod
@@ -227,49 +317,46 @@ class StudioState:
             InvalidInput: The text is no such state.
             InvalidDesign: A design in it cannot exist.
         """
-        values = _parsed(text)
+        allowed = f"a state that the studio saved, version {VERSION}"
         try:
-            return cls(**_fields(values))
+            values = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise InvalidInput("state file", str(error), allowed) from None
+        version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
+        if version != VERSION:
+            raise InvalidInput("state file", f"version {version}", allowed)
+        try:
+            return cls(**_fields(**values))
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if type(error).__module__.startswith("softreach"):
                 raise
-            raise InvalidInput("state file", str(error), "one that the studio saved") from None
+            raise InvalidInput("state file", str(error), allowed) from None
 
 
-_PLAIN = ("activation", "target", "needs")
-
-
-def _parsed(text: str | bytes) -> dict[str, Any]:
-    allowed = f"a state that the studio saved, version {VERSION}"
-    try:
-        values = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput("state file", str(error), allowed) from None
-    version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
-    if version != VERSION:
-        raise InvalidInput("state file", f"version {version}", allowed)
-    return values
-
-
-def _fields(values: dict[str, Any]) -> dict[str, Any]:
-    look = dict(values["appearance"])
-    look["slice"] = Slice(**look["slice"])
-    look["plots"] = PlotSettings(**look["plots"])
-    camera, reference, path = values["camera"], values["reference"], values["path"]
+def _fields(
+    *,
+    design: str,
+    activation: Any,
+    appearance: dict[str, Any],
+    target: Any,
+    reference: str | None,
+    camera: dict[str, Any] | None,
+    path: dict[str, Any] | None,
+    needs: Any,
+) -> dict[str, Any]:
+    plots, cut = PlotSettings(**appearance["plots"]), Slice(**appearance["slice"])
+    if camera is not None:
+        camera |= {name: vector(camera[name]) for name in ("position", "look_at")}
     return {
-        "design": design_of_text(values["design"], "state file"),
-        "activation": tuple(map(float, values["activation"])),
-        "appearance": Appearance(**look),
-        "target": values["target"] and vector(values["target"]),
+        "design": design_of_text(design, "state file"),
+        "activation": tuple(map(float, activation)),
+        "appearance": Appearance(**appearance | {"slice": cut, "plots": plots}),
+        "target": target and vector(target),
         "reference": reference and design_of_text(reference, "state file"),
-        "camera": camera and _camera(**camera),
-        "path": path and TipPath.from_fields(path),
-        "needs": str(values["needs"]),
+        "camera": camera and Camera(**camera),
+        "path": path and TipPath.through(**path),
+        "needs": str(needs),
     }
-
-
-def _camera(position: Any, look_at: Any, aspect: float | None = None) -> Camera:
-    return Camera(position=vector(position), look_at=vector(look_at), aspect=aspect)
 
 
 def vector(values: Iterable[float]) -> Vector:
@@ -293,10 +380,8 @@ def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...
     return tuple(box.clip(values).tolist())
 
 
-# History: states before and states undone, as values, so that going back is exact.
-#
-# Looks are no part of it: whoever goes back to an earlier design keeps the view.
-
+# History: states before and states undone, as values, so that going back is exact. Looks are no
+# part of it: whoever goes back to an earlier design keeps the view.
 
 _LONGEST = 200  # steps back
 _PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
@@ -308,14 +393,10 @@ _POSE = ("activation", "target")
 class History:
     """States to go back and forth to; a change makes a new history."""
 
-    past: tuple[StudioState, ...] = ()
-    """The latest last."""
-    future: tuple[StudioState, ...] = ()
-    """The next last."""
-    kind: str = ""
-    """Of the latest change; "" after a step back or forth."""
-    at: float = field(default=0.0, compare=False)
-    """Time of that change [s]."""
+    past: tuple[StudioState, ...] = ()  # the latest last
+    future: tuple[StudioState, ...] = ()  # the next last
+    kind: str = ""  # of the latest change; "" after a step back or forth
+    at: float = field(default=0.0, compare=False)  # time of that change [s]
 
     def after(
         self,
@@ -350,17 +431,15 @@ class History:
         """The state before the latest step, seen as now; the present one if there was none."""
         if not self.past:
             return self, present
-        *past, last = self.past
-        future = (*self.future, present)
-        return History(past=tuple(past), future=future), _seen_as(present, last)
+        history = History(past=self.past[:-1], future=(*self.future, present))
+        return history, _seen_as(present, self.past[-1])
 
     def forth(self, present: StudioState) -> tuple[History, StudioState]:
         """The state that was undone last, seen as now; the present one if there is none."""
         if not self.future:
             return self, present
-        *future, following = self.future
-        past = (*self.past, present)
-        return History(past=past, future=tuple(future)), _seen_as(present, following)
+        history = History(past=(*self.past, present), future=self.future[:-1])
+        return history, _seen_as(present, self.future[-1])
 
 
 def _seen_as(view: StudioState, state: StudioState) -> StudioState:
@@ -368,7 +447,6 @@ def _seen_as(view: StudioState, state: StudioState) -> StudioState:
 
 
 def _kind(old: StudioState, new: StudioState) -> str:
-    settings = [name for name in _SETTINGS if getattr(old, name) != getattr(new, name)]
-    if settings:  # activations may have been moved into other bounds
-        return " ".join(settings)
-    return "pose" if any(getattr(old, name) != getattr(new, name) for name in _POSE) else ""
+    differ = [name for name in (*_SETTINGS, *_POSE) if getattr(old, name) != getattr(new, name)]
+    settings = [name for name in differ if name in _SETTINGS]
+    return " ".join(settings) or ("pose" if differ else "")  # bounds may have moved activations

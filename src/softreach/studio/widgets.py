@@ -13,19 +13,14 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from softreach.studio import markup
 from softreach.support.quantity import sizes_in
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
-_PRECISION = 12
-"""Digits after the point that viser leaves of what a slider holds."""
+_PRECISION = 12  # digits after the point that viser leaves of what a slider holds
 _UNAPPLIED = "Enter applies it."
-_DIGITS = 15  # of what was converted from another unit
 _UNIT_IN = re.compile(r"\[([^\]]+)\]$| / (L)$")
 
 
@@ -55,33 +50,6 @@ class Line:
         self._widget.remove()
 
 
-def show_where(wanted: bool, *widgets: Any) -> None:
-    """Show widgets that mean something now, and hide them else."""
-    for widget in widgets:
-        if widget.visible != wanted:
-            widget.visible = wanted
-
-
-class PictureFrame:
-    """Place for a picture that changes, empty until there is one."""
-
-    def __init__(self, gui: GuiApi, container: Any) -> None:
-        self._gui, self._container = gui, container
-        self._widget: Any = None
-        self._shown: NDArray[np.uint8] | None = None
-
-    def show(self, image: NDArray[np.uint8]) -> None:
-        """Show a picture, RGB from 0 to 255, shape (rows, columns, 3)."""
-        if image is self._shown:
-            return
-        self._shown = image
-        if self._widget is None:
-            with self._container:
-                self._widget = self._gui.add_image(image, format="png")
-        else:
-            self._widget.image = image
-
-
 def number_of(text: str) -> float | None:
     """The finite number that a text is, with a minus of any kind; None if it is none."""
     try:
@@ -89,11 +57,6 @@ def number_of(text: str) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) else None
-
-
-def number_text(value: float) -> str:
-    """A number as a person would type it."""
-    return f"{value:.12g}"
 
 
 def unit_in(label: str) -> str:
@@ -105,14 +68,10 @@ def unit_in(label: str) -> str:
 class TextKind(NamedTuple):
     """Kind of value that is typed."""
 
-    demand: str
-    """Demand on a text, as in "must be a number"."""
-    value: Callable[[str], Any]
-    """From a text; None if it is no such value."""
-    text: Callable[[Any], str]
-    """From a value, as a person would type it."""
-    has_units: bool = False
-    """True if a text may have a unit, in whose place its value is shown once it is applied."""
+    demand: str  # on a text, as in "must be a number"
+    value: Callable[[str], Any]  # from a text; None if it is no such value
+    text: Callable[[Any], str]  # from a value, as a person would type it
+    has_units: bool = False  # in a text, in whose place the value is shown once it is applied
 
 
 def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
@@ -123,18 +82,18 @@ def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
         length: L [m] of the arm, which is a unit of lengths.
     """
     demand = "a number" + _with_units(unit, length())
-    return TextKind(demand, lambda text: _number(text, unit, length()), number_text, True)
+    return TextKind(demand, lambda text: _number(text, unit, length()), "{:.12g}".format, True)
 
 
 def vector_kind(unit: str, length: Callable[[], float]) -> TextKind:
     """Three of them, as `number_kind`."""
 
-    def value(text: str) -> tuple[float, ...] | None:
+    def value(text: str) -> tuple[float | None, ...] | None:
         parts = tuple(_number(part, unit, length()) for part in _parts(text))
-        return None if len(parts) != 3 or None in parts else parts  # pyright: ignore
+        return None if len(parts) != 3 or None in parts else parts
 
     demand = "three numbers, such as 0, 0, -9.81" + _with_units(unit, length())
-    return TextKind(demand, value, lambda vector: ", ".join(map(number_text, vector)), True)
+    return TextKind(demand, value, lambda vector: ", ".join(f"{x:.12g}" for x in vector), True)
 
 
 def _parts(text: str) -> list[str]:
@@ -147,7 +106,7 @@ def _number(text: str, unit: str, length: float) -> float | None:
     name = next((name for name in sorted(units, key=len)[::-1] if text.endswith(name)), "")
     number = number_of(text.removesuffix(name))
     # 2 deg are 2.0 deg, whatever their sizes in rad
-    return number if number is None or not name else float(f"{number * units[name]:.{_DIGITS}g}")
+    return number if number is None or not name else float(f"{number * units[name]:.15g}")
 
 
 def _units(unit: str, length: float) -> Mapping[str, float]:
@@ -192,10 +151,6 @@ class TypedField:
                 self._text.value = text
                 self._message.warn("")
         self._follow()
-
-    def rename(self, label: str, kind: TextKind, value: Any) -> None:
-        """Show another value of another kind."""
-        self._text.label, self._kind, self.value = label, kind, value
 
     def on_update(self, callback: Callable[[Any], object]) -> None:
         """Call back with the event when a person has applied a value."""

@@ -23,17 +23,14 @@ StaleCheck = Callable[[], None]
 """Raises `Dropped` if what is being done is no longer wanted."""
 
 _PATIENCE = 0.1  # [s], after which whoever waits for a turn looks whether it is still wanted
+_REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
 
 
 class Dropped(Exception):
     """The work in hand is no longer wanted."""
 
 
-def _always_wanted() -> None:
-    """Check of work outside of a worker, which is always wanted."""
-
-
-_check: ContextVar[StaleCheck] = ContextVar("check", default=_always_wanted)
+_check: ContextVar[StaleCheck] = ContextVar("check", default=lambda: None)
 
 
 def check_wanted() -> None:
@@ -71,23 +68,13 @@ class Latest:
     """
 
     def __init__(
-        self, failed: Callable[[Exception], None], idle: Callable[[], None] = _always_wanted
+        self, failed: Callable[[Exception], None], idle: Callable[[], None] = lambda: None
     ) -> None:
-        """Start with nothing to do.
-
-        Args:
-            failed: Called with an exception other than `Dropped`.
-            idle: Called when there is nothing left to do.
-        """
+        """Start with nothing to do; `failed` gets exceptions, `idle` follows the last work."""
         self._failed, self._idle = failed, idle
         self._waiting: Callable[[StaleCheck], None] | None = None
-        self._busy = self._closed = self._canceled = False
+        self._closed = self._canceled = self.busy = False
         self._changed = threading.Condition()
-
-    @property
-    def busy(self) -> bool:
-        """True while there is something to do."""
-        return self._busy
 
     def submit(self, work: Callable[[StaleCheck], None]) -> None:
         """Do this next, instead of whatever was to be next."""
@@ -95,15 +82,15 @@ class Latest:
             if self._closed:
                 return
             self._waiting = work
-            if not self._busy:
-                self._busy = True
+            if not self.busy:
+                self.busy = True
                 threading.Thread(target=self._run, daemon=True).start()
 
     def cancel(self) -> bool:
         """Drop what is being done and what waits; return whether there was anything."""
         with self._changed:
-            self._waiting, self._canceled = None, self._busy
-            return self._busy
+            self._waiting, self._canceled = None, self.busy
+            return self.busy
 
     def close(self) -> None:
         """Drop everything, for good."""
@@ -113,13 +100,13 @@ class Latest:
     def join(self, timeout: float | None = None) -> bool:
         """Wait until there is nothing left to do; return whether that is so."""
         with self._changed:
-            return self._changed.wait_for(lambda: not self._busy, timeout)
+            return self._changed.wait_for(lambda: not self.busy, timeout)
 
     def _run(self) -> None:
-        _check.set(self._check)
+        _check.set(self._stale)
         while (work := self._next()) is not None:
             try:
-                work(self._check)
+                work(self._stale)
             except Dropped:
                 continue
             except Exception as error:  # shown to the reader; a thread has nobody to raise to
@@ -132,31 +119,30 @@ class Latest:
         with self._changed:
             work, self._waiting, self._canceled = self._waiting, None, False
             if work is None:
-                self._busy = False
+                self.busy = False
                 self._changed.notify_all()
             return work
 
-    def _check(self) -> None:
+    def _stale(self) -> None:
         if self._closed or self._canceled or self._waiting is not None:
             raise Dropped
 
 
-_REST, _LONG_REST = 1.0, 60.0  # [s] without an end of any work
+def rest(check: StaleCheck, seconds: float) -> None:
+    """Wait for some time, as long as what comes after is still wanted."""
+    for _ in range(math.ceil(seconds / _PATIENCE)):
+        check()
+        time.sleep(_PATIENCE)
+    check()
 
 
 def _return_memory(check: StaleCheck) -> None:
     """Return what work has freed; after a minute's rest also what is only kept to be quick."""
-    _rest(check, _REST)
+    rest(check, _REST)
     return_memory()
-    _rest(check, _LONG_REST)
+    rest(check, LONG_REST)
     forget_prepared()
     return_memory()
-
-
-def _rest(check: StaleCheck, seconds: float) -> None:
-    for _ in range(math.ceil(seconds / _PATIENCE)):
-        time.sleep(_PATIENCE)
-        check()
 
 
 _returned = Latest(lambda _: None)
@@ -170,10 +156,8 @@ def return_memory_soon() -> None:
 # Budget of one computation: a share of the free memory, and some seconds.
 
 
-_SHARE = 0.2
-"""Of the free memory that one computation may plan with: others hold their results."""
-_LEFT = 0.4
-"""Of the memory that was free in the beginning: with less a computation ends."""
+_SHARE = 0.2  # of the free memory that one computation may plan with: others hold their results
+_LEFT = 0.4  # of the memory that was free in the beginning: with less a computation ends
 _PAUSE = 0.2  # [s] between looks at the memory
 
 
@@ -187,12 +171,9 @@ class Budget:
     def __init__(
         self, check: StaleCheck, seconds: float, report: Callable[[int], None] | None = None
     ) -> None:
-        """Begin now.
+        """Begin now; it may take some seconds [s].
 
-        Args:
-            check: Raises when the computation is no longer wanted.
-            seconds: What it may take [s].
-            report: Told how many items are done in all, at most some times a second.
+        At most some times a second, `report` is called with the number of items done in all.
         """
         self._check, self._report = check, report
         free = free_memory()
@@ -203,10 +184,7 @@ class Budget:
         self._next, self._done = 0.0, 0
 
     def __call__(self, done: int = 0) -> None:
-        """Go on if that is wanted, and there is time and memory.
-
-        Args:
-            done: Items done since the last call.
+        """Go on with so many items done if that is wanted, and there is time and memory.
 
         Raises:
             OverBudget: There is not.
@@ -218,45 +196,31 @@ class Budget:
             raise OverBudget(f"more than {self._seconds:g} s")
         if now >= self._next:
             self._next = now + _PAUSE
-            self._look()
-
-    def _look(self) -> None:
-        if free_memory() < self._least:
-            raise OverBudget("more memory than is free")
-        if self._report is not None:
-            self._report(self._done)
+            if free_memory() < self._least:
+                raise OverBudget("more memory than is free")
+            if self._report is not None:
+                self._report(self._done)
 
 
 # Effort: the samples of an arm that there is time and memory for.
 
 
 _PILOT = 512
-_LOWEST = 10
-"""Level below which a cloud shows no shape."""
-_COPIES = 4
-"""Of a cloud that exist at a time: while it is drawn, colored or written."""
+_LOWEST = 10  # level below which a cloud shows no shape
+_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
 
 
 def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that is computed in time.
+    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
 
-    Args:
-        rod: Of an arm whose samples cost much: loaded, or of many bundles.
-        seconds: What the cloud may take on one core [s].
-        wanted: Level beyond which nobody asks.
+    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
     """
     affordable = math.floor(math.log2(max(seconds, 1e-9) / _seconds_each(rod)))
     return min(wanted, max(_LOWEST, affordable))
 
 
 def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that memory holds.
-
-    Args:
-        bundles: How many activations a sample has.
-        memory: What the cloud and its copies may take [bytes].
-        wanted: Level beyond which nobody asks.
-    """
+    """The level of the largest cloud, at most wanted, that memory [bytes] holds with its copies."""
     each = 8.0 * (bundles + 3) * _COPIES
     return min(wanted, max(_LOWEST, math.floor(math.log2(max(memory, 1.0) / each))))
 
@@ -266,19 +230,14 @@ def _seconds_each(rod: TipMap) -> float:
     """Cost of one sample [s], once everything is compiled and prepared."""
     (cube,) = cube_blocks("sobol", _PILOT, rod.box.bundles, 0, _PILOT)
     gamma = rod.box.from_cube(cube)
-    _tips(rod, gamma[:16])
-    return max(min(_seconds(rod, gamma) for _ in range(2)), 1e-6) / _PILOT
 
+    def seconds(gamma: NDArray[np.float64]) -> float:
+        start = time.perf_counter()
+        (rod.status if rod.supports_unstable else rod.tips)(gamma)
+        return time.perf_counter() - start
 
-def _seconds(rod: TipMap, gamma: NDArray[np.float64]) -> float:
-    start = time.perf_counter()
-    _tips(rod, gamma)
-    return time.perf_counter() - start
-
-
-def _tips(rod: TipMap, gamma: NDArray[np.float64]) -> None:
-    """Do what a cloud does with samples."""
-    (rod.status if rod.supports_unstable else rod.tips)(gamma)
+    seconds(gamma[:16])
+    return max(min(seconds(gamma), seconds(gamma)), 1e-6) / _PILOT
 
 
 # Compilation of kernels, for which only the first use on a machine has to wait.

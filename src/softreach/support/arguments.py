@@ -20,23 +20,6 @@ from typing import Any
 
 from softreach.support.errors import InvalidInput, Range, did_you_mean
 
-__all__ = [
-    "POSITIVE",
-    "as_dataset",
-    "as_flag",
-    "as_function",
-    "as_given",
-    "as_instance",
-    "as_integer",
-    "as_mapping",
-    "as_names",
-    "as_number",
-    "as_one_of",
-    "as_path",
-    "as_text",
-    "plain",
-]
-
 POSITIVE = Range(0.0, open_low=True)
 """Finite numbers above zero."""
 
@@ -60,15 +43,17 @@ def as_integer(name: str, value: object, low: int = 0, high: float = math.inf) -
 
 def as_flag(name: str, value: object) -> bool:
     """True or False, and nothing else that Python takes for true."""
-    flag = plain(value)
-    if isinstance(flag, bool):
-        return flag
-    raise InvalidInput(name, as_given(value), "True or False")
+    return as_instance(name, plain(value), bool, "True or False")
 
 
 def as_text(name: str, value: object) -> str:
     """Text of any length."""
     return as_instance(name, value, str, "text")
+
+
+def as_function(name: str, value: object) -> Callable[..., Any]:
+    """A function, or anything else that can be called."""
+    return as_instance(name, value, Callable, "a function")
 
 
 def as_path(name: str, value: object) -> str:
@@ -103,18 +88,11 @@ def as_mapping(name: str, value: object, each: Callable[[str, Any], Any]) -> dic
     raise InvalidInput(name, as_given(value), "a dictionary whose keys are names")
 
 
-def as_instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> Any:
+def as_instance(name: str, value: Any, kind: Any, what: str) -> Any:
     """An object of a class; `what` names it: "a Manipulator"."""
     if isinstance(value, kind):
         return value
     raise InvalidInput(name, as_given(value), what)
-
-
-def as_function(name: str, value: object) -> Callable[..., Any]:
-    """A function, or anything else that can be called."""
-    if callable(value):
-        return value
-    raise InvalidInput(name, as_given(value), "a function")
 
 
 def as_dataset(

@@ -16,28 +16,6 @@ from numpy.typing import NDArray
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
 
-__all__ = [
-    "Array",
-    "Faces",
-    "Index",
-    "Mask",
-    "Points",
-    "as_directions",
-    "as_faces",
-    "as_floats",
-    "as_indices",
-    "as_points",
-    "as_rows",
-    "as_shares",
-    "as_stations",
-    "check_finite",
-    "joined",
-    "joined_by",
-    "labeled",
-    "read_only",
-    "rows",
-]
-
 Array = NDArray[np.float64]
 """Numbers."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -71,18 +70,6 @@ class NotPossible(SoftreachError, ValueError):
 
     The sentence says what stands in the way, and what to do.
     """
-
-
-def check_date() -> None:
-    """Refuse a date of files in the environment that NumPy and Matplotlib cannot read.
-
-    Raises:
-        InvalidInput: `SOURCE_DATE_EPOCH` is no time of a calendar.
-    """
-    date = os.environ.get("SOURCE_DATE_EPOCH", "0")
-    if not (date.isascii() and date.isdigit() and len(date) < 12):
-        allowed = "a whole number of seconds since 1970, or left out"
-        raise InvalidInput("SOURCE_DATE_EPOCH", repr(date), allowed)
 
 
 class Range(NamedTuple):

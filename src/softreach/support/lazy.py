@@ -2,34 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Generic, Self, TypeVar, overload
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-Result = TypeVar("Result")
+if TYPE_CHECKING:
+    lazy = cached_property
+else:
 
+    class lazy(cached_property):
+        """As `functools.cached_property`, which in Python 3.11 has one lock for all objects.
 
-class lazy(Generic[Result]):
-    """As `functools.cached_property`, which in Python 3.11 lets one thread at a time compute it.
+        Threads that ask different arms would wait for each other. Here two threads that ask the
+        same object at once may both compute it.
+        """
 
-    That lock is one for all objects of a class: threads that ask different arms would wait for each
-    other. Here two threads that ask the same object at once may both compute it.
-    """
-
-    def __init__(self, compute: Callable[[Any], Result]) -> None:
-        self._compute, self.__doc__ = compute, compute.__doc__
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    @overload
-    def __get__(self, instance: None, owner: type) -> Self: ...
-
-    @overload
-    def __get__(self, instance: object, owner: type) -> Result: ...
-
-    def __get__(self, instance: Any, owner: type) -> Any:
-        if instance is None:
-            return self
-        value = self._compute(instance)
-        instance.__dict__[self._name] = value
-        return value
+        def __get__(self, instance: Any, owner: type | None = None) -> Any:
+            if instance is None:
+                return self
+            value = instance.__dict__[self.attrname] = self.func(instance)
+            return value

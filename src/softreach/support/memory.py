@@ -6,9 +6,10 @@ import ctypes
 import gc
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import NotPossible
 
 _UNKNOWN = 4e9  # where the system does not say
 _NOTICED = 1e8  # bytes; below, the system is not asked
@@ -27,33 +28,28 @@ _CONTROL_GROUPS = (
 
 def free_memory() -> float:
     """Memory that can be had without swapping [bytes], or 4e9 where the system does not say."""
-    free = min(_system(), _control_group())
-    return free if free < float("inf") else _UNKNOWN
+    return min([_system(), *_control_groups()])
 
 
 def _system() -> float:
-    try:
+    with suppress(OSError, StopIteration, ValueError):
         lines = Path("/proc/meminfo").read_text().splitlines()
         return next(1024.0 * int(line.split()[1]) for line in lines if "MemAvailable" in line)
-    except (OSError, StopIteration, ValueError):
-        pass
-    try:
+    with suppress(AttributeError, OSError, ValueError):
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")) / 2.0
-    except (AttributeError, OSError, ValueError):
-        return float("inf")
+    return _UNKNOWN
 
 
-def _control_group() -> float:
+def _control_groups() -> list[float]:
     """Memory that a container leaves of its limit, with the files that it keeps only to read."""
+    found = []
     for limit, used, stat, kept in _CONTROL_GROUPS:
-        try:
+        with suppress(OSError, ValueError):  # no such group, or its limit is "max"
             lines = map(str.split, (_CONTROL_GROUP / stat).read_text().splitlines())
             cache = next((float(value) for name, value in lines if name == kept), 0.0)
             free = float((_CONTROL_GROUP / limit).read_text())
-            return free - float((_CONTROL_GROUP / used).read_text()) + cache
-        except (OSError, ValueError):  # no such group, or its limit is "max"
-            continue
-    return float("inf")
+            found.append(free - float((_CONTROL_GROUP / used).read_text()) + cache)
+    return found
 
 
 def return_memory() -> None:
@@ -69,8 +65,8 @@ def check_memory(name: str, value: object, needed: float) -> None:
     """Refuse what takes more memory than is free [bytes]: Linux would grant it, then kill.
 
     Raises:
-        InvalidInput: The argument of this name and value needs too much.
+        NotPossible: What has this name and value needs too much.
     """
     if needed > _NOTICED and needed > (free := free_memory()):
         taken = f"{needed / 1e9:,.1f} GB of memory, of which {free / 1e9:,.1f} GB are free"
-        raise InvalidInput(name, value, f"smaller: it takes {taken}")
+        raise NotPossible(f"{name} = {value} needs {taken}")

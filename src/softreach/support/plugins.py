@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import sys
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -22,8 +22,6 @@ ACTUATORS, PROFILES, METRICS = (
     f"softreach.{each}" for each in ("actuators", "profiles", "metrics")
 )
 """Groups of entry points: the name of a class, or of a metric, and where it is."""
-
-_A_MODULE = "a module that can be imported"
 
 _imported: list[ModuleType] = []
 
@@ -46,15 +44,12 @@ def importing(names: Iterable[str]) -> Iterator[None]:
 
 def _import(name: str) -> ModuleType:
     path = Path(name).resolve() if name.endswith(".py") else None
-    if path is not None and not path.is_file():
-        raise InvalidInput("import", name, "the path of a .py file that exists")
-    if path is not None and str(path.parent) not in sys.path:
+    if path is not None:
+        if not path.is_file():
+            raise InvalidInput("import", name, "the path of a .py file that exists")
         sys.path.append(str(path.parent))
     importlib.invalidate_caches()
-    try:
-        module = importlib.import_module(path.stem if path else name)
-    except (Exception, SystemExit) as error:
-        raise InvalidInput("import", name or "''", _A_MODULE, _cause(error)) from error
+    module = _tried("import", name, lambda: importlib.import_module(path.stem if path else name))
     if path is not None and Path(module.__file__ or "").resolve() != path:
         raise InvalidInput("import", name, "a file whose name no other module has")
     return module
@@ -78,11 +73,16 @@ def loaded(entry: EntryPoint) -> Any:
     Raises:
         InvalidInput: It cannot be imported.
     """
+    return _tried(f"entry point {entry.name}", entry.value, entry.load)
+
+
+def _tried(name: str, value: str, load: Callable[[], Any]) -> Any:
+    """What is loaded; an error of the user's code is refused with its line."""
     try:
-        return entry.load()
+        return load()
     except (Exception, SystemExit) as error:
-        name = f"entry point {entry.name}"
-        raise InvalidInput(name, entry.value, _A_MODULE, _cause(error)) from error
+        cause = _cause(error)
+        raise InvalidInput(name, value or "''", "a module that can be imported", cause) from error
 
 
 def _cause(error: BaseException) -> str:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import base64
 import io
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from html import escape
 from importlib.resources import files
 from os import PathLike
 from typing import Any
@@ -16,9 +18,9 @@ from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
 from softreach.support.quantity import columns
 
-__all__ = ["REPORT", "Report", "Section", "check_libraries"]
+__all__ = ["REPORT", "Report", "Reported", "Section", "check_libraries"]
 
-REPORT: Formats = {".html": FileFormat(("jinja2",), "paper")}
+REPORT: Formats = {".html": FileFormat(("jinja2",), "report")}
 """Formats of reports."""
 
 _DPI = 160
@@ -65,6 +67,9 @@ class Report:
                 lines += section.points
         return "\n  ".join(lines)
 
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write one HTML file, to be read offline.
 
@@ -86,13 +91,27 @@ class Report:
             file.write(page.encode())
 
 
+class Reported(ABC):
+    """A result that shows itself by its report."""
+
+    @abstractmethod
+    def report(self) -> Report:
+        """All of it, to be printed, or saved as an .html file."""
+
+    def __repr__(self) -> str:
+        return str(self.report())
+
+    def _repr_html_(self) -> str:
+        return self.report()._repr_html_()
+
+
 def check_libraries() -> None:
     """Say which libraries of a report with pictures are missing.
 
     Raises:
         MissingExtra: matplotlib or Jinja2 is not installed.
     """
-    check_installed(("matplotlib", "plot"), ("jinja2", "paper"))
+    check_installed(("matplotlib", "plot"), ("jinja2", "report"))
 
 
 def _template() -> Any:

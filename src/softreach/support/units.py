@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from softreach.support.arguments import as_given
@@ -70,6 +71,10 @@ class LengthUnit(NamedTuple):
     def rounded(self, value: float, power: int = 1, digits: str = ".4g") -> str:
         """A value in SI units with so many digits, such as "12.5 mm"."""
         return f"{value / self.scale(power):{digits}} {self.symbol(power)}"
+
+    def place(self, point: Iterable[float]) -> str:
+        """A position [m] in words: "(200, 100, 600) mm"."""
+        return f"({', '.join(f'{x / self.size:.6g}' for x in point)}) {self.name}"
 
     def scale(self, power: int = 1) -> float:
         """Size of the unit of lengths [m], of areas [m²] for power 2, of volumes [m³] for 3."""

@@ -430,8 +430,9 @@ class ReachableSolid(ReachableSet):
         numbers = super()._numbers()
         if self.shell is not None:
             area, thickness = self.shell
-            numbers |= with_error("shell_area", *area, "m2", "area of the thin set")
-            numbers |= with_error("shell_thickness", *thickness, "m", "thickness of the thin set")
+            sheet = with_error("shell_area", *area, "m2", "area of the thin set")
+            sheet |= with_error("shell_thickness", *thickness, "m", "thickness of the thin set")
+            numbers = sheet | numbers
         if self.multiplicity:
             about = {"units": "m3", "long_name": "error of the volume reached more than once"}
             numbers["multiplicity_error"] = ((), self.multiplicity_error, about)

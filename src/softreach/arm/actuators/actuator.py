@@ -9,27 +9,16 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.along import AlongArm
 from softreach.arm.number import MOST, Number, as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import Fault, InvalidDesign, Range
 
-__all__ = [
-    "MOST_BUNDLES",
-    "MOST_TURN",
-    "Actuator",
-    "Bounds",
-    "Outline",
-    "PolarActuator",
-    "Resultants",
-    "bounds_faults",
-]
-
-Array = NDArray[np.float64]
 Bounds = tuple[float, float] | tuple[tuple[float, float], ...]
 
 MOST_TURN = 200 * math.pi
@@ -69,26 +58,13 @@ class Outline:
     """Outer radius of each bundle over R2 [-], shape (station, bundle)."""
     shape: tuple[str, ...]
     """"sector" of a ring, "line" along the arm, or round "lumen", for each bundle."""
-    acts: NDArray[np.bool_]
+    acts: Mask
     """Stations at which each bundle acts, shape (station, bundle)."""
 
     @property
     def middle_ratio(self) -> Array:
         """Radius of the middle line of each bundle over R2 [-], shape (station, bundle)."""
         return 0.5 * (self.inner_ratio + self.outer_ratio)
-
-    @classmethod
-    def empty(cls, stations: int) -> Outline:
-        """The outline of a passive rod at so many stations."""
-        nowhere = np.empty((stations, 0))
-        return cls(
-            center=nowhere,
-            extent=np.empty(0),
-            inner_ratio=nowhere,
-            outer_ratio=nowhere,
-            shape=(),
-            acts=np.empty((stations, 0), bool),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,9 +183,10 @@ class Actuator(Span, ABC):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations inside (0, L) where its load jumps or is not smooth [m]."""
-        return tuple(z for z in self.span(profile.length) if 0.0 < z < profile.length)
+        places = (*self.span(profile.length), *(profile.length * x for x in self.breaks))
+        return tuple(z for z in places if 0.0 < z < profile.length)
 
-    def acts(self, profile: Profile, z: Array) -> NDArray[np.bool_]:
+    def acts(self, profile: Profile, z: Array) -> Mask:
         """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
 
         Returns:
@@ -221,7 +198,6 @@ class Actuator(Span, ABC):
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
         """Faults that keep it from driving an arm with this profile and section."""
-        del profile, section
         return []
 
     def _faults(self) -> list[Fault]:

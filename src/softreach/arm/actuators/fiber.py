@@ -11,19 +11,15 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.actuators.actuator import MOST_TURN
-from softreach.arm.actuators.ring_integrals import RingIntegrals
-from softreach.arm.actuators.sector import SectorActuator, cone_integrals
+from softreach.arm.actuators.sector import RingIntegrals, SectorActuator, cone_integrals
 from softreach.arm.along import AlongArm, Pieces
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-
-__all__ = ["FiberArchitecture", "ObliqueMuscle", "RadialMuscle", "helical_rotation"]
-
-Array = NDArray[np.float64]
+from softreach.support.arrays import Array
 
 # Enough for machine precision between two samples of an angle.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -54,21 +50,14 @@ class FiberArchitecture(SectorActuator):
         "α",
         "rad",
         "helical angle at the outer radius",
-        low=-math.pi / 2,
-        high=math.pi / 2,
-        open_low=True,
-        open_high=True,
+        above=-math.pi / 2,
+        below=math.pi / 2,
         along=AlongArm,
         instead_of="revolution",
         hint=" (0 for a longitudinal fiber)",
         default=None,
     )
     """α, from the axis, at the outer radius of the ring [rad]; |α| < π/2; may change along Z."""
-
-    def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        angle = self.helical_angle
-        breaks = angle.breaks if isinstance(angle, AlongArm) else ()
-        return (*super().breakpoints(profile), *(profile.length * x for x in breaks))
 
     def helical_angle_on(self, profile: Profile, section: Section) -> float | AlongArm:
         """α at the outer radius of the ring [rad], which the revolution fixes."""
@@ -86,7 +75,6 @@ class FiberArchitecture(SectorActuator):
         return float(self.rotation(profile, section, end)[0])
 
     def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
-        """Of Ω and α, the one not given follows from the other."""
         if field == "revolution":
             return self.revolution_on(profile, section)
         if field == "helical_angle":
@@ -172,13 +160,7 @@ class ObliqueMuscle(SectorActuator):
     )
 
     helical_angle: float = number(
-        "α",
-        "rad",
-        "angle of its fibers",
-        low=-math.pi / 2,
-        high=math.pi / 2,
-        open_low=True,
-        open_high=True,
+        "α", "rad", "angle of its fibers", above=-math.pi / 2, below=math.pi / 2
     )
     """α of its fibers from the axis, at the outer radius of the ring [rad]; 0 is longitudinal."""
 
@@ -194,7 +176,6 @@ class ObliqueMuscle(SectorActuator):
         return cone_integrals(section.ring(self.ring), profile.slope(z), angle)
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        del profile, section
         return np.zeros(len(z))
 
 
@@ -219,7 +200,6 @@ class RadialMuscle(SectorActuator):
 
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0 = -ν (1 - ρ²)/2, I1 = -ν (1 - ρ³)/3, I3 = 0 [-]."""
-        del profile
         ring = section.ring(self.ring)
         nu, rho, each = ring.material.poisson_ratio, ring.radius_ratio, np.ones(len(z))
         return RingIntegrals(
@@ -227,5 +207,4 @@ class RadialMuscle(SectorActuator):
         )
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        del profile, section
         return np.zeros(len(z))

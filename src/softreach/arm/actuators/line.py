@@ -7,34 +7,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.actuators.actuator import MOST_TURN, Outline, PolarActuator, Resultants
-from softreach.arm.along import AlongArm, Samples
+from softreach.arm.along import Samples
 from softreach.arm.number import as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault
-
-__all__ = ["Chamber", "LengthTendon", "Tendon"]
-
-Array = NDArray[np.float64]
-
-
-class _Route(NamedTuple):
-    """Polar coordinates of the tendons and their slopes along the arm."""
-
-    distance: Array
-    """ρt(Z) [m], shape (station, 1)."""
-    distance_slope: Array
-    """ρt'(Z) [-], shape (station, 1)."""
-    angle: Array
-    """θ(Z) [rad], shape (station, bundle)."""
-    angle_slope: Array
-    """θ'(Z) [rad/m], shape (station, 1)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,23 +78,19 @@ class Tendon(PolarActuator):
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = -t3 and M = -p × t along t = (p' + e3)/|p' + e3| of the straight arm: (52)."""
-        del section
-        route = self._route(profile, z)
-        cos, sin = np.cos(route.angle), np.sin(route.angle)
-        around = route.distance * route.angle_slope
-        x, y = route.distance * cos, route.distance * sin
-        t1 = route.distance_slope * cos - around * sin
-        t2 = route.distance_slope * sin + around * cos
+        (distance, inclination), (angle, turning) = self._route(profile, z)
+        cos, sin, around = np.cos(angle), np.sin(angle), distance * turning
+        x, y = distance * cos, distance * sin
+        t1, t2 = inclination * cos - around * sin, inclination * sin + around * cos
         t3 = 1.0 / np.hypot(1.0, np.hypot(t1, t2))
         moment = np.stack([-y * t3, x * t3, (y * t1 - x * t2) * t3], axis=1)
         return Resultants(-t3, moment)
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        del section
-        route = self._route(profile, z)
-        ratio = route.distance / profile.radius(z)[:, None] * np.ones(self.bundles)
+        (distance, _), (angle, _) = self._route(profile, z)
+        ratio = distance / profile.radius(z)[:, None] * np.ones(self.bundles)
         return Outline(
-            center=route.angle,
+            center=angle,
             extent=np.zeros(self.bundles),
             inner_ratio=ratio,
             outer_ratio=ratio,
@@ -119,13 +98,7 @@ class Tendon(PolarActuator):
             acts=self.acts(profile, z),
         )
 
-    def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        bent = [along for along in (self.distance, self.routing) if isinstance(along, AlongArm)]
-        breaks = [profile.length * x for along in bent for x in along.breaks]
-        return (*super().breakpoints(profile), *breaks)
-
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        del profile
         return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
 
     def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
@@ -134,21 +107,20 @@ class Tendon(PolarActuator):
             return float(np.diff(other(self.span_over_length(profile.length)))[0])
         return super()._following(field, other, profile, section)
 
-    def _route(self, profile: Profile, z: Array) -> _Route:
-        column = z[:, None]
-        angle, turning = self._angle(profile, column)
-        return _Route(
-            *self.length_and_slope("distance", profile, column), self.start_angles + angle, turning
-        )
+    def _route(self, profile: Profile, z: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """ρt(Z) [m] and its slope [-], (station, 1); θ(Z) [rad], (station, bundle), and its [1/m].
 
-    def _angle(self, profile: Profile, z: Array) -> tuple[Array, Array]:
-        """θ - θ0 and its slope."""
-        x = z / profile.length
+        All slopes have the shape (station, 1).
+        """
+        distance = self.length_and_slope("distance", profile, z[:, None])
+        x = z[:, None] / profile.length
         if self.routing is not None:
-            return self.routing(x), self.routing.derivative(x) / profile.length
-        start, end = self.span_over_length(profile.length)
-        rate = self.revolution / (end - start)
-        return rate * (x - start), np.full(z.shape, rate / profile.length)
+            turned, rate = self.routing(x), self.routing.derivative(x)
+        else:
+            start, end = self.span_over_length(profile.length)
+            rate = np.full(x.shape, self.revolution / (end - start))
+            turned = rate * (x - start)
+        return distance, (self.start_angles + turned, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
@@ -180,7 +152,7 @@ class LengthTendon(Tendon):
     slack: float = number("q0", "m", "pulled in by so much before it is taut", default=0.0)
     """q0, pulled in by so much before it is taut [m]; negative where it is pretensioned."""
     tendon_stiffness: float | None = number(
-        "k", "N/m", "stiffness of tendon and drive in series", low=0.0, open_low=True, default=None
+        "k", "N/m", "stiffness of tendon and drive in series", above=0.0, default=None
     )
     """k, stiffness of tendon and drive in series [N/m]; None for one that does not stretch."""
     pretension: float = number("τ0", "N", "tension at q0 of the straight arm", low=0.0, default=0.0)
@@ -247,27 +219,20 @@ class Chamber(PolarActuator):
     )
     """ρc over the outer radius R2(Z) [-]."""
     radius: float | None = number(
-        "a",
-        "m",
-        "radius of the channel",
-        low=0.0,
-        open_low=True,
-        instead_of="radius_ratio",
-        default=None,
+        "a", "m", "radius of the channel", above=0.0, instead_of="radius_ratio", default=None
     )
     """a, radius of the channel [m]."""
     radius_ratio: float | None = number(
-        "a/R2", "", "radius of the channel over R2", low=0.0, open_low=True, default=None
+        "a/R2", "", "radius of the channel over R2", above=0.0, default=None
     )
     """a over the outer radius R2(Z) [-]."""
     area_factor: float = number(
-        "A/πa²", "", "effective over geometric area", low=0.0, open_low=True, default=1.0
+        "A/πa²", "", "effective over geometric area", above=0.0, default=1.0
     )
     """Effective area over π a² [-], from a measurement; 1 where the channel does not widen."""
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = A and M = p × A e3 with the effective area A and the center p: theory (53)."""
-        del section
         area = np.pi * self.area_factor * self.length_at("radius", profile, z) ** 2
         arm = area * self.length_at("distance", profile, z)
         angle = self.start_angles
@@ -276,12 +241,9 @@ class Chamber(PolarActuator):
         return Resultants(area[:, None] + along, np.stack(moment, axis=1))
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        del section
         each, outer = np.ones(self.bundles), profile.radius(z)
-        distance, radius = (
-            self.length_at("distance", profile, z),
-            self.length_at("radius", profile, z),
-        )
+        distance = self.length_at("distance", profile, z)
+        radius = self.length_at("radius", profile, z)
         share = float(np.max(radius / np.maximum(distance, radius)))
         return Outline(
             center=np.broadcast_to(self.start_angles, (len(z), self.bundles)),
@@ -293,5 +255,4 @@ class Chamber(PolarActuator):
         )
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        del profile
         return section.modulus_faults(f"for chamber {self.name!r}, whose activation is in Pa")

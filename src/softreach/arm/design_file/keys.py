@@ -36,27 +36,6 @@ from softreach.arm.stations import Marker, RigidPiece
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
-__all__ = [
-    "ACTUATORS",
-    "KINDS",
-    "PROFILES",
-    "Key",
-    "Kind",
-    "Place",
-    "WrittenFloat",
-    "degrees_text",
-    "every_kind",
-    "field_keys",
-    "in_file_terms",
-    "in_file_units",
-    "keys_of",
-    "known_kinds",
-    "one_a_path",
-    "own_kind",
-    "own_kinds",
-    "radians",
-]
-
 PROFILES: Mapping[str, type[Profile]] = MappingProxyType(
     {"linear": LinearTaper, "piecewise": PiecewiseTaper, "sampled": SampledTaper}
 )
@@ -132,9 +111,12 @@ def field_keys(kind: type) -> dict[str, str]:
 
 def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
     """Imported kinds of actuators or profiles that are not softreach's, by their classes' names."""
+    kinds = of.__subclasses__()
+    for kind in kinds:  # which grows
+        kinds += kind.__subclasses__()
     return {
         kind.__name__: kind
-        for kind in _subclasses(of)
+        for kind in kinds
         if kind.__module__.partition(".")[0] != "softreach"
         and not getattr(kind, "__abstractmethods__", ())
     }
@@ -167,11 +149,6 @@ def known_kinds(of: type[Kind]) -> list[str]:
     return [*dict.fromkeys([*own_kinds(of), *plugins.declared(_GROUPS[of])])]
 
 
-def _subclasses(of: type[Kind]) -> list[type[Kind]]:
-    direct = of.__subclasses__()
-    return direct + [kind for child in direct for kind in _subclasses(child)]
-
-
 @cache
 def _every_key() -> Mapping[str, str]:
     """Field -> key of all parts, but for bounds, whose unit depends on the actuator."""
@@ -202,9 +179,8 @@ def in_file_terms(
         places: Places of the parts in the file by their paths in the arm; without them, paths stay
             but for the field at their end.
     """
-    return InvalidDesign(
-        one_a_path([_in_file_terms(fault, places) for fault in error.faults]), source
-    )
+    faults = [_in_file_terms(fault, places) for fault in error.faults]
+    return InvalidDesign(one_a_path(faults), source)
 
 
 def one_a_path(faults: Iterable[Fault]) -> list[Fault]:
@@ -226,9 +202,8 @@ def _in_file_terms(fault: Fault, places: Mapping[str, Place]) -> Fault:
         value = _shown_degrees(value)
     if isinstance(allowed, str) and places:  # which calls other fields by their names
         said = [path.rpartition(".")[2] for path in fault.path.split(", ")]
-        others = {
-            field: key for field, key in _every_key().items() if "_" in field or field in said
-        }
+        keys = _every_key()
+        others = {field: keys[field] for field in keys if "_" in field or field in said}
         allowed = re.sub(r"\w+", lambda word: others.get(word[0]) or word[0], allowed)
         allowed = re.sub("(Samples|AlongArm) along the arm(, or None)?", "a table", allowed)
     return Fault(", ".join(names), value, allowed)
@@ -241,11 +216,12 @@ def _written(path: str, places: Mapping[str, Place]) -> tuple[str, Any]:
         head, dot, field = path.rpartition(".")
         return head + dot + (_every_key().get(field) or field), MISSING
     place = places[max(owners, key=len)]
-    field, rest = re.fullmatch(r"(\w*)(.*)", path[len(max(owners, key=len)) :].lstrip(".")).groups()  # pyright: ignore
+    inside = path[len(max(owners, key=len)) :].lstrip(".")
+    field = re.match(r"\w*", inside)[0]  # pyright: ignore[reportOptionalSubscript]
+    rest = inside.removeprefix(field)
     key = field if field in place.table else place.keys.get(field, field)
-    return f"{place.path}.{key}{rest}".rstrip("."), MISSING if rest else place.table.get(
-        key, MISSING
-    )
+    value = MISSING if rest else place.table.get(key, MISSING)
+    return f"{place.path}.{key}{rest}".rstrip("."), value
 
 
 def in_file_units(allowed: Range | str) -> Range | str:

@@ -44,8 +44,6 @@ from softreach.support.files import toml
 from softreach.support.files.text import read_text
 from softreach.support.files.toml import WRONG, FaultReader, key_text, unknown_key
 
-__all__ = ["LONGEST", "document_of", "read", "text_of"]
-
 LONGEST = 250_000
 """Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
 
@@ -83,12 +81,7 @@ def text_of(path: str | PathLike[str]) -> str:
 def document_of(
     text: str, source: str, number: Callable[[str], Any] = WrittenFloat
 ) -> dict[str, Any]:
-    """The tables of TOML text; numbers with a point or an exponent remember how they were written.
-
-    Args:
-        text: The text of a design file.
-        source: Its name in errors.
-        number: Maker of the value of a number with a point or an exponent.
+    """The tables of TOML text as `toml.document_of`, by default with numbers as they were written.
 
     Raises:
         InvalidDesign: Text that is no TOML, or too long to be a design.
@@ -141,11 +134,11 @@ class _Reader(FaultReader):
             self._refuse("actuators", f"{len(listed):,} tables", f"must be at most {MOST_BUNDLES}")
             return {}
         fields: dict[str, Any] = {"profile": self._alone("profile", Profile)}
-        for name, raw in self._at_top("materials").items():
+        for name, raw in self._table(self._document, "materials").items():
             path = f"materials.{key_text(name)}"
             self._materials[name] = self._part(Material, raw, path, ("name",), name=name)
         fields["section"] = self._section()
-        places = {"places": self._at_top("stations")}
+        places = {"places": self._table(self._document, "stations")}
         fields["stations"] = self._made(Stations, Place("stations"), places)
         for name in ("actuators", "rigid_pieces", "drives", "markers"):
             fields[name] = self._several(name, LAYOUT[name][1])
@@ -153,18 +146,20 @@ class _Reader(FaultReader):
             del fields["drives"]
         for name in ("loads", "base", "rest"):
             fields[name] = self._alone(name, LAYOUT[name][1])
-        fields["display_unit"], fields["point"] = self._display_unit(), self._document.get("point")
+        display = self._table(self._document, "display")
+        self._check_keys(display, "display", ["unit"])
+        self.places["display_unit"] = Place("display.unit")
+        fields["display_unit"], fields["point"] = display.get("unit"), self._document.get("point")
         return {name: value for name, value in fields.items() if value is not None}
 
     def _alone(self, name: str, kind: type[Part]) -> Any:
-        """The part of a table at the top, if there is one."""
-        is_there = isinstance(self._document.get(name), dict)
-        return self._any(kind, self._at_top(name), name) if is_there else None
+        raw = self._document.get(name)
+        return self._any(kind, raw, name) if isinstance(raw, dict) else None
 
     def _several(self, name: str, kind: type[Part]) -> tuple[Any, ...]:
         """The sound parts of a list of tables, and where they stand by their paths in the arm."""
-        paths = [(f"{name}[{k}]", raw) for k, raw in self._listed(name)]
-        each = [(path, self._any(kind, raw, path)) for path, raw in paths]
+        tables = self._tables(self._document, name)
+        each = [(path, self._any(kind, raw, path)) for raw, path in tables]
         sound = [(self.places[path], part) for path, part in each if part is not None]
         parts = [part for _, part in sound]
         names = [each.name for each in named_actuators(parts)] if kind is Actuator else []
@@ -195,15 +190,6 @@ class _Reader(FaultReader):
     def _part(
         self, kind: type[Part], raw: Any, path: str, without: tuple[str, ...] = (), **others: Any
     ) -> Any:
-        """The part that a table describes; None where it has faults.
-
-        Args:
-            kind: Its class.
-            raw: Table as the file holds it.
-            path: Its path in the file.
-            without: Keys that the table does not have here.
-            others: Further fields of the part.
-        """
         values, wrong = self._values(kind, raw, path, without)
         return self._made(kind, Place(path, field_keys(kind), raw), values | others, wrong)
 
@@ -280,11 +266,8 @@ class _Reader(FaultReader):
             return self._along(number, raw, path)
         if number.unit != "rad":
             return raw
-        angles = [
-            radians(each) if Range().admits(each) else each
-            for each in (raw if isinstance(raw, list) else [raw])
-        ]
-        return tuple(angles) if isinstance(raw, list) else angles[0]
+        angles = [*map(_in_radians, raw)] if isinstance(raw, list) else _in_radians(raw)
+        return tuple(angles) if isinstance(angles, list) else angles
 
     def _along(self, number: Number, raw: dict[str, Any], path: str) -> Any:
         """A function along the arm, in the unit of the key that it belongs to."""
@@ -302,7 +285,6 @@ class _Reader(FaultReader):
         return WRONG if made is None else made
 
     def _material(self, raw: Any, path: str, of: str) -> Material | None:
-        """A material by its name or its values, of the core or of a ring."""
         if isinstance(raw, dict):
             made = self._part(Material, raw, path)
             self.places[of] = self.places[path]
@@ -319,23 +301,16 @@ class _Reader(FaultReader):
         return self._refuse(path, raw, _materials_text(raw, [*self._materials]), None)
 
     def _section(self) -> Section | None:
-        rings = [self._part(Ring, raw, f"rings[{k}]") for k, raw in self._listed("rings")]
+        rings = [self._part(Ring, raw, path) for raw, path in self._tables(self._document, "rings")]
         for k in range(len(rings)):
             path = f"rings[{k}].material"
             self.places.setdefault(path, Place(path, field_keys(Material)))
-        values, wrong = self._values(Section, self._at_top("section"), "section")
+        table = self._table(self._document, "section")
+        values, wrong = self._values(Section, table, "section")
         if not rings or None in rings:
             return None
-        place = Place("section", field_keys(Section), self._at_top("section"))
+        place = Place("section", field_keys(Section), table)
         return self._made(Section, place, values | {"rings": tuple(rings)}, wrong)
-
-    def _display_unit(self) -> Any:
-        """The unit that the arm is to be shown in; whether there is such a one the arm judges."""
-        raw = self._at_top("display")
-        for key in (key for key in raw if key != "unit"):
-            self._refuse(f"display.{key_text(key)}", raw[key], unknown_key(key, {"unit": "unit"}))
-        self.places["display_unit"] = Place("display.unit")
-        return raw.get("unit")
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""
@@ -348,23 +323,13 @@ class _Reader(FaultReader):
         if self._document.get("rings") == []:
             self._refuse("rings", [], "must not be empty")
         for key in (key for key in self._document if key not in LAYOUT):
-            known = {name: name for name in LAYOUT}
             home = _home(key)
-            said = f"unknown key; {home}" if home else unknown_key(key, known)
+            said = (
+                f"unknown key; {home}"
+                if home
+                else unknown_key(key, {name: name for name in LAYOUT})
+            )
             self._refuse(key_text(key), self._document[key], said)
-
-    def _at_top(self, key: str) -> dict[str, Any]:
-        """A table at the top; an empty one if there is none, or something else."""
-        value = self._document.get(key)
-        return value if isinstance(value, dict) else {}
-
-    def _listed(self, key: str) -> list[tuple[int, dict[str, Any]]]:
-        raw = self._document.get(key)
-        tables = [*enumerate(raw)] if isinstance(raw, list) else []
-        for k, table in tables:
-            if not isinstance(table, dict):
-                self._refuse(f"{key}[{k}]", table, "must be a table")
-        return [(k, table) for k, table in tables if isinstance(table, dict)]
 
     def _plain(self, value: Any, path: str) -> Any:
         """Lists as tuples, and tables of values along the arm as functions."""
@@ -377,17 +342,15 @@ class _Reader(FaultReader):
         return float(value) if isinstance(value, WrittenFloat) else value
 
 
+def _in_radians(value: Any) -> Any:
+    return radians(value) if Range().admits(value) else value
+
+
 def _home(key: str) -> str:
-    """Hint where a key belongs that is not one of the top."""
-    if key.removesuffix("s") in KINDS[Actuator]:
-        return f'write [[actuators]] with kind = "{key.removesuffix("s")}"'
-    homes = {
-        "[profile]": LinearTaper,
-        "[section]": Section,
-        "[[rings]]": Ring,
-        "[materials.NAME]": Material,
-        "[loads]": Loads,
-    }
+    if (kind := key.removesuffix("s")) in KINDS[Actuator]:
+        return f'write [[actuators]] with kind = "{kind}"'
+    homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
+    homes |= {"[materials.NAME]": Material, "[loads]": Loads}
     home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
     return f"it belongs in {home}" if home else ""
 

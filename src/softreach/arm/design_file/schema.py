@@ -20,8 +20,6 @@ from softreach.arm.stations import Marker, RigidPiece
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
 
-__all__ = ["json_schema"]
-
 _Schema = dict[str, Any]
 
 _NUMBERS: _Schema = {"type": "array", "items": {"type": "number"}}
@@ -61,11 +59,10 @@ def _definitions() -> dict[str, _Schema]:
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
-    kinds = {**PROFILES, **ACTUATORS}
-    definitions |= {
-        name: _table(kind, kind.__doc__ or "", kind=name) for name, kind in kinds.items()
+    return definitions | {
+        name: _table(kind, kind.__doc__ or "", kind=name)
+        for name, kind in {**PROFILES, **ACTUATORS}.items()
     }
-    return definitions
 
 
 def _top() -> dict[str, _Schema]:

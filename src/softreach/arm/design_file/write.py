@@ -16,25 +16,17 @@ from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.files.toml import inline_table, key_text, value_text
 
-__all__ = ["display_text", "render"]
-
 _NAMES = {kind: name for kinds in KINDS.values() for name, kind in kinds.items()}
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 
-_FIRST = ("name", "unit", "ring", "length", "revolution")
-_LAST = (
-    "taper",
-    "offset",
-    "extent",
-    "bundles",
-    "activation_bounds",
-    "start_over_length",
-    "end_over_length",
-    "start",
-    "end",
+_ORDER = (
+    *("name", "unit", "ring", "length", "revolution"),
+    "",  # what distinguishes a kind
+    *("taper", "offset", "extent", "bundles", "activation_bounds"),
+    *("start_over_length", "end_over_length", "start", "end"),
 )
-"""Order of fields: between these stands what distinguishes a kind."""
+"""Order of fields."""
 
 
 def render(arm: Mapping[str, Any]) -> str:
@@ -48,19 +40,13 @@ def render(arm: Mapping[str, Any]) -> str:
     for material in (section.core, *(ring.material for ring in section.rings)):
         if material is not None and material.name:
             names.setdefault(material.name, material)
-    blocks = [
-        [
-            "version = 2",
-            *([] if arm["point"] is None else [f"point = {value_text(arm['point'])}"]),
-            *([] if arm["actuators"] else ["actuators = []"]),
-        ],
-        ["[profile]", *_lines(arm["profile"])],
-        *(
-            [f"[materials.{key_text(name)}]", *_lines(material, without=("name",))]
-            for name, material in names.items()
-        ),
-        *_section_blocks(section, names),
-    ]
+    top = ["version = 2"]
+    top += [] if arm["point"] is None else [f"point = {value_text(arm['point'])}"]
+    top += [] if arm["actuators"] else ["actuators = []"]
+    blocks = [top, ["[profile]", *_lines(arm["profile"])]]
+    for name, material in names.items():
+        blocks.append([f"[materials.{key_text(name)}]", *_lines(material, without=("name",))])
+    blocks += _section_blocks(section, names)
     if stations:
         places = (f"{key_text(name)} = {value_text(z)}" for name, z in stations.items())
         blocks.append(["[stations]", *places])
@@ -92,18 +78,15 @@ def _lines(part: Part, without: tuple[str, ...] = ("point_loads",)) -> list[str]
 
 def _plain_pairs(part: Part) -> Iterator[tuple[str, str]]:
     for field in fields(part):  # pyright: ignore[reportArgumentType]
-        if field.init and (value := getattr(part, field.name)) is not None:
-            value = value.name if isinstance(value, Station) else value
-            yield field.name, _plain_text(part, field.name, value)
-
-
-def _plain_text(part: object, name: str, value: Any) -> str:
-    try:
-        return _along_text(value, value_text) if isinstance(value, AlongArm) else value_text(value)
-    except (TypeError, ValueError):
-        kind = type(part).__name__
-        allowed = "must be a number, text or a sequence of these to fit in a design file"
-        raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
+        value = getattr(part, field.name) if field.init else None
+        value = value.name if isinstance(value, Station) else value
+        try:
+            if value is not None:
+                yield field.name, _text("", value)
+        except (TypeError, ValueError):
+            allowed = "must be a number, text or a sequence of these to fit in a design file"
+            path = f"{type(part).__name__}.{field.name}"
+            raise InvalidDesign([Fault(path, value, allowed)]) from None
 
 
 def _section_blocks(section: Section, names: Mapping[str, Material]) -> Iterator[list[str]]:
@@ -137,18 +120,16 @@ def _pairs(part: Part, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str
 
 
 def _rank(field: str) -> int:
-    if field in _FIRST:
-        return _FIRST.index(field) - len(_FIRST)
-    return 1 + _LAST.index(field) if field in _LAST else 0
+    return _ORDER.index(field if field in _ORDER else "")
 
 
 def _text(key: str, value: Any) -> str:
     if isinstance(value, BundleNumbers):
         return inline_table((key_text(name), value_text(x)) for name, x in value.items())
-    if isinstance(value, Station):
-        return value_text(value.name)
     number = degrees_text if key.endswith("_deg") else value_text
-    return _along_text(value, number) if isinstance(value, AlongArm) else number(value)
+    if isinstance(value, AlongArm):
+        return _along_text(value, number)
+    return value_text(value.name) if isinstance(value, Station) else number(value)
 
 
 def _along_text(along: AlongArm, number: Callable[[float], str]) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from softreach import schema
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.cloud.clouds import design_of
-from softreach.exchange.activefilaments.filament import Filament, filament_of
+from softreach.exchange.activefilaments.filament import filament_of
 from softreach.rod.kinematics import tip_positions
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
@@ -104,18 +104,16 @@ def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool
     filament = filament_of(design_of(schema.check_cloud(cloud)))
     check_place(path, overwrite=overwrite)
     with writing(gamma_path(path), overwrite=overwrite) as file:
-        _write(file, cloud["activation"].values, filament)
+        _write(file, filament.to_columns(cloud["activation"].values))
     with writing(path, overwrite=overwrite) as file:
         _write(file, cloud["tip"].values)
 
 
-def _write(file: BufferedWriter, values: Array, filament: Filament | None = None) -> None:
+def _write(file: BufferedWriter, values: Array) -> None:
     """Rows of the shortest numbers that read back to the same ones."""
     for first in range(0, len(values), _BLOCK):
-        block = values[first : first + _BLOCK]
-        rows = block if filament is None else filament.to_columns(block)
-        text = "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist())
-        file.write(text.encode("ascii"))
+        rows = values[first : first + _BLOCK].tolist()
+        file.write("".join(",".join(map(repr, row)) + "\n" for row in rows).encode("ascii"))
 
 
 CLOUD_PAIR: Formats = {".csv": FileFormat()}
@@ -123,15 +121,14 @@ CLOUD_PAIR: Formats = {".csv": FileFormat()}
 
 
 def _table(path: Path, columns: int, meaning: str) -> Array:
-    name = fspath(path)
+    name, allowed = fspath(path), "rows of comma-separated numbers"
     if not path.is_file():
         raise InvalidInput("file", name, "a file that exists")
     try:
         # NumPy would unpack or fetch what it is given by name.
         with path.open(encoding="utf-8-sig") as file:
-            first = next((line for line in file if line.strip()), None)
-            if first is None:  # of which NumPy would warn
-                raise InvalidInput(name, "no rows", "rows of comma-separated numbers")
+            if not (first := next((line for line in file if line.strip()), "")):
+                raise InvalidInput(name, "no rows", allowed)  # of which NumPy would warn
             table = np.loadtxt(chain([first], file), delimiter=",", comments=None, ndmin=2)
     except InvalidInput:
         raise
@@ -140,7 +137,7 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
         if match := _NO_NUMBER.search(text):
             text = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
         text = "no text" if isinstance(error, UnicodeDecodeError) else text
-        raise InvalidInput(name, text, "rows of comma-separated numbers") from None
+        raise InvalidInput(name, text, allowed) from None
     if table.shape[1] != columns:
         size = counted(table.shape[1], "column")
         raise InvalidInput(name, size, f"{columns}: {meaning}")

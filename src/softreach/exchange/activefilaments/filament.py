@@ -4,70 +4,64 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from os import PathLike
 
 import numpy as np
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.along import AlongArm, Pieces
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
-from softreach.arm.section import Ring, Section
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.text import write_text
 
-Angle = float | Pieces
+FILAMENT_SCRIPT: Formats = {".jl": FileFormat()}
+"""Format of `write_design`."""
 
+Bounds = tuple[tuple[float, float], ...]
+
+_THERE = "in ActiveFilaments.jl"
 _SMALLEST_TAPER = 1e-4  # rad; below it their Θ(Z) is unstable, as their own source warns
 _ANY_MODULUS = 1e6  # Pa, where Young's modulus cancels
+_HEAD = """\
+# The filament of ActiveFilaments.jl with the tips of a design of softreach.
+# Lengths in m, angles in rad, E in Pa, density in kg/m^3.
+using ActiveFilaments
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FilamentRing:
     """A ring and the sectors in it."""
 
-    young_modulus: float
-    """E [Pa]."""
-    poisson_ratio: float
-    """ν [-]."""
-    inner_radius: float
-    """R1 at the base [m]."""
-    outer_radius: float
-    """R2 at the base [m]."""
-    angle: Angle = 0.0
-    """α at the outer radius [rad]."""
-    extent: float = math.pi
-    """σ of every sector [rad]."""
-    offset: float = 0.0
-    """Polar angle of the center of the first sector [rad]."""
-    bounds: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
-    """(lower, upper) γ of each sector in their scale [-]; one that stays 0 where none is."""
-    bundles: tuple[int, ...] = ()
-    """Index of the bundle of the arm for each sector; none for a ring without fibers."""
-    scale: float = 1.0
-    """Their γ over that of the arm [-]."""
-    name: str = ""
-    """Its name in the arm."""
+    young_modulus: float  # E [Pa]
+    poisson_ratio: float  # ν [-]
+    radii: tuple[float, float]  # R1 and R2 at the base [m]
+    angle: float | Pieces = 0.0  # α at the outer radius [rad]
+    extent: float = math.pi  # σ of every sector [rad]
+    offset: float = 0.0  # polar angle of the center of the first sector [rad]
+    bounds: Bounds = ((0.0, 0.0),)  # of γ of each sector in their scale; one stays 0 where none is
+    bundles: tuple[int, ...] = ()  # of the arm, one for each sector; none without fibers
+    scale: float = 1.0  # their γ over that of the arm [-]
+    name: str = ""  # in the arm
 
 
 @dataclass(frozen=True, kw_only=True)
 class Filament:
     """An `AFilament`, and the structure of its activation."""
 
-    length: float
-    """L [m]."""
-    taper: float
-    """φ of the outermost surface [rad]."""
-    density: float | None
-    """ρ, one for all of it [kg/m³]; None where it plays no part."""
-    rings: tuple[FilamentRing, ...]
-    """The innermost first, the outermost last."""
-    core_modulus: float
-    """E inside of the first ring [Pa]."""
-    core_poisson_ratio: float
-    """ν inside of the first ring [-]."""
+    length: float  # L [m]
+    taper: float  # φ of the outermost surface [rad]
+    density: float | None  # ρ, one for all of it [kg/m³]; None where it plays no part
+    rings: Sequence[FilamentRing]  # the innermost first, the outermost last
+    core_modulus: float  # E inside of the first ring [Pa]
+    core_poisson_ratio: float  # ν inside of the first ring [-]
 
     @property
     def columns(self) -> int:
@@ -76,24 +70,53 @@ class Filament:
 
     def to_columns(self, activation: Array) -> Array:
         """Their activations from those of the arm, shape (sample, bundle) to (sample, column)."""
-        blocks = [
-            activation[:, list(ring.bundles)] * ring.scale
-            if ring.bundles
-            else np.zeros((len(activation), len(ring.bounds)))
-            for ring in self.rings
-        ]
-        return np.concatenate(blocks, axis=1)
+        return np.concatenate(
+            [
+                activation[:, list(ring.bundles)] * ring.scale
+                if ring.bundles
+                else np.zeros((len(activation), len(ring.bounds)))
+                for ring in self.rings
+            ],
+            axis=1,
+        )
 
     def from_columns(self, columns: Array) -> Array:
         """Activations of the arm from theirs, shape (sample, column) to (sample, bundle)."""
         activation = np.zeros((len(columns), sum(len(ring.bundles) for ring in self.rings)))
         first = 0
         for ring in self.rings:
-            block = columns[:, first : first + len(ring.bounds)]
-            first += len(ring.bounds)
+            last = first + len(ring.bounds)
             if ring.bundles:
-                activation[:, list(ring.bundles)] = block / ring.scale
+                activation[:, list(ring.bundles)] = columns[:, first:last] / ring.scale
+            first = last
         return activation
+
+
+def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a Julia script that defines the filament of ActiveFilaments.jl with an arm's tips.
+
+    Args:
+        arm: The design.
+        path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace a file.
+
+    Raises:
+        InvalidInput: The arm has what no filament there has: another profile than a linear taper,
+            a bore, or other actuators than fibers along all of it; or something else is there.
+        NotWritten: It cannot be written.
+    """
+    write_text(path, design_script(arm), overwrite=overwrite)
+
+
+def design_script(arm: Manipulator) -> str:
+    """The text that `write_design` writes.
+
+    Raises:
+        InvalidInput: As `write_design`.
+    """
+    filament = filament_of(a_manipulator("arm", arm))
+    lines = [_HEAD, *_definition(filament), "", *_activation(filament.rings)]
+    return "\n".join(lines) + "\n"
 
 
 def filament_of(arm: Manipulator) -> Filament:
@@ -106,90 +129,35 @@ def filament_of(arm: Manipulator) -> Filament:
     Raises:
         InvalidInput: Something that a filament there does not have.
     """
-    _check_expressible(arm)
+    for name, value, allowed in _faults(arm):
+        raise InvalidInput(name, value, f"{allowed} {_THERE}")
     assert isinstance(arm.profile, LinearTaper)
-    core = arm.section.core_material
+    core, layers = arm.section.core_material, arm.section.layers
+    is_dense = all(layer.material.density is not None for layer in layers)
     return Filament(
         length=arm.length,
         taper=arm.profile.taper,
-        density=_density(arm),
-        rings=_from_inside_out(list(_rings(arm))),
+        density=float(arm.section.mass_per_length(1.0)) / math.pi if is_dense else None,
+        rings=_ordered(list(_rings(arm))),
         core_modulus=_modulus(core),
         core_poisson_ratio=core.poisson_ratio,
     )
 
 
-def arm_of(filament: Filament) -> Manipulator:
-    """The arm that a filament of ActiveFilaments.jl is.
-
-    Rings that overlap stay so: each adds its whole stiffness there as here. The mass per length is
-    the filament's, whatever overlaps.
-
-    Raises:
-        InvalidDesign: Numbers that no arm can have.
-    """
-    outer = filament.rings[-1].outer_radius
-    profile = LinearTaper(length=filament.length, outer_radius=outer, taper=filament.taper)
-    spans = [(ring.inner_radius / outer, ring.outer_radius / outer) for ring in filament.rings]
-    density = _shared_density(filament, spans)
-    rings = tuple(
-        Ring(
-            inner_ratio=low,
-            outer_ratio=high,
-            material=Material(
-                young_modulus=ring.young_modulus, poisson_ratio=ring.poisson_ratio, density=density
-            ),
-        )
-        for ring, (low, high) in zip(filament.rings, spans, strict=True)
-    )
-    core = Material(
-        young_modulus=filament.core_modulus,
-        poisson_ratio=filament.core_poisson_ratio,
-        density=density,
-    )
-    default = min(rings, key=lambda ring: ring.inner_ratio).material
-    return Manipulator(
-        profile=profile,
-        section=Section(rings=rings, core=None if core == default else core),
-        actuators=tuple(_fiber(k, ring) for k, ring in enumerate(filament.rings)),
-    )
-
-
-def _fiber(place: int, ring: FilamentRing) -> FiberArchitecture:
-    return FiberArchitecture(
-        name=ring.name or f"ring {place + 1}",
-        ring=place,
-        bundles=len(ring.bounds),
-        helical_angle=ring.angle,
-        extent=ring.extent,
-        offset=ring.offset,
-        activation_bounds=ring.bounds,
-    )
-
-
-def _shared_density(filament: Filament, spans: list[tuple[float, float]]) -> float | None:
-    """The density that, counted in every layer, gives the mass of the filament."""
-    if filament.density is None:
-        return None
-    layers = min(inner for inner, _ in spans) ** 2 + sum(b**2 - a**2 for a, b in spans)
-    return filament.density / layers if abs(layers - 1.0) > 1e-9 else filament.density
-
-
-def _from_inside_out(rings: list[FilamentRing]) -> tuple[FilamentRing, ...]:
-    """As they are, if the first is innermost and the last outermost; else sorted to be so."""
-    for order in rings, sorted(rings, key=lambda ring: (ring.outer_radius, ring.inner_radius)):
-        if is_from_inside_out(order):
-            return tuple(order)
-    spans = [(ring.inner_radius, ring.outer_radius) for ring in rings]
-    allowed = "in ActiveFilaments.jl such that the innermost one is not the outermost of several"
-    raise InvalidInput("radii of the rings", spans, allowed)
-
-
-def is_from_inside_out(rings: Sequence[FilamentRing]) -> bool:
+def is_from_inside_out(radii: Sequence[tuple[float, float]]) -> bool:
     """True if the first ring is the innermost and the last the outermost, as AFilament takes it."""
-    innermost = min(ring.inner_radius for ring in rings)
-    outermost = max(ring.outer_radius for ring in rings)
-    return rings[0].inner_radius == innermost and rings[-1].outer_radius == outermost
+    inner, outer = zip(*radii, strict=True)
+    return inner[0] == min(inner) and outer[-1] == max(outer)
+
+
+def _ordered(rings: list[FilamentRing]) -> Sequence[FilamentRing]:
+    """As they are, if the first is innermost and the last outermost; else sorted to be so."""
+    for order in rings, sorted(rings, key=lambda ring: ring.radii[::-1]):
+        if is_from_inside_out([ring.radii for ring in order]):
+            return order
+    spans = [ring.radii for ring in rings]
+    allowed = f"{_THERE} such that the innermost one is not the outermost of several"
+    raise InvalidInput("radii of the rings", spans, allowed)
 
 
 def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
@@ -206,8 +174,7 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
         body = FilamentRing(
             young_modulus=_modulus(ring.material) / share,
             poisson_ratio=ring.material.poisson_ratio,
-            inner_radius=ring.inner_ratio * base,
-            outer_radius=ring.outer_ratio * base,
+            radii=(ring.inner_ratio * base, ring.outer_ratio * base),
             scale=float(share),
             name=ring.name,
         )
@@ -232,38 +199,78 @@ def _modulus(material: Material) -> float:
     return _ANY_MODULUS if material.young_modulus is None else material.young_modulus
 
 
-def _density(arm: Manipulator) -> float | None:
-    """The one density that gives the arm's mass per length [kg/m³]."""
-    if any(layer.material.density is None for layer in arm.section.layers):
-        return None
-    return float(arm.section.mass_per_length(1.0)) / math.pi
-
-
-def _check_expressible(arm: Manipulator) -> None:
-    there = "in ActiveFilaments.jl"
+def _faults(arm: Manipulator) -> Iterator[tuple[str, object, str]]:
+    """What no filament there has: name, value and what there is."""
     if not arm.base.is_identity:
-        hint = "give arm.replace(base=Base()), whose places are those in the frame of the base"
-        raise InvalidInput("base", str(arm.base), f"upright at the origin {there}", hint)
+        yield "base", str(arm.base), "upright at the origin, as arm.replace(base=Base()) is,"
     if not isinstance(arm.profile, LinearTaper):
-        raise InvalidInput("profile", type(arm.profile).__name__, f"a LinearTaper {there}")
+        yield "profile", type(arm.profile).__name__, "a LinearTaper"
+        return
     if arm.rigid_pieces:
-        raise InvalidInput("rigid_pieces", len(arm.rigid_pieces), f"0 {there}")
+        yield "rigid_pieces", len(arm.rigid_pieces), "0"
     taper = arm.profile.taper
     if 0 < abs(taper) < _SMALLEST_TAPER:
-        raise InvalidInput("taper", f"{taper:g} rad", f"0 or at least {_SMALLEST_TAPER:g} {there}")
+        yield "taper", f"{taper:g} rad", f"0 or at least {_SMALLEST_TAPER:g}"
     if arm.section.measured is not None:
-        raise InvalidInput("section.measured", arm.section.measured, f"None {there}")
+        yield "section.measured", arm.section.measured, "None"
     if arm.section.bore_ratio > 0:
-        raise InvalidInput("bore_ratio", arm.section.bore_ratio, f"0 {there}")
+        yield "bore_ratio", arm.section.bore_ratio, "0"
     for actuator in arm.actuators:
         if not isinstance(actuator, FiberArchitecture):
-            kind = type(actuator).__name__
-            raise InvalidInput(actuator.name, kind, f"a FiberArchitecture {there}")
-        stretch = actuator.span_over_length(arm.length)
+            yield actuator.name, type(actuator).__name__, "a FiberArchitecture"
+            return
+        stretch, angle = actuator.span_over_length(arm.length), actuator.helical_angle
         if stretch != (0.0, 1.0):
-            raise InvalidInput(f"stretch of {actuator.name}", stretch, f"all of the arm {there}")
-        angle = actuator.helical_angle
+            yield f"stretch of {actuator.name}", stretch, "all of the arm"
         if isinstance(angle, AlongArm) and (taper != 0 or not isinstance(angle, Pieces)):
-            allowed = f"constant, or Pieces on an arm without taper, {there}"
-            name = f"helical_angle of {actuator.name}"
-            raise InvalidInput(name, type(angle).__name__, allowed)
+            name, kind = f"helical_angle of {actuator.name}", type(angle).__name__
+            yield name, kind, "constant, or Pieces on an arm without taper,"
+
+
+def _definition(filament: Filament) -> Iterator[str]:
+    yield "rings = ["
+    for ring in filament.rings:
+        mechanics = _mechanics(ring.young_modulus, ring.poisson_ratio)
+        fibers = f"FiberArchitecture({_angle(ring.angle, filament.length)})"
+        yield f"    Ring({mechanics}, Geometry{ring.radii}, {fibers}),{_comment(ring)}"
+    yield "]"
+    inside = _mechanics(filament.core_modulus, filament.core_poisson_ratio)
+    yield f"innerTube = InnerTube({inside}, Geometry(0.0, {filament.rings[0].radii[0]!r}))"
+    values = {"L": filament.length, "phi2": filament.taper, "ρvol": filament.density}
+    options = [f"{name} = {value!r}" for name, value in values.items() if value is not None]
+    yield f"filament = AFilament(rings; {', '.join(options)}, innerTube = innerTube)"
+
+
+def _activation(rings: Sequence[FilamentRing]) -> Iterator[str]:
+    sides = [[_vector(pair[side] for pair in ring.bounds) for side in (0, 1)] for ring in rings]
+    yield "activation = ["
+    for ring, (lows, _) in zip(rings, sides, strict=True):
+        sectors = f"{len(ring.bounds)}, {lows}, {ring.extent!r}, {ring.offset!r}"
+        yield f"    ActivationPiecewiseGamma({sectors}),"
+    yield "]"
+    yield "γBounds = ["
+    yield from (f"    ({lows}, {highs})," for lows, highs in sides)
+    yield "]"
+
+
+def _comment(ring: FilamentRing) -> str:
+    name = "".join(character if character.isprintable() else " " for character in ring.name)
+    scale = f"γ is {ring.scale:g} times that of softreach" if ring.scale != 1 else ""
+    comment = "; ".join(part for part in (name.strip(), scale) if part)
+    return f"  # {comment}" if comment else ""
+
+
+def _mechanics(modulus: float, poisson_ratio: float) -> str:
+    return f"MechanicalProperties({modulus!r}, {poisson_ratio!r})"
+
+
+def _angle(angle: float | Pieces, length: float) -> str:
+    if not isinstance(angle, Pieces):
+        return repr(angle)
+    ends = [length * x for x in angle.stations_over_length]
+    ranges = ", ".join(f"({start!r}, {end!r})" for start, end in pairwise(ends))
+    return f"PiecewiseStructure({_vector(angle.values)}, [{ranges}])"
+
+
+def _vector(numbers: Iterable[float]) -> str:
+    return f"[{', '.join(map(repr, numbers))}]"

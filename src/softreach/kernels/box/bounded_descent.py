@@ -2,6 +2,10 @@
 
 The rod is evaluated in between for all that still run. Those that end make room for the next, so
 that the evaluation is never asked for a few.
+
+`box_steps` are Newton's toward the minimum of a function in the box. Variables on a bound that the
+gradient pushes outward stay there; the others take a Newton step, damped until the Hessian is
+positive definite, and stop at their bounds (Bertsekas 1982).
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["FIRST_DAMPING", "NOWHERE", "Running", "judge", "next_trials"]
+__all__ = ["FIRST_DAMPING", "NOWHERE", "Running", "box_steps", "judge", "next_trials"]
 
 NOWHERE = 1e150
 """Coordinate of tips that do not count; no distance may be infinite here."""
@@ -145,3 +149,65 @@ def next_trials(running, n, step, multiplier, gamma, low, high, scales):
             running.trial[i, j] = min(max(end, low[j]), high[j])
         x, y, z = multiplier[i, 0], multiplier[i, 1], multiplier[i, 2]
         running.left[i] = running.softness[i] * math.sqrt(x * x + y * y + z * z)
+
+
+_FIRST_SHIFT = 1e-4  # of the largest diagonal entry
+_DAMPINGS = 24
+
+
+@kernel
+def box_steps(gamma, gradient, hessian, damping, low, high, trial):
+    """Write the end of each step (n, m) into `trial`; `damping` (n,) grows where it has to."""
+    m = gamma.shape[1]
+    factor, step = np.empty((m, m)), np.empty(m)
+    free = np.empty(m, np.bool_)
+    for n in range(gamma.shape[0]):
+        largest = 0.0
+        for i in range(m):
+            down, up = gamma[n, i] <= low[i], gamma[n, i] >= high[i]
+            slope = gradient[n, i]
+            free[i] = not ((down and slope >= 0) or (up and slope <= 0) or low[i] == high[i])
+            largest = max(largest, abs(hessian[n, i, i]))
+        for _ in range(_DAMPINGS):
+            if _factored(hessian, n, damping[n] * largest, free, factor):
+                break
+            damping[n] = max(10.0 * damping[n], _FIRST_SHIFT)
+        _solve(factor, gradient, n, free, step)
+        for i in range(m):
+            trial[n, i] = min(max(gamma[n, i] + step[i], low[i]), high[i])
+
+
+@inline
+def _factored(hessian, n, shift, free, factor):
+    """Cholesky of the free rows and columns plus a shift; whether it is positive definite."""
+    m = factor.shape[0]
+    for i in range(m):
+        for j in range(i + 1):
+            total = 0.5 * (hessian[n, i, j] + hessian[n, j, i]) if free[i] and free[j] else 0.0
+            if i == j:
+                total += shift if free[i] else 1.0
+            scale = abs(total)
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = total / factor[j, j]
+            elif total <= 1e-13 * scale:
+                return False
+            else:
+                factor[i, i] = math.sqrt(total)
+    return True
+
+
+@inline
+def _solve(factor, gradient, n, free, step):
+    m = factor.shape[0]
+    for i in range(m):
+        total = -gradient[n, i] if free[i] else 0.0
+        for k in range(i):
+            total -= factor[i, k] * step[k]
+        step[i] = total / factor[i, i]
+    for i in range(m - 1, -1, -1):
+        total = step[i]
+        for k in range(i + 1, m):
+            total -= factor[k, i] * step[k]
+        step[i] = total / factor[i, i]

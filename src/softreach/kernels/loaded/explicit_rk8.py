@@ -17,6 +17,34 @@ NODES = (0.0, (7 - _S) / 14, 0.5, (7 + _S) / 14, 1.0)
 """Lobatto nodes of the unit step."""
 
 
+_STAGES = tuple(
+    (*row, 0.0, 0.0, 0.0, 0.0)[:6]
+    for row in (
+        (1 / 2, 0.0),
+        (1 / 4, 1 / 4),
+        (1 / 7, (-7 - 3 * _S) / 98, (21 + 5 * _S) / 49),
+        ((11 + _S) / 84, (18 + 4 * _S) / 63, (21 - _S) / 252),
+        ((5 + _S) / 48, (9 + _S) / 36, (-231 + 14 * _S) / 360, (63 - 7 * _S) / 80),
+        (
+            *((10 - _S) / 42, (-432 + 92 * _S) / 315, (633 - 145 * _S) / 90),
+            *((-504 + 115 * _S) / 70, (63 - 13 * _S) / 35),
+        ),
+        (1 / 14, (14 - 3 * _S) / 126, (13 - 3 * _S) / 63, 1 / 9),
+        (1 / 32, (91 - 21 * _S) / 576, 11 / 72, (-385 - 75 * _S) / 1152, (63 + 13 * _S) / 128),
+        (
+            *(1 / 14, 1 / 9, (-733 - 147 * _S) / 2205, (515 + 111 * _S) / 504),
+            *((-51 - 11 * _S) / 56, (132 + 28 * _S) / 245),
+        ),
+        (
+            *((-42 + 7 * _S) / 18, (-18 + 28 * _S) / 45, (-273 - 53 * _S) / 72),
+            *((301 + 53 * _S) / 72, (28 - 28 * _S) / 45, (49 - 7 * _S) / 18),
+        ),
+        (1 / 20, 49 / 180, 16 / 45, 49 / 180, 1 / 20),
+    )
+)
+"""Coefficients of the slopes that each stage beside the first, and the far end, add up."""
+
+
 @inline
 def at_stages(nodes):
     """The nodes of the eleven stages from the five of a step."""
@@ -72,64 +100,27 @@ def step_function(rates, plus):
     @inline
     def step(nodes, s):
         k1 = rates(nodes[0], s)
-        s2 = plus(s, (1 / 2, 0.0, 0.0, 0.0, 0.0, 0.0), k1, k1, k1, k1, k1, k1)
+        s2 = plus(s, _STAGES[0], k1, k1, k1, k1, k1, k1)
         k2 = rates(nodes[1], s2)
-        s3 = plus(s, (1 / 4, 1 / 4, 0.0, 0.0, 0.0, 0.0), k1, k2, k1, k1, k1, k1)
+        s3 = plus(s, _STAGES[1], k1, k2, k1, k1, k1, k1)
         k3 = rates(nodes[2], s3)
-        c = (1 / 7, (-7 - 3 * _S) / 98, (21 + 5 * _S) / 49, 0.0, 0.0, 0.0)
-        s4 = plus(s, c, k1, k2, k3, k1, k1, k1)
+        s4 = plus(s, _STAGES[2], k1, k2, k3, k1, k1, k1)
         k4 = rates(nodes[3], s4)
-        c = ((11 + _S) / 84, (18 + 4 * _S) / 63, (21 - _S) / 252, 0.0, 0.0, 0.0)
-        s5 = plus(s, c, k1, k3, k4, k1, k1, k1)
+        s5 = plus(s, _STAGES[3], k1, k3, k4, k1, k1, k1)
         k5 = rates(nodes[4], s5)
-        c = ((5 + _S) / 48, (9 + _S) / 36, (-231 + 14 * _S) / 360, (63 - 7 * _S) / 80, 0.0, 0.0)
-        s6 = plus(s, c, k1, k3, k4, k5, k1, k1)
+        s6 = plus(s, _STAGES[4], k1, k3, k4, k5, k1, k1)
         k6 = rates(nodes[5], s6)
-        c = (
-            (10 - _S) / 42,
-            (-432 + 92 * _S) / 315,
-            (633 - 145 * _S) / 90,
-            (-504 + 115 * _S) / 70,
-            (63 - 13 * _S) / 35,
-            0.0,
-        )
-        s7 = plus(s, c, k1, k3, k4, k5, k6, k1)
+        s7 = plus(s, _STAGES[5], k1, k3, k4, k5, k6, k1)
         k7 = rates(nodes[6], s7)
-        c = (1 / 14, (14 - 3 * _S) / 126, (13 - 3 * _S) / 63, 1 / 9, 0.0, 0.0)
-        s8 = plus(s, c, k1, k5, k6, k7, k1, k1)
+        s8 = plus(s, _STAGES[6], k1, k5, k6, k7, k1, k1)
         k8 = rates(nodes[7], s8)
-        c = (
-            1 / 32,
-            (91 - 21 * _S) / 576,
-            11 / 72,
-            (-385 - 75 * _S) / 1152,
-            (63 + 13 * _S) / 128,
-            0.0,
-        )
-        s9 = plus(s, c, k1, k5, k6, k7, k8, k1)
+        s9 = plus(s, _STAGES[7], k1, k5, k6, k7, k8, k1)
         k9 = rates(nodes[8], s9)
-        c = (
-            1 / 14,
-            1 / 9,
-            (-733 - 147 * _S) / 2205,
-            (515 + 111 * _S) / 504,
-            (-51 - 11 * _S) / 56,
-            (132 + 28 * _S) / 245,
-        )
-        s10 = plus(s, c, k1, k5, k6, k7, k8, k9)
+        s10 = plus(s, _STAGES[8], k1, k5, k6, k7, k8, k9)
         k10 = rates(nodes[9], s10)
-        c = (
-            (-42 + 7 * _S) / 18,
-            (-18 + 28 * _S) / 45,
-            (-273 - 53 * _S) / 72,
-            (301 + 53 * _S) / 72,
-            (28 - 28 * _S) / 45,
-            (49 - 7 * _S) / 18,
-        )
-        s11 = plus(s, c, k5, k6, k7, k8, k9, k10)
+        s11 = plus(s, _STAGES[9], k5, k6, k7, k8, k9, k10)
         k11 = rates(nodes[10], s11)
-        c = (1 / 20, 49 / 180, 16 / 45, 49 / 180, 1 / 20, 0.0)
-        end = plus(s, c, k1, k8, k9, k10, k11, k1)
+        end = plus(s, _STAGES[10], k1, k8, k9, k10, k11, k1)
         return end, (s, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11)
 
     return step

@@ -8,20 +8,24 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["interpolate"]
+__all__ = ["UNEVEN", "interpolate"]
+
+UNEVEN = 1e3
+"""Roughness of cells beside one that is cut."""
 
 
 @kernel
-def interpolate(values, is_smooth, points, sizes, out):
+def interpolate(values, rough, points, sizes, out, rough_there):
     """Interpolate by Lagrange's polynomials, in smooth cells cubic in each axis, linear in others.
 
     Args:
         values: Directions at the nodes (node, 3 direction), the last axis of the grid varying
             fastest.
-        is_smooth: Whether cells are, and those beside them (cell,).
+        rough: Roughness of the cells (cell,).
         points: Places in cells from the first node (n, 3); outside the nearest cell is continued.
         sizes: Nodes of every axis, 1 or at least 4 (3,).
         out: Filled with unit vectors, (n, 3 direction).
+        rough_there: Filled with the roughness of the cell of each place (n,).
     """
     weights, first, count = np.zeros((3, 4)), np.zeros(3, np.int64), np.zeros(3, np.int64)
     for n in range(points.shape[0]):
@@ -29,8 +33,9 @@ def interpolate(values, is_smooth, points, sizes, out):
         for axis in range(3):
             first[axis] = min(max(int(np.floor(points[n, axis])), 0), max(sizes[axis] - 2, 0))
             cell = cell * max(sizes[axis] - 1, 1) + first[axis]
+        rough_there[n] = rough[cell]
         for axis in range(3):
-            count[axis] = min(sizes[axis], 4 if is_smooth[cell] else 2)
+            count[axis] = min(sizes[axis], 4 if rough[cell] < UNEVEN else 2)
             if count[axis] == 4:
                 first[axis] = min(max(first[axis] - 1, 0), sizes[axis] - 4)
             _weigh(weights[axis], points[n, axis] - first[axis], count[axis])

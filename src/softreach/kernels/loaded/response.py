@@ -21,7 +21,20 @@ from softreach.kernels.loaded.frames import (
     world,
 )
 from softreach.kernels.loaded.rod_step import column_step, frame_tip
-from softreach.kernels.loaded.section import SHARE, F, G, M, Y, begin_tip, frame_nodes
+from softreach.kernels.loaded.section import (
+    FORCE,
+    MOMENT,
+    SHARE,
+    THETA,
+    F,
+    G,
+    M,
+    Y,
+    begin_tangents,
+    begin_tip,
+    frame_nodes,
+    push,
+)
 from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.shooting import node_world
 from softreach.kernels.loaded.unloaded_frames import (
@@ -154,16 +167,16 @@ def _step_columns(w, columns, first, bundles, lanes, unloaded, tables):
 
 
 @inline
-def _begin(w, columns, units, tip, i):
+def _begin(w, columns, units, tip, seen, i):
     """The tip, theory (67), with turns of the world about its axes, and unit forces along them."""
+    w[SHARE + i] = 1.0
+    put_world(w, G, i, seen[0], seen[1])
     begin_tip(w, tip, i)
-    share, axes = w[SHARE + i], world(w, G, i)
-    weight = combination((share * tip[0], share * tip[1], share * tip[2]), axes)
-    lever, f = (tip[3], tip[4], tip[5]), (share * tip[6], share * tip[7], share * tip[8])
+    begin_tangents(w, tip, i)
     for n in range(3):
-        put(columns[n], 0, i, axes[n])
-        put(columns[n], 3 * LANES, i, cross(lever, cross(axes[n], weight)))
-        put(columns[n], 9 * LANES, i, along(axes, cross(f, axes[n])))
+        put(columns[n], 0, i, get(w, THETA + 3 * n * LANES, i))
+        put(columns[n], 3 * LANES, i, get(w, MOMENT + 3 * n * LANES, i))
+        put(columns[n], 9 * LANES, i, get(w, FORCE + 3 * n * LANES, i))
         columns[n, (12 + n) * LANES + i] = 1.0
         if units > 0:
             columns[columns.shape[0] - 3 + n, (9 + n) * LANES + i] = 1.0
@@ -172,9 +185,7 @@ def _begin(w, columns, units, tip, i):
 @inline
 def _push(w, columns, moment, i):
     """A dead moment at the tip end of a step, theory (67)."""
-    share = w[SHARE + i]
-    m = combination((share * moment[0], share * moment[1], share * moment[2]), world(w, G, i))
-    put(w, M, i, plus(get(w, M, i), m))
+    m = push(w, moment, i)
     for n in range(columns.shape[0]):
         dm = get(columns[n], 3 * LANES, i)
         put(columns[n], 3 * LANES, i, plus(dm, cross(get(columns[n], 0, i), m)))
@@ -213,19 +224,29 @@ def _clear(columns, axes, i):
 
 
 @inline
-def _enter(w, columns, now, node, i):
-    """Turn the world of a section to what a node sees, and what lies beyond with it."""
-    missing = missing_turn(now, node)
-    put(w, M, i, plus(get(w, M, i), _combine(columns, 3 * LANES, i, missing)))
-    put(w, Y, i, plus(get(w, Y, i), _combine(columns, 6 * LANES, i, missing)))
-    put(w, F, i, plus(get(w, F, i), _combine(columns, 9 * LANES, i, missing)))
-    put_world(w, G, i, node[0], node[1])
-    for n in range(3):
-        put(columns[n], 0, i, node[n])
+def _arrive(w, columns, frames, q, row, node, count, wanted, i):
+    """Turn the world of a section to what the node sees, and what lies beyond with it."""
+    now, size = world(w, G, i), frames.shape[1] // count
+    if size == 3:
+        put(columns[0], 0, i, now[0])
+    if wanted:
+        _clear(columns, now, i)
+    if node < count:
+        g, h = node_world(q, frames, row, node, size)
+        if size == 3:
+            h = now[1]
+        axes = orthonormal(g, h)
+        missing = missing_turn(now, axes)
+        put(w, M, i, plus(get(w, M, i), _combine(columns, 3 * LANES, i, missing)))
+        put(w, Y, i, plus(get(w, Y, i), _combine(columns, 6 * LANES, i, missing)))
+        put(w, F, i, plus(get(w, F, i), _combine(columns, 9 * LANES, i, missing)))
+        put_world(w, G, i, axes[0], axes[1])
+        for n in range(3):
+            put(columns[n], 0, i, axes[n])
 
 
 @kernel
-def respond(gamma, tip, frames, tables, slopes, compliance, trace):  # noqa: C901
+def respond(gamma, tip, frames, tables, slopes, compliance, trace):
     """Responses of n rods in equilibrium, whatever is asked for.
 
     Args:
@@ -257,11 +278,9 @@ def respond(gamma, tip, frames, tables, slopes, compliance, trace):  # noqa: C90
         rest_frames(work, lanes, tables[0], lengths, unloaded)
         columns[:] = 0.0
         for i in range(LANES):
-            w[SHARE + i] = 1.0
             row = first + min(i, here - 1)
-            g, h = node_world(turn_at(work, TURN, i), frames, row, 0, size)
-            put_world(w, G, i, g, h)
-            _begin(w, columns, units, tip, i)
+            seen = node_world(turn_at(work, TURN, i), frames, row, 0, size)
+            _begin(w, columns, units, tip, seen, i)
         for s in range(count):
             for k in range(firsts[s], firsts[s + 1]):
                 if moments[k].any():
@@ -277,17 +296,8 @@ def respond(gamma, tip, frames, tables, slopes, compliance, trace):  # noqa: C90
                 if trace.shape[0] > 0:
                     _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[first:, k + 1])
             for i in range(LANES):
-                now, q = world(w, G, i), turn_at(work, TURN, i)
-                if turns > 0:
-                    put(columns[0], 0, i, now[0])
-                if wanted:
-                    _clear(columns, now, i)
-                if s + 1 < count:
-                    row = first + min(i, here - 1)
-                    g, h = node_world(q, frames, row, s + 1, size)
-                    if turns > 0:
-                        h = now[1]
-                    _enter(w, columns, now, orthonormal(g, h), i)
+                row, q = first + min(i, here - 1), turn_at(work, TURN, i)
+                _arrive(w, columns, frames, q, row, s + 1, count, wanted, i)
         for i in range(here):
             _store(w, work, columns, first, i, bundles, slopes, compliance)
 

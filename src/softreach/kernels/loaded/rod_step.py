@@ -38,10 +38,10 @@ def _mix(a, x, b, y):
 @inline
 def _yield(node, n, m):
     """β, ζ and ω; node = (λ, ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, ...)."""
-    growth, length, d, bending, twisting, axial, _ = node
-    beta = growth * twisting * dot(d, m)
-    zeta = length + growth * axial * dot(d, n)
-    return beta, zeta, _mix(growth * bending, m, beta, d)
+    rest_length, length, d, bending, twisting, axial, _ = node
+    beta = rest_length * twisting * dot(d, m)
+    zeta = length + rest_length * axial * dot(d, n)
+    return beta, zeta, _mix(rest_length * bending, m, beta, d)
 
 
 @inline
@@ -52,11 +52,13 @@ def _moment_rate(node, n, m, beta, zeta):
 @inline
 def _tangent_rate(node, n, m, yields, theta, dm, dn, drive):
     """Product rule, theory (68), (73): dθ, dδM, and δω and δζ; drive = (δλ, δℓ, δω̂)."""
-    growth, _, d, bending, twisting, axial, _ = node
-    (beta, zeta, turn), (d_growth, d_length, d_turn) = yields, drive
-    d_beta = growth * twisting * dot(d, dm) + d_growth * twisting * dot(d, m)
-    d_zeta = growth * axial * dot(d, dn) + d_growth * axial * dot(d, n) + d_length
-    turned = plus(_mix(growth * bending, dm, d_beta, d), _mix(d_growth * bending, m, 1.0, d_turn))
+    rest_length, _, d, bending, twisting, axial, _ = node
+    (beta, zeta, turn), (d_rest_length, d_length, d_turn) = yields, drive
+    d_beta = rest_length * twisting * dot(d, dm) + d_rest_length * twisting * dot(d, m)
+    d_zeta = rest_length * axial * dot(d, dn) + d_rest_length * axial * dot(d, n) + d_length
+    turned = plus(
+        _mix(rest_length * bending, dm, d_beta, d), _mix(d_rest_length * bending, m, 1.0, d_turn)
+    )
     pushed = plus(_mix(d_beta, m, beta, dm), _mix(d_zeta, n, zeta, dn))
     return (
         plus(cross(turn, theta), turned),
@@ -122,11 +124,11 @@ def _frame_tip_rates(node, s):
 @inline
 def _column_rates(place, t):
     """Of (θ, δM, δy); place = (node, (G, H, M, y), (δλ, δℓ, δω̂, u))."""
-    node, (g, h, m, y), (d_growth, d_length, d_turn, unit) = place
+    node, (g, h, m, y), (d_rest_length, d_length, d_turn, unit) = place
     axes = g, h, cross(g, h)
     n = combination(node[6], axes)
     dn = plus(cross(t[0], n), combination(unit, axes))
-    yields, drive = _yield(node, n, m), (d_growth, d_length, d_turn)
+    yields, drive = _yield(node, n, m), (d_rest_length, d_length, d_turn)
     theta, dm, turned, d_zeta = _tangent_rate(node, n, m, yields, t[0], t[1], dn, drive)
     dy = plus(plus(cross(yields[2], t[2]), cross(turned, y)), times(d_zeta, node[2]))
     return theta, dm, dy

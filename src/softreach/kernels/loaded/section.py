@@ -60,16 +60,20 @@ def begin_tangents(w, tip, i):
 
 
 @inline
-def push(w, moment, tangents, i):
-    """A dead moment at the tip end of a step, theory (67)."""
+def push(w, moment, i):
+    """A dead moment at the tip end of a step, theory (67); the moment."""
     share, axes = w[SHARE + i], world(w, G, i)
     m = combination((share * moment[0], share * moment[1], share * moment[2]), axes)
     put(w, M, i, plus(get(w, M, i), m))
-    if tangents:
-        for j in range(3):
-            at = MOMENT + 3 * j * LANES
-            turn = get(w, THETA + 3 * j * LANES, i)
-            put(w, at, i, plus(get(w, at, i), cross(turn, m)))
+    return m
+
+
+@inline
+def push_tangents(w, m, i):
+    """What the moment changes in the tangents."""
+    for at in range(0, 9 * LANES, 3 * LANES):
+        dm = cross(get(w, THETA + at, i), m)
+        put(w, MOMENT + at, i, plus(get(w, MOMENT + at, i), dm))
 
 
 def _nodes_with(load):

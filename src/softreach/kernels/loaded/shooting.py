@@ -46,6 +46,7 @@ from softreach.kernels.loaded.section import (
     begin_tip,
     carry_normal,
     push,
+    push_tangents,
     step_direction_tip,
 )
 from softreach.kernels.loaded.section import SIZE as SECTION
@@ -201,20 +202,8 @@ def _store(w, nodes, work, first, here, tiny, out):
             out[row, -1] = AT_WORK
 
 
-def _walk_with(in_space, tangents):  # noqa: C901
-    """A walk from tip to base, with tangents of turns of the world or with the tip."""
-    step_walk, step_tip, watch, begin, go_on, turns, missing = IN_SPACE if in_space else ALONG_ONE
-    step = step_walk if tangents else step_tip
-
-    @inline
-    def set_out(w, node, tip, i):
-        put(w, G, i, get(node, WORLD, i))
-        put(w, H, i, get(node, WORLD + 3 * LANES, i))
-        begin_tip(w, tip, i)
-        if tangents:
-            begin_tangents(w, tip, i)
-            begin(w, i)
-            w[MARGIN + i] = 1.0
+def _entry_with(in_space, tangents, missing, turns):
+    """The way into the next segment, with what lies beyond turned to what the node sees."""
 
     @inline
     def enter(w, before, node, i):
@@ -230,7 +219,25 @@ def _walk_with(in_space, tangents):  # noqa: C901
             put_three(w, THETA, i, world(w, G, i))
             put_three(w, MOMENT, i, three(node, ANSWER, i))
             put_three(w, FORCE, i, three(node, ANSWER + 9 * LANES, i))
-            go_on(w, i)
+
+    return enter
+
+
+def _walk_with(in_space, tangents):  # noqa: C901
+    """A walk from tip to base, with tangents of turns of the world or with the tip."""
+    step_walk, step_tip, watch, begin, go_on, turns, missing = IN_SPACE if in_space else ALONG_ONE
+    step = step_walk if tangents else step_tip
+    enter = _entry_with(in_space, tangents, missing, turns)
+
+    @inline
+    def set_out(w, node, tip, i):
+        put(w, G, i, get(node, WORLD, i))
+        put(w, H, i, get(node, WORLD + 3 * LANES, i))
+        begin_tip(w, tip, i)
+        if tangents:
+            begin_tangents(w, tip, i)
+            begin(w, i)
+            w[MARGIN + i] = 1.0
 
     @pasted
     def walk(w, nodes, rest, table, tip):
@@ -242,7 +249,9 @@ def _walk_with(in_space, tangents):  # noqa: C901
                 r, c = rest[k], scalars[k]
                 if in_space and moments[k].any():
                     for i in range(LANES):
-                        push(w, moments[k], tangents, i)
+                        m = push(w, moments[k], i)
+                        if tangents:
+                            push_tangents(w, m, i)
                 for i in range(LANES):
                     step(w, r, c, i)
                 if tangents:
@@ -251,6 +260,8 @@ def _walk_with(in_space, tangents):  # noqa: C901
             before, node = nodes[n], nodes[n + 1]
             for i in range(LANES):
                 enter(w, before, node, i)
+                if tangents:
+                    go_on(w, i)
 
     return walk
 

@@ -33,7 +33,7 @@ TURN = 12 * LANES
 WORK = TURN + 4 * LANES
 
 
-def pack_lengths(measure, stretch, growth):
+def pack_lengths(measure, stretch, rest_length_factor):
     """Tables (step, 2 node, bundle + 1) of η dZ, then ζ̂ dZ, at the nodes of steps.
 
     The last column is at rest.
@@ -41,9 +41,9 @@ def pack_lengths(measure, stretch, growth):
     Args:
         measure: Length of the step as each node sees it [m], shape (step, node).
         stretch: z [-], shape (step, node, bundle).
-        growth: Its part in η [-], shape (step, node, bundle).
+        rest_length_factor: Its part in η [-], shape (step, node, bundle).
     """
-    measure, both = np.tile(measure, 2), np.concatenate([growth, stretch], axis=1)
+    measure, both = np.tile(measure, 2), np.concatenate([rest_length_factor, stretch], axis=1)
     bundles = both.shape[2]
     table = np.zeros((*measure.shape, -(-max(bundles, 1) // 4) * 4 + 1))
     table[..., :bundles] = measure[..., None] * both
@@ -98,14 +98,14 @@ def _of_four(weights, g):
 
 
 @inline
-def _fill_lengths(values, lanes, growth, length):
+def _fill_lengths(values, lanes, rest_length, length):
     """η dZ and ζ̂ dZ of one node, into the first row and the fifth."""
-    a, b, p, q = growth[-1], length[-1], _four(growth, 0), _four(length, 0)
+    a, b, p, q = rest_length[-1], length[-1], _four(rest_length, 0), _four(length, 0)
     for i in range(LANES):
         g = _activations(lanes, 0, i)
         values[i], values[4 * LANES + i] = a + _of_four(p, g), b + _of_four(q, g)
     for j in range(4, lanes.shape[0], 4):
-        p, q = _four(growth, j), _four(length, j)
+        p, q = _four(rest_length, j), _four(length, j)
         for i in range(LANES):
             g = _activations(lanes, j, i)
             values[i] += _of_four(p, g)
@@ -136,11 +136,11 @@ def _fill_bends(values, lanes, table):
 @inline
 def _bend(work, at, i):
     """η u dZ at one Gauss node."""
-    growth = work[at + i]
+    rest_length = work[at + i]
     return (
-        growth * work[at + LANES + i],
-        growth * work[at + 2 * LANES + i],
-        growth * work[at + 3 * LANES + i],
+        rest_length * work[at + LANES + i],
+        rest_length * work[at + 2 * LANES + i],
+        rest_length * work[at + 3 * LANES + i],
     )
 
 

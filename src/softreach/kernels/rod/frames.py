@@ -24,14 +24,14 @@ _BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)
 def _node(table, k, node, gamma):
     """A = (ηu, ζ e3) dZ at one node of step k."""
     row, last = 4 * node, BEND_ROWS + node if table.shape[1] > BEND_ROWS else 4 * node
-    growth, length, x, y, z = table[k, row, -1], table[k, last, -1], 0.0, 0.0, 0.0
+    rest_length, length, x, y, z = table[k, row, -1], table[k, last, -1], 0.0, 0.0, 0.0
     for j in range(gamma.shape[0]):
-        growth += table[k, row, j] * gamma[j]
+        rest_length += table[k, row, j] * gamma[j]
         x += table[k, row + 1, j] * gamma[j]
         y += table[k, row + 2, j] * gamma[j]
         z += table[k, row + 3, j] * gamma[j]
         length += table[k, last, j] * gamma[j]
-    return growth * x, growth * y, growth * z, 0.0, 0.0, length
+    return rest_length * x, rest_length * y, rest_length * z, 0.0, 0.0, length
 
 
 @inline

@@ -28,16 +28,16 @@ __all__ = ["jacobians"]
 
 
 @inline
-def _change(growth, weights, a):
+def _change(rest_length, weights, a):
     """Change of A = (ηu, ζ e3) dZ per unit of one activation, from its column of the table.
 
     Product rule on ω = ηu, with u = ω/η, theory (28).
     """
-    ratio = weights[0] / growth
+    ratio = weights[0] / rest_length
     return (
-        ratio * a[0] + growth * weights[1],
-        ratio * a[1] + growth * weights[2],
-        ratio * a[2] + growth * weights[3],
+        ratio * a[0] + rest_length * weights[1],
+        ratio * a[1] + rest_length * weights[2],
+        ratio * a[2] + rest_length * weights[3],
         0.0,
         0.0,
         weights[4],

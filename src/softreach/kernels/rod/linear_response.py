@@ -68,8 +68,9 @@ def _add(factor, a, out):
 
 
 @inline
-def _rates_of_places(growth, stretch, thrust, d3, force, work):
+def _rates_of_places(node, d3, force, work):
     """Write ρ' = (η/K0 d3 (d3 × n)ᵀ - ζ d3 ×) θ into `work`, shape (3, 3)."""
+    rest_length, stretch, thrust = node
     _skew(d3, work)
     across = (
         d3[1] * force[2] - d3[2] * force[1],
@@ -78,18 +79,19 @@ def _rates_of_places(growth, stretch, thrust, d3, force, work):
     )
     for a in range(3):
         for b in range(3):
-            work[a, b] = growth * thrust * d3[a] * across[b] - stretch * work[a, b]
+            work[a, b] = rest_length * thrust * d3[a] * across[b] - stretch * work[a, b]
 
 
 @inline
-def _sources(growth, stretch, thrust, d, force, turning, pushing, yielding, hat, climb, source):
+def _sources(node, d, force, turning, pushing, yielding, hat, climb, source):
     """Write what the tables alone change: of ρ' into `climb`, of θ' and μ' into `source`."""
+    rest_length, stretch, thrust = node
     columns = pushing.shape[0]
     climb[:] = 0.0
     source[:] = 0.0
     for c in range(columns):
         pull = yielding[0, c] * d[2, 0] + yielding[1, c] * d[2, 1] + yielding[2, c] * d[2, 2]
-        grown = pushing[c] + growth * thrust * pull
+        grown = pushing[c] + rest_length * thrust * pull
         for a in range(3):
             climb[a, 3 + c] = d[2, a] * grown
     _product(1.0, d.T, turning, source[:3, 3:])
@@ -100,13 +102,13 @@ def _sources(growth, stretch, thrust, d, force, turning, pushing, yielding, hat,
 
 
 @inline
-def _law(growth, resistance, d, moment, force, rise, hat, local):
+def _law(rest_length, resistance, d, moment, force, rise, hat, local):
     """Write the law of θ' and μ' by θ and μ into `local`, shape (6, 6)."""
     local[:] = 0.0
     for a in range(3):
         for b in range(3):
             for e in range(3):
-                local[a, 3 + b] += growth * d[e, a] * resistance[e] * d[e, b]
+                local[a, 3 + b] += rest_length * d[e, a] * resistance[e] * d[e, b]
     _skew(moment, hat)
     _product(1.0, local[:3, 3:], hat, local[:3, :3])
     _skew(force, hat)
@@ -220,9 +222,16 @@ def _moment_at_base(state, lever, weight, tipping, excess, unknown):
     _solve(excess[:, :3], unknown)
 
 
+@inline
+def _solved(values, unknown, out):
+    """Write what columns come to, whose first three are those of the unknowns."""
+    _copy(values[:, 3:], out)
+    _product(1.0, values[:, :3], unknown, out)
+
+
 @kernel
 def respond(
-    growth,
+    rest_length,
     stretch,
     resistance,
     thrust,
@@ -244,7 +253,7 @@ def respond(
     """Movements of one rod at boundaries of its steps, and works along it, for all columns.
 
     Args:
-        growth: η dZ of the nodes [m], shape (step, 3).
+        rest_length: η dZ of the nodes [m], shape (step, 3).
         stretch: ζ dZ [m], likewise.
         resistance: 1/K1, 1/K1, 1/K3 [1/(N m²)], shape (step, 3, 3); zero without loads.
         thrust: 1/K0 [1/N], shape (step, 3).
@@ -263,7 +272,7 @@ def respond(
         turns: Result, θ, likewise.
         works: Result, shape (work, column).
     """
-    steps, columns = growth.shape[0], turning.shape[3]
+    steps, columns = rest_length.shape[0], turning.shape[3]
     every = columns + 3
     loaded = thrust.max() > 0.0
     state, place = np.zeros((6, every)), np.zeros((3, every))  # θ and μ, ρ
@@ -277,23 +286,17 @@ def respond(
     moved, angle = np.zeros((3, every)), np.zeros((3, every))
     for k in range(steps):
         for i in range(3):
-            d, n, s = directors[k, i], force[k, i], stretch[k, i]
-            _rates_of_places(growth[k, i], s, thrust[k, i], d[2], n, rise[i])
-            source = rates[6 * i : 6 * i + 6]
-            _sources(
-                growth[k, i],
-                s,
-                thrust[k, i],
-                d,
-                n,
-                turning[k, i],
-                pushing[k, i],
-                yielding[k, i],
-                hat,
-                climb[i],
-                source,
+            d, n, node = (
+                directors[k, i],
+                force[k, i],
+                (rest_length[k, i], stretch[k, i], thrust[k, i]),
             )
-            _law(growth[k, i], resistance[k, i], d, moment[k, i], n, rise[i], hat, local[i])
+            source = rates[6 * i : 6 * i + 6]
+            _rates_of_places(node, d[2], n, rise[i])
+            _sources(
+                node, d, n, turning[k, i], pushing[k, i], yielding[k, i], hat, climb[i], source
+            )
+            _law(rest_length[k, i], resistance[k, i], d, moment[k, i], n, rise[i], hat, local[i])
         if loaded:
             _collocate(local, state, system, rates)
         for i in range(3):
@@ -307,9 +310,6 @@ def respond(
     if loaded:
         _moment_at_base(state, lever, weight, tipping, angle, unknown)
     for mark in range(len(marks)):
-        _copy(kept[mark, :3, 3:], moves[mark])
-        _copy(kept[mark, 3:, 3:], turns[mark])
-        _product(1.0, kept[mark, :3, :3], unknown, moves[mark])
-        _product(1.0, kept[mark, 3:, :3], unknown, turns[mark])
-    _copy(work[:, 3:], works)
-    _product(1.0, work[:, :3], unknown, works)
+        _solved(kept[mark, :3], unknown, moves[mark])
+        _solved(kept[mark, 3:], unknown, turns[mark])
+    _solved(work, unknown, works)

@@ -23,19 +23,22 @@ def hat(omega: Array, v: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def twists(measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array) -> Array:
+def twists(
+    measure: Array, stretch: Array, rest_length_factor: Array, curvature: Array, gamma: Array
+) -> Array:
     """A = (ηu, ζe3) dZ at every node of every step, shape (step, node, 4, 4).
 
     Args:
         measure: Length of the step as each node sees it [m], shape (step, node).
         stretch: z [-], shape (step, node, bundle).
-        growth: Its part in η [-], shape (step, node, bundle).
+        rest_length_factor: Its part in η [-], shape (step, node, bundle).
         curvature: U [1/m], shape (step, node, 3, bundle).
         gamma: One activation [-], shape (bundle,).
     """
-    grown, length = measure * (1.0 + growth @ gamma), measure * (1.0 + stretch @ gamma)
+    rest_length = measure * (1.0 + rest_length_factor @ gamma)
+    length = measure * (1.0 + stretch @ gamma)
     e3 = np.array([0.0, 0.0, 1.0])
-    return hat(grown[..., None] * (curvature @ gamma), length[..., None] * e3)
+    return hat(rest_length[..., None] * (curvature @ gamma), length[..., None] * e3)
 
 
 def magnus6(a1: Array, a2: Array, a3: Array) -> Array:
@@ -53,16 +56,20 @@ def magnus6(a1: Array, a2: Array, a3: Array) -> Array:
     return b1 + b3 / 12 + bracket(-20 * b1 - b3 + c1, b2 + c2) / 240
 
 
-def frames(measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array) -> Array:
+def frames(
+    measure: Array, stretch: Array, rest_length_factor: Array, curvature: Array, gamma: Array
+) -> Array:
     """Homogeneous frames (d1 d2 d3 r) at the base and after every step, (step + 1, 4, 4)."""
     from scipy.linalg import expm
 
     frame = [np.eye(4)]
-    for a in twists(measure, stretch, growth, curvature, gamma):
+    for a in twists(measure, stretch, rest_length_factor, curvature, gamma):
         frame.append(frame[-1] @ expm(magnus6(*a)))
     return np.array(frame)
 
 
-def tip(measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array) -> Array:
+def tip(
+    measure: Array, stretch: Array, rest_length_factor: Array, curvature: Array, gamma: Array
+) -> Array:
     """Tip position r(L) [m], shape (3,)."""
-    return frames(measure, stretch, growth, curvature, gamma)[-1, :3, 3]
+    return frames(measure, stretch, rest_length_factor, curvature, gamma)[-1, :3, 3]

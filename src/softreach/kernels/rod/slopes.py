@@ -175,12 +175,12 @@ def _row(below, s, left, t, right, beside):
 @inline
 def _write_node(work, i, scratch, to, row, same):
     """Product rule on ω = ηu."""
-    growth = work[i]
+    rest_length = work[i]
     bend = row[0] * work[i + LANES] + row[1] * work[i + 2 * LANES] + row[2] * work[i + 3 * LANES]
     scratch[to] = bend + same * row[5]
-    scratch[to + TOGETHER] = growth * row[0]
-    scratch[to + 2 * TOGETHER] = growth * row[1]
-    scratch[to + 3 * TOGETHER] = growth * row[2]
+    scratch[to + TOGETHER] = rest_length * row[0]
+    scratch[to + 2 * TOGETHER] = rest_length * row[1]
+    scratch[to + 3 * TOGETHER] = rest_length * row[2]
 
 
 @inline

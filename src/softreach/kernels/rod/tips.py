@@ -40,7 +40,7 @@ WORK = TIP + 3 * LANES
 _GROUP = 4  # bundles added at once
 
 
-def pack(measure, stretch, growth, curvature):
+def pack(measure, stretch, rest_length_factor, curvature):
     """Node tables as one array (step, row, bundle + 1): rows η dZ, u1, u2, u3 of each node.
 
     Three rows ζ dZ follow where ζ is not η. The last column is the value at rest; bundles are
@@ -49,17 +49,17 @@ def pack(measure, stretch, growth, curvature):
     Args:
         measure: Length of the step as each node sees it [m], shape (step, 3).
         stretch: z [-], shape (step, 3, bundle).
-        growth: Its part in η [-], shape (step, 3, bundle).
+        rest_length_factor: Its part in η [-], shape (step, 3, bundle).
         curvature: U [1/m], shape (step, 3, 3, bundle).
     """
     steps, _, bundles = stretch.shape
     table = np.zeros((steps, NODE_ROWS, -(-max(bundles, 1) // _GROUP) * _GROUP + 1))
     bends = table[:, :BEND_ROWS].reshape(steps, 3, 4, table.shape[-1])
-    for rows, values in ((bends[:, :, 0], growth), (table[:, BEND_ROWS:], stretch)):
+    for rows, values in ((bends[:, :, 0], rest_length_factor), (table[:, BEND_ROWS:], stretch)):
         rows[..., :bundles] = measure[..., None] * values
         rows[..., -1] = measure
     bends[:, :, 1:, :bundles] = curvature
-    return table if (growth != stretch).any() else table[:, :BEND_ROWS].copy()
+    return table if (rest_length_factor != stretch).any() else table[:, :BEND_ROWS].copy()
 
 
 @inline
@@ -116,8 +116,8 @@ def nodes_at(work, i):
 
 
 @inline
-def _twist(growth, u1, u2, u3, length):
-    return growth * u1, growth * u2, growth * u3, 0.0, 0.0, length
+def _twist(rest_length, u1, u2, u3, length):
+    return rest_length * u1, rest_length * u2, rest_length * u3, 0.0, 0.0, length
 
 
 @inline

@@ -2,43 +2,44 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
-from softreach.paper.claims import Finding, Numbers, judged
-from softreach.paper.notebook import Notebook, Settings
+from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, judged
 from softreach.plot import DesignPanel, plot_designs
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.summary import describe
 
 
-def model(settings: Settings, notes: Notebook) -> None:
+def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
     """The design, its angles, its symmetry."""
     arm = minimal_trunk(taper=np.radians(3))
+    _draw(arm, notes)
     facts = describe(arm)
     corners = [minimal_trunk(np.radians(o), np.radians(p)) for o in (0, 108) for p in (0, 3)]
-    notes.note(
-        narrowing=facts.taper_ratio,
-        helical_angle_deg=float(np.degrees(facts.helical_angles[1])),
-        gap_deg=_gap(arm),
-        asymmetry=max(_asymmetry(corner, settings.seed) for corner in corners),
-    )
-    _draw(arm, notes)
+    return {
+        "narrowing": facts.taper_ratio,
+        "helical_angle_deg": float(np.degrees(facts.helical_angles[1])),
+        "gap_deg": _gap(arm),
+        "asymmetry": max(_asymmetry(corner, settings.seed) for corner in corners),
+    }
 
 
 def meeting(n: Numbers) -> Finding:
-    words = f"at Z = L the edges of the sectors are {abs(n['gap_deg']):.2g}° apart"
-    return judged(words, abs(n["gap_deg"]) < 1.0)
+    words = f"at Z = L the edges of the sectors are {abs(n.gap_deg):.2g}° apart"
+    return judged(words, abs(n.gap_deg) < 1.0)
 
 
 def narrowing(n: Numbers) -> Finding:
-    return judged(f"{n['narrowing']:.2f}-fold", round(n["narrowing"], 1) == 6.2)
+    return judged(f"{n.narrowing:.2f}-fold", round(n.narrowing, 1) == 6.2)
 
 
 def symmetry(n: Numbers) -> Finding:
-    words = f"exchanging the helical activations mirrors the tip to within {n['asymmetry']:.1e} L"
-    return judged(words, n["asymmetry"] < 1e-9)
+    words = f"exchanging the helical activations mirrors the tip to within {n.asymmetry:.1e} L"
+    return judged(words, n.asymmetry < 1e-9)
 
 
 def _gap(arm: Manipulator) -> float:
@@ -57,16 +58,14 @@ def _asymmetry(arm: Manipulator, seed: int) -> float:
 
 
 def _draw(arm: Manipulator, notes: Notebook) -> None:
-    helix = [DesignPanel("back", arm, "back", [1])]
     words = "A helical fiber of the tapered arm, and its cross-section at the base and halfway."
+    helix = [DesignPanel("back", arm, "back", [1])]
     figure = plot_designs(helix, stations_over_length=(0.0, 0.5), width=1.8)
     notes.draw("1b", "figure_1b_fiber", words, figure)
-    sides = {0: "back", 1: "back", 2: "front"}
-    singles = [
-        DesignPanel(f"{arm.bundle_names[k]}, {side}", arm, side, [k]) for k, side in sides.items()
-    ]
     words = "The three architectures alone, each above its bundle's place in the cross-section."
+    sides = enumerate(("back", "back", "front"))
+    singles = [DesignPanel(f"{arm.bundle_names[k]}, {side}", arm, side, [k]) for k, side in sides]
     notes.draw("1c", "figure_1c_architectures", words, plot_designs(singles))
-    sides = [DesignPanel("front", arm), DesignPanel("back", arm, "back")]
     words = "The minimal design from the front and the back, above its cross-section at the base."
-    notes.draw("1d", "figure_1d_design", words, plot_designs(sides))
+    both = [DesignPanel("front", arm), DesignPanel("back", arm, "back")]
+    notes.draw("1d", "figure_1d_design", words, plot_designs(both))

@@ -34,10 +34,10 @@ from softreach.rod.kinematics import (
     shape_dataset,
     stations_along,
 )
-from softreach.rod.loaded.phase import SHOT_AT_ONCE
-from softreach.rod.loaded.ring import NEUTRAL, SYMMETRIC
+from softreach.rod.loaded.postures import NEUTRAL, SYMMETRIC
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip

@@ -1,36 +1,111 @@
-"""Postures at the nodes of a grid over the activation box, and the cuts between them.
+"""Branches of equilibria, followed along ways of activations or loads, and over a grid.
 
-The grid is flooded from rest, node after node along its edges, each step a branch that is followed.
-Neighbors that are not on one branch are cut: between them the arm snaps, or leans to either side.
-Cells without a cut tell where to begin within them.
+A step along a way predicts how the nodes of an arm see the world by the slope of the last one, and
+corrects that by Newton's method. It counts where the correction is small, of the frames and of the
+tip, and where the equilibrium is stable; otherwise it is tried at half its length.
+
+The grid over the activation box is flooded from rest, node after node along its edges, each step a
+branch that is followed. Neighbors that are not on one branch are cut: between them the arm snaps,
+or leans to either side. Cells without a cut tell where to begin within them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.kernels.loaded.grid_values import interpolate
+from softreach.kernels.loaded.grid_values import UNEVEN, interpolate
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.loaded.following import follow
-from softreach.rod.loaded.shooting import Shots, turn_between
+from softreach.rod.loaded.shooting import ALL_LOADS, Equilibria, turn_between, units
 from softreach.rod.loaded.solver import Solver
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 
-__all__ = ["Flood", "are_same", "grid_sizes", "smooth_edges"]
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
-
+_CORRECTION, _CORRECTION_OF_NODES = 0.12, 0.03  # [rad], of one segment and of several
+_TIP = 3.0  # weight of the correction of a tip [rad/L]
+_SHORTEST = 2.0**-20  # of a path, below which its branch has ended
+_MOST_STEPS = 3000
 _NODES = {1: 33, 2: 33, 3: 17}
 """Nodes per free bundle: at most a few thousand postures."""
 _SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
-_UNEVEN = 1e3  # roughness of whole cells beside others
+CUT = 1e6
+"""Roughness of cells that are cut."""
 PARTS = 64  # of a line, at which it is asked for cuts
+
+
+class Followed(NamedTuple):
+    """Branches as far as they were followed."""
+
+    last: Equilibria
+    """The last equilibrium; undecided where it is not that of the end of the way."""
+    has_ended: Mask
+    """Mask of branches that end before the way does, shape (n,)."""
+    share: Array
+    """Of the way that was followed, shape (n,)."""
+
+
+def follow(
+    solver: Solver,
+    begin: Array,
+    end: Array,
+    start: Equilibria,
+    slope: Array | None = None,
+    *,
+    hangs: bool = True,
+    shortest: float = _SHORTEST,
+) -> Followed:
+    """Branches of stable equilibria along straight ways between activations, each by itself.
+
+    Args:
+        solver: That of the arm.
+        begin: Activations, shape (n, bundles).
+        end: Others.
+        start: Equilibria at the beginning.
+        slope: Change of the frame along the way, if it is known, shape (n, component).
+        hangs: Whether the loads are on; if not, they are put on along the way.
+        shortest: Step, over the length of the way, below which a branch has ended.
+    """
+    n, last = len(begin), start.of(np.arange(len(begin)))
+    place, step = np.where(hangs & (begin == end).all(axis=1), 1.0, 0.0), np.ones(n)
+    slopes = np.zeros_like(last.frame) if slope is None else slope.copy()
+    moves, is_first, ended = np.zeros((n, 3)), np.ones(n, bool), ~start.is_found
+    for _ in range(_MOST_STEPS):
+        rows = np.flatnonzero(~ended & (place < 1.0))
+        if not len(rows):
+            break
+        to = np.minimum(1.0, place[rows] + step[rows])
+        h = to - place[rows]
+        guess = units(last.frame[rows] + h[:, None] * slopes[rows])
+        gamma = begin[rows] + to[:, None] * (end[rows] - begin[rows])
+        found = solver.careful(gamma, guess, ALL_LOADS if hangs else to)
+        missed = found.tips - last.tips[rows] - h[:, None] * moves[rows]
+        good, growth = _judged(solver, found, guess, missed, is_first[rows])
+        on, h_on, found = rows[good], h[good, None], found.of(good)
+        slopes[on] = (found.frame - last.frame[on]) / h_on
+        moves[on] = (found.tips - last.tips[on]) / h_on
+        last.put(on, found)
+        place[on], is_first[on] = to[good], False
+        step[rows] = h * growth
+        ended[rows] = ~good & (step[rows] < shortest)
+    return Followed(last.only(start.is_found & (place >= 1.0)), ended, place)
+
+
+def _judged(
+    solver: Solver, found: Equilibria, guess: Array, missed: Array, is_first: Mask
+) -> tuple[Mask, Array]:
+    """Mask of steps that count, and what the lengths of the next ones are multiplied by."""
+    allowed = _CORRECTION if solver.tables.segments == 1 else _CORRECTION_OF_NODES
+    with np.errstate(all="ignore"):  # of what is not found
+        off = np.linalg.norm(missed, axis=1) / solver.tables.arm.length
+        turn = turn_between(found.frame, guess)
+        change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
+        wanted = 0.5 * (np.sqrt(1.0 + 4.0 * allowed / change) - 1.0)  # half of what is allowed
+    good = found.is_stable & (change < np.where(is_first, 2.0, 1.0) * allowed)
+    shorter = np.where(wanted > 0.1, 0.4, 0.25)
+    return good, np.where(good, np.clip(wanted, 0.5, 4.0), shorter)
 
 
 def grid_sizes(box: ActivationBox) -> tuple[int, ...] | None:
@@ -47,37 +122,21 @@ class Flood:
 
     box: ActivationBox
     sizes: tuple[int, ...]
-    held: Shots
+    held: Equilibria
     """Postures of the nodes, the last bundle varying fastest; not found where none is held."""
     is_whole: Mask
     """True for cells whose edges are all on one branch, shape of the cells."""
 
-    @classmethod
-    def over(
-        cls, solver: Solver, box: ActivationBox, sizes: tuple[int, ...], rest: Array, start: Shots
-    ) -> Flood:
-        """Flood a grid.
-
-        Args:
-            solver: That of the twin.
-            box: Bounds of the activations.
-            sizes: Nodes for every bundle.
-            rest: Activations at rest, shape (bundles,).
-            start: The posture there.
-        """
-        return _Flooding(solver, box, sizes).run(rest, start)
-
     def at(self, gamma: Array) -> tuple[Array, Array]:
-        """Frames to begin from, and the roughness of cells; infinite where no frame is known."""
-        free, of_nodes, rough = self.box.is_free, self.held.frame, self._rough
+        """Frames to begin from, and the roughness of cells; `CUT` where no frame is known."""
+        free, of_nodes = self.box.is_free, self.held.frame
         sizes, places = np.array(self.sizes)[free], self._in_cells(gamma)[:, free]
         fill = 3 - len(sizes)
         places = np.pad(places, ((0, 0), (fill, 0)))
         sizes = np.pad(sizes, (fill, 0), constant_values=1)
-        frames = np.empty((len(gamma), of_nodes.shape[1]))
-        interpolate(of_nodes, rough.ravel() < _UNEVEN, places, sizes, frames)
-        rough = rough[self.cells_at(gamma)]
-        frames[np.isinf(rough)] = of_nodes[self.held.is_found.argmax()]
+        frames, rough = np.empty((len(gamma), of_nodes.shape[1])), np.empty(len(gamma))
+        interpolate(of_nodes, self._rough.ravel(), places, sizes, frames, rough)
+        frames[rough == CUT] = of_nodes[self.held.is_found.argmax()]
         return frames, rough
 
     @lazy
@@ -90,17 +149,14 @@ class Flood:
                 first = np.clip(np.arange(size - 1) - 1, 0, size - 4)
                 smooth = np.logical_and.reduce([smooth.take(first + k, axis) for k in range(3)])
                 jumps = np.abs(np.diff(frames, 3, axis)).max(axis=-1).take(first, axis)
-                for other, length in enumerate(self.sizes):
-                    if other != axis and length > 1:
-                        jumps = np.maximum(np.delete(jumps, -1, other), np.delete(jumps, 0, other))
-                rough = np.maximum(rough, jumps)
-        return np.where(self.is_whole, np.where(smooth, rough, _UNEVEN), np.inf)
+                rough = np.maximum(rough, over_cells(jumps, np.maximum, axis))
+        return np.where(self.is_whole, np.where(smooth, rough, UNEVEN), CUT)
 
-    def nearest(self, gamma: Array) -> tuple[Array, Shots]:
+    def nearest(self, gamma: Array) -> tuple[Array, Equilibria]:
         """The nearest nodes, and their postures."""
         last = np.array(self.sizes) - 1
         place = np.clip(np.round(self._in_cells(gamma)), 0, last)
-        node = np.ravel_multi_index(tuple(place.astype(np.intp).T), self.sizes)
+        node = np.ravel_multi_index(tuple(place.astype(int).T), self.sizes)
         return self.box.low + place / np.maximum(last, 1) * self.box.widths, self.held.of(
             np.atleast_1d(node)
         )
@@ -108,6 +164,12 @@ class Flood:
     def is_uncut(self, gamma: Array) -> Mask:
         """Mask of activations in cells whose edges are all on one branch."""
         return self.is_whole[self.cells_at(gamma)]
+
+    def differ(self, other: Flood, gamma: Array) -> Mask:
+        """Mask of activations in cells at a corner of which two floods hold different postures."""
+        length = np.ptp(self.held.tips[self.held.is_found], axis=0).max(initial=0.0)
+        differ = ~are_same(self.held, other.held, length).reshape(self.sizes)
+        return over_cells(differ, np.logical_or)[self.cells_at(gamma)]
 
     def clear(self, rest: Array, gamma: Array) -> Array:
         """Shares of the lines from rest up to which they meet no cut, shape (n,)."""
@@ -121,44 +183,39 @@ class Flood:
 
     def cells_at(self, gamma: Array) -> tuple[Index, ...]:
         """Indices of the cells that activations are in."""
-        cells = np.floor(self._in_cells(gamma)).astype(np.intp)
+        cells = np.floor(self._in_cells(gamma)).astype(int)
         return tuple(np.clip(cells, 0, np.maximum(np.array(self.sizes) - 2, 0)).T)
 
 
-class _Flooding:
+class Flooding:
+    """The flooding of a grid.
+
+    Args:
+        solver: That of the twin.
+        box: Bounds of the activations.
+        sizes: Nodes for every bundle.
+    """
+
     def __init__(self, solver: Solver, box: ActivationBox, sizes: tuple[int, ...]) -> None:
         self.solver, self.box, self.sizes = solver, box, sizes
         ends = zip(box.low, box.high, sizes, strict=True)
         axes = np.meshgrid(*(np.linspace(*end) for end in ends), indexing="ij")
         self.gamma = np.stack(axes, axis=-1).reshape(-1, box.bundles)
-        n = len(self.gamma)
-        self.states = solver.empty(n)
-        self.is_known = np.zeros(n, bool)
-        self.numbers = np.arange(n).reshape(sizes)
-        self.linked = np.zeros((len(sizes), n), bool)  # to the next node along each axis
+        self.held = solver.empty(len(self.gamma))
+        self.numbers = np.arange(len(self.gamma)).reshape(sizes)
+        self.linked = np.zeros((len(sizes), len(self.gamma)), bool)  # to the next along each axis
 
-    def run(self, rest: Array, start: Shots) -> Flood:
+    def run(self, rest: Array, start: Equilibria) -> Flood:
+        """The grid, flooded from a posture at rest, whose activations have shape (1, bundles)."""
         self.rest = rest
-        nearest = int((((self.gamma - rest) / self.box.scales) ** 2).sum(axis=1).argmin())
-        found = follow(self.solver, rest[None], self.gamma[[nearest]], start).shots
-        self._keep(np.array([nearest]), found)
-        front = np.flatnonzero(self.is_known)
+        away = (((self.gamma - rest) / self.box.scales) ** 2).sum(axis=1)
+        nearest = np.array([away.argmin()])
+        self.held.put(nearest, follow(self.solver, rest, self.gamma[nearest], start).last)
+        front = nearest[self.held.is_found[nearest]]
         while len(front):
             front = self._wave(front)
         self._link()
-        held = self._shots(np.arange(len(self.gamma)))
-        return Flood(self.box, self.sizes, held, self._whole_cells())
-
-    def _keep(self, nodes: Index, found: Shots) -> None:
-        good = found.is_found
-        at = nodes[good]
-        self.states.tips[at], self.states.frame[at] = found.tips[good], found.frame[good]
-        self.states.margin[at] = found.margin[good]
-        self.is_known[at] = True
-
-    def _shots(self, nodes: Index) -> Shots:
-        tips, _, margin, frame = self.states.of(nodes)
-        return Shots(tips, frame, margin, self.is_known[nodes])
+        return Flood(self.box, self.sizes, self.held, self._whole_cells())
 
     def _neighbors(self, nodes: Index, axis: int, way: int) -> tuple[Index, Mask]:
         """Nodes next to some along an axis, and mask of those that are in the grid."""
@@ -176,79 +233,77 @@ class _Flooding:
                 to, inside = self._neighbors(front, axis, way)
                 edge = front, to, np.full_like(to, axis), np.full_like(to, way)
                 edges.append(np.stack(edge)[:, inside])
-        left, before = np.concatenate(edges, axis=1), self.is_known.copy()
+        left, before = np.concatenate(edges, axis=1), self.held.is_found
         at, line = ((self.gamma[nodes] - self.rest) / self.box.scales for nodes in left[:2])
         share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
         off = at - np.clip(share, 0.0, 1.0)[:, None] * line  # near the lines from rest first
         left = left[:, np.argsort(np.sqrt((off * off).sum(axis=1)), kind="stable")]
         while True:
-            left = left[:, ~self.is_known[left[1]]]
+            left = left[:, ~self.held.is_found[left[1]]]
             _, first = np.unique(left[1], return_index=True)
             if not len(first):
                 break
             self._grow(*left[:, first])
             left = np.delete(left, first, axis=1)
-        return np.flatnonzero(self.is_known & ~before)
+        return np.flatnonzero(self.held.is_found & ~before)
 
     def _grow(self, origin: Index, to: Index, axis: Index, way: Index) -> None:
-        slopes = np.zeros_like(self.states.frame[origin])
+        known, frame = self.held.is_found, self.held.frame
+        slopes = np.zeros_like(frame[origin])
         for k in range(len(self.sizes)):
             for sense in (-1, 1):
                 rows = np.flatnonzero((axis == k) & (way == sense))
                 back, inside = self._neighbors(origin[rows], k, -sense)
-                known = inside & self.is_known[back]
-                ahead = self.states.frame[origin[rows]] - self.states.frame[back]
-                slopes[rows] = np.where(known[:, None], ahead, 0.0)
+                ahead = frame[origin[rows]] - frame[back]
+                slopes[rows] = np.where((inside & known[back])[:, None], ahead, 0.0)
         ends = self.gamma[origin], self.gamma[to]
-        found = follow(self.solver, *ends, self._shots(origin), slopes).shots
-        self._keep(to, found)
+        found = follow(self.solver, *ends, self.held.of(origin), slopes).last
         good = found.is_found
+        self.held.put(to[good], found.of(good))
         lower = np.where(way > 0, origin, to)
         self.linked[axis[good], lower[good]] = True
 
     def _link(self) -> None:
         """Tell edges on one branch from cuts: smooth ones at once, the others by following them."""
-        frames = self.states.frame.reshape(*self.sizes, -1)
-        tips = self.states.tips.reshape(*self.sizes, 3) / self.solver.tables.arm.length
-        known = self.is_known.reshape(self.sizes)
+        length = self.solver.tables.arm.length
+        frames, tips = self.held.frame.reshape(*self.sizes, -1), self.held.tips / length
         for axis, size in enumerate(self.sizes):
             if size < 2:
                 continue
-            low = np.delete(self.numbers, -1, axis).ravel()
-            both = (np.delete(known, -1, axis) & np.delete(known, 0, axis)).ravel()
-            smooth = smooth_edges(frames, tips, axis).ravel()
-            low, smooth = low[both], smooth[both]
-            self.linked[axis, low[smooth]] = True
-            doubtful = low[~self.linked[axis, low]]
-            high, _ = self._neighbors(doubtful, axis, 1)
-            ends = self.gamma[doubtful], self.gamma[high]
-            found = follow(self.solver, *ends, self._shots(doubtful)).shots
-            same = are_same(found, self._shots(high), self.solver.tables.arm.length)
-            self.linked[axis, doubtful[same]] = True
+            low, high = (np.delete(self.numbers, end, axis).ravel() for end in (-1, 0))
+            both = self.held.is_found[low] & self.held.is_found[high]
+            smooth = smooth_edges(frames, tips.reshape(*self.sizes, 3), axis).ravel()
+            self.linked[axis, low[both & smooth]] = True
+            both &= ~self.linked[axis, low]
+            low, high = low[both], high[both]
+            found = follow(self.solver, self.gamma[low], self.gamma[high], self.held.of(low)).last
+            self.linked[axis, low[are_same(found, self.held.of(high), length)]] = True
 
     def _whole_cells(self) -> Mask:
-        whole = self.is_known.reshape(self.sizes)
+        """Mask of cells all of whose corners are known, and whose edges are all linked."""
+        whole = over_cells(self.held.is_found.reshape(self.sizes), np.logical_and)
         for axis, size in enumerate(self.sizes):
             if size > 1:
-                whole = np.delete(whole, -1, axis) & np.delete(whole, 0, axis)
-        for axis, size in enumerate(self.sizes):
-            if size < 2:
-                continue
-            edges = np.delete(self.linked[axis].reshape(self.sizes), -1, axis)
-            for other, length in enumerate(self.sizes):
-                if other != axis and length > 1:
-                    edges = np.delete(edges, -1, other) & np.delete(edges, 0, other)
-            whole &= edges
+                edges = np.delete(self.linked[axis].reshape(self.sizes), -1, axis)
+                whole &= over_cells(edges, np.logical_and, axis)
         return whole
 
 
-def are_same(shots: Shots, others: Shots, length: float, within: float = _SAME) -> Mask:
+def over_cells(values: Any, combine: np.ufunc, along: int | None = None) -> Any:
+    """Values at the corners of cells, or on their edges along one axis, combined over each cell."""
+    for axis in range(values.ndim):
+        if axis != along and values.shape[axis] > 1:
+            values = combine(np.delete(values, -1, axis), np.delete(values, 0, axis))
+    return values
+
+
+def are_same(some: Equilibria, others: Equilibria, length: float, within: float = _SAME) -> Mask:
     """Mask of those that are the same posture of an arm of a length [m], to so much [rad, L]."""
     with np.errstate(invalid="ignore"):  # of what is not found
-        moved = np.linalg.norm(shots.tips - others.tips, axis=1)
-        apart = turn_between(shots.frame, others.frame)
+        moved = np.linalg.norm(some.tips - others.tips, axis=1)
+        apart = turn_between(some.frame, others.frame)
     near = (apart < within) & (moved < within * length)
-    return np.asarray(near & shots.is_found & others.is_found)
+    return np.asarray(near & some.is_found & others.is_found)
 
 
 def smooth_edges(frames: Array, tips: Array, axis: int) -> Mask:

@@ -11,23 +11,15 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.lanes import LANES
-from softreach.rod.loaded.flood import Flood, are_same, smooth_edges
-from softreach.rod.loaded.following import follow
-from softreach.rod.loaded.postures import FloodedPostures, Postures, polished
-from softreach.rod.loaded.shooting import Equilibria, Shots
+from softreach.rod.loaded.flood import are_same, follow, smooth_edges
+from softreach.rod.loaded.postures import Postures, polished
+from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.tip_map import BLOCK, Held, TipStatus
+from softreach.rod.tip_map import Held
 from softreach.support import parallel
-from softreach.support.arrays import joined
-
-__all__ = ["held_over"]
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
+from softreach.support.arrays import Array, Index, Mask, joined
 
 _MOST = 4  # postures of one node
 _END = 2.0**-10  # of an edge, to which the end of a branch is found
@@ -38,7 +30,7 @@ _EVERY = 4  # nodes along each axis to one that lines lead to, where there is no
 _UNKNOWN, _NONE = -2, -1
 
 
-Points = Callable[[Array, Shots], Array]
+Points = Callable[[Array, Equilibria], Array]
 """(activations, postures) -> the places of the point that stands for the tip [m], shape (n, 3)."""
 
 
@@ -49,22 +41,10 @@ def held_over(
     grid = _Grid(postures.solver, gamma, sizes)
     grid.fill(postures, grid.has_arm)
     is_doubled = grid.states[:, 1] >= 0
-    beside = grid.has_arm
-    if isinstance(postures, FloodedPostures) and isinstance(mirrored, FloodedPostures):
-        beside = beside & _differ(postures.flood, mirrored.flood, gamma)
+    beside = grid.has_arm & postures.differ(mirrored, gamma)
     if beside.any():
         grid.fill(mirrored, beside)
     return grid.held(is_doubled, points)
-
-
-def _differ(flood: Flood, other: Flood, gamma: Array) -> Mask:
-    """Mask of activations in cells at a corner of which two floods hold different postures."""
-    length = np.ptp(flood.held.tips[flood.held.is_found], axis=0).max(initial=0.0)
-    differ = ~are_same(flood.held, other.held, length).reshape(flood.sizes)
-    for axis, size in enumerate(flood.sizes):
-        if size > 1:
-            differ = np.delete(differ, -1, axis) | np.delete(differ, 0, axis)
-    return differ[flood.cells_at(gamma)]
 
 
 class _Grid:
@@ -76,29 +56,28 @@ class _Grid:
         self.has_arm: Mask = np.asarray(np.isfinite(gamma).all(axis=1))
         self.states = np.full((len(gamma), _MOST), _NONE)
         """Numbers of the postures of each node."""
-        self.node = np.empty(0, np.intp)
-        self.shots = _shots(solver.empty(0))
-        self.next = np.empty((0, 2 * len(sizes)), np.intp)
+        self.node = np.empty(0, int)
+        self.found = solver.empty(0)
+        self.next = np.empty((0, 2 * len(sizes)), int)
         """Postures on the same branch at the next node down and up each axis."""
         self.links = list[Index]()
         self.ends = list[Index]()
         self.end_gamma = list[Array]()
-        self.end_shots = list[Shots]()
+        self.end_postures = list[Equilibria]()
 
     def fill(self, postures: Postures, where: Mask) -> None:
         """Find the postures that are connected with those at some nodes, on the twin of a side."""
-        first, uncut = len(self.node), where.copy()
-        if isinstance(postures, FloodedPostures):
-            uncut[where] = postures.flood.is_uncut(self.gamma[where])
-        else:
+        first, uncut = len(self.node), self.has_arm.copy()
+        uncut[uncut] = postures.is_uncut(self.gamma[uncut])
+        by_lines = not uncut.any()
+        if by_lines:
             place = np.unravel_index(np.arange(len(where)), self.sizes)
-            uncut &= (np.stack(place) % _EVERY == 0).all(axis=0)
-        nodes = np.flatnonzero(uncut)
-        known = _found(postures, self.gamma[nodes])
-        good = known.status == TipStatus.STABLE
-        nodes, known = nodes[good], known.of(good)
+            uncut = (np.stack(place) % _EVERY == 0).all(axis=0)
+        nodes = np.flatnonzero(where & uncut)
+        known = postures.find_all(self.gamma[nodes], by_lines=by_lines)
+        good = known.is_stable
         at = np.full(len(self.gamma), _NONE)
-        at[nodes] = self._put(nodes, _shots(known))
+        at[nodes[good]] = self._put(nodes[good], known.of(good))
         if not len(self.node):
             return
         self._link_smooth(at, postures)
@@ -108,43 +87,42 @@ class _Grid:
 
     def held(self, is_doubled: Mask, points: Points) -> Held:
         """What was found."""
-        pairs, ends = (
-            np.concatenate([np.empty((0, 2), np.intp), *p]) for p in (self.links, self.ends)
-        )
+        none = np.empty((0, 2), int)
+        links, ends = (np.concatenate([none, *pairs]) for pairs in (self.links, self.ends))
         end_gamma = np.concatenate([self.gamma[:0], *self.end_gamma])
-        end_shots = joined([self.shots.of(np.arange(0)), *self.end_shots])
-        tips, end_tips = points(self.gamma[self.node], self.shots), points(end_gamma, end_shots)
-        return Held(self.node, tips, pairs, ends, end_tips, is_doubled, self.shots.frame)
+        end_postures = joined([self.found.of(slice(0)), *self.end_postures])
+        tips, end_tips = points(self.gamma[self.node], self.found), points(end_gamma, end_postures)
+        return Held(self.node, tips, links, ends, end_tips, is_doubled, self.found.frame)
 
-    def _put(self, nodes: Index, shots: Shots) -> Index:
+    def _put(self, nodes: Index, found: Equilibria) -> Index:
         """Numbers of postures at nodes, known ones or new; none where a node has too many."""
         numbers, left = np.full(len(nodes), _NONE), np.arange(len(nodes))
         while len(left):
             _, first = np.unique(nodes[left], return_index=True)
             now = left[first]
-            numbers[now] = self._put_one_each(nodes[now], shots.of(now))
+            numbers[now] = self._put_one_each(nodes[now], found.of(now))
             left = np.delete(left, first)
         return numbers
 
-    def _put_one_each(self, nodes: Index, shots: Shots) -> Index:
+    def _put_one_each(self, nodes: Index, found: Equilibria) -> Index:
         numbers, open_ = np.full(len(nodes), _NONE), np.arange(len(nodes))
         for place in range(_MOST):
             at = self.states[nodes[open_], place]
             same = at >= 0
-            old = self.shots.of(at[same])
-            same[same] = are_same(shots.of(open_[same]), old, self.length, _SAME)
+            old = self.found.of(at[same])
+            same[same] = are_same(found.of(open_[same]), old, self.length, _SAME)
             numbers[open_[same]] = at[same]
             new = open_[at < 0]
             numbers[new] = self.states[nodes[new], place] = len(self.node) + np.arange(len(new))
-            self._append(nodes[new], shots.of(new))
+            self._append(nodes[new], found.of(new))
             open_ = open_[(at >= 0) & ~same]
         return numbers
 
-    def _append(self, nodes: Index, shots: Shots) -> None:
+    def _append(self, nodes: Index, found: Equilibria) -> None:
         if not len(nodes):
             return
         self.node = np.concatenate([self.node, nodes])
-        self.shots = joined([self.shots, shots])
+        self.found = joined([self.found, found])
         unknown = np.full((len(nodes), self.next.shape[1]), _UNKNOWN)
         self.next = np.concatenate([self.next, unknown])
 
@@ -156,15 +134,15 @@ class _Grid:
     def _link_smooth(self, at: Index, postures: Postures) -> None:
         """Link neighbors on an edge in an uncut cell, or that goes on as that beside it does."""
         lost = np.where(at >= 0, 0.0, np.nan)[:, None]
-        frames = (self.shots.frame[at] + lost).reshape(*self.sizes, -1)
-        tips = (self.shots.tips[at] / self.length + lost).reshape(*self.sizes, 3)
+        frames = (self.found.frame[at] + lost).reshape(*self.sizes, -1)
+        tips = (self.found.tips[at] / self.length + lost).reshape(*self.sizes, 3)
         numbers = np.arange(len(at)).reshape(self.sizes)
         for axis in range(len(self.sizes)):
             low, high = (np.delete(numbers, end, axis).ravel() for end in (-1, 0))
             smooth = smooth_edges(frames, tips, axis).ravel()
-            if isinstance(postures, FloodedPostures):
-                smooth |= postures.flood.is_uncut(0.5 * (self.gamma[low] + self.gamma[high]))
-            smooth &= (at[low] >= 0) & (at[high] >= 0)
+            both = (at[low] >= 0) & (at[high] >= 0)
+            low, high, smooth = low[both], high[both], smooth[both]
+            smooth |= postures.is_uncut(0.5 * (self.gamma[low] + self.gamma[high]))
             self._link(at[low[smooth]], at[high[smooth]], 2 * axis + 1)
 
     def _wave(self, twin: Solver, front: Index) -> Index:
@@ -184,12 +162,11 @@ class _Grid:
     def _grow(self, twin: Solver, state: Index, to: Index, column: Index) -> None:
         exists = self.has_arm[to]
         state, to, column = state[exists], to[exists], column[exists]
-        found, share = self._followed(twin, state, to, column)
-        good = found.is_found.copy()
-        numbers = self._put(to[good], found.of(good))
-        before = self.shots.of(state)
-        leaps = np.linalg.norm(found.tips - before.tips, axis=1) > _LEAP * self.length
-        found.put(np.flatnonzero(leaps), before.of(leaps))
+        ends, share = self._followed(twin, state, to, column)
+        good, before = ends.is_found.copy(), self.found.of(state)
+        numbers = self._put(to[good], ends.of(good))
+        leaps = np.linalg.norm(ends.tips - before.tips, axis=1) > _LEAP * self.length
+        ends.put(np.flatnonzero(leaps), before.of(leaps))
         share[leaps] = 0.0
         kept = (numbers >= 0) & ~leaps[good]
         self._link(state[good][kept], numbers[kept], column[good][kept])
@@ -199,50 +176,31 @@ class _Grid:
         self.ends.append(np.stack([state[~good], to[~good]], axis=1))
         begin, end = self.gamma[self.node[state[~good]]], self.gamma[to[~good]]
         self.end_gamma.append(begin + share[~good, None] * (end - begin))
-        self.end_shots.append(found.of(~good))
+        self.end_postures.append(ends.of(~good))
 
     def _followed(
         self, twin: Solver, state: Index, to: Index, column: Index
-    ) -> tuple[Shots, Array]:
+    ) -> tuple[Equilibria, Array]:
         """Postures of the arm at the ends of branches of the twin, or where these end.
 
         And the shares of the edges up to there.
         """
-        start = self.shots.of(state)
+        start = self.found.of(state)
         back = self.next[state, column ^ 1]
-        before = self.shots.frame[np.maximum(back, 0)]
+        before = self.found.frame[np.maximum(back, 0)]
         slopes = np.where((back >= 0)[:, None], start.frame - before, 0.0)
-        out, share = start.of(np.arange(len(state))), np.ones(len(state))
+        ends, share = start.of(np.arange(len(state))), np.ones(len(state))
 
         def run(rows: slice) -> None:
-            some = np.arange(len(state))[rows]
-            begin, end = self.gamma[self.node[state[some]]], self.gamma[to[some]]
-            branch = follow(twin, begin, end, start.of(some), slopes[some], shortest=_END)
-            shots, share[some] = branch.shots, branch.share
-            arrived = np.flatnonzero(shots.is_found)
-            of_arm = polished(self.solver, end[arrived], shots.of(arrived), _POLISHED)
-            shots.put(arrived[of_arm.is_found], of_arm.of(of_arm.is_found))
-            out.put(some, shots)
+            begin, end = self.gamma[self.node[state[rows]]], self.gamma[to[rows]]
+            last, _, share[rows] = follow(
+                twin, begin, end, start.of(rows), slopes[rows], shortest=_END
+            )
+            arrived = np.flatnonzero(last.is_found)
+            of_arm = polished(self.solver, end[arrived], last.of(arrived), _POLISHED)
+            last.put(arrived[of_arm.is_found], of_arm.of(of_arm.is_found))
+            ends.put(rows, last)
 
         size = max(8 * LANES, len(state) // 4)
         parallel.run(partial(run, b) for b in parallel.blocks(len(state), size))
-        return out, share
-
-
-def _found(postures: Postures, gamma: Array) -> Equilibria:
-    """Postures of activations in uncut cells; by lines where there is no flood."""
-    known = postures.solver.empty(len(gamma))
-    parallel.run(partial(postures.direct, gamma, b, known) for b in _blocks(gamma, BLOCK // 8))
-    if not isinstance(postures, FloodedPostures):
-        rows = np.flatnonzero(known.status != TipStatus.STABLE)
-        blocks = _blocks(rows, 32 * LANES)
-        parallel.run(partial(postures.by_line, gamma, rows[b], known) for b in blocks)
-    return known
-
-
-def _blocks(values: Array | Index, size: int) -> list[slice]:
-    return parallel.blocks(len(values), size)
-
-
-def _shots(known: Equilibria) -> Shots:
-    return Shots(known.tips, known.frame, known.margin, known.status == TipStatus.STABLE)
+        return ends, share

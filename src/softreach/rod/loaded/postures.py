@@ -5,40 +5,49 @@ under all loads, when all activations are raised together to γ. Arms with a pla
 their stability in it at pitchforks, and lean to either side from there on. So branches are followed
 on a twin of the arm with a tiny intrinsic twist, which decides between the sides, and every posture
 is then polished on the arm itself.
+
+A tall column has no stable posture at rest but a ring of leaning ones, all around the direction of
+its loads. Activations, however small, lean it to one side of the ring.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, ClassVar
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
+from softreach.kernels.lanes import LANES
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded.flood import PARTS, Flood, grid_sizes
-from softreach.rod.loaded.following import Followed, follow
-from softreach.rod.loaded.ring import Ring
-from softreach.rod.loaded.shooting import Equilibria, Shots, turn_between
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.loaded.flood import CUT, PARTS, Flood, Flooding, Followed, follow, grid_sizes
+from softreach.rod.loaded.shooting import Equilibria, turn_between
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import SHOT_AT_ONCE
+from softreach.rod.tip_map import BLOCK, TipStatus
+from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 
-if TYPE_CHECKING:
-    from softreach.rod.loaded.solver import Solver
-
-__all__ = ["Postures"]
-
-Array = NDArray[np.float64]
-
+NEUTRAL = 1e-5
+"""What tolerances leave of the margin of a ring, which is 0."""
+SYMMETRIC = 1e-6
+"""Of the directions that the base of an axisymmetric arm would have to see [rad]."""
+_AT_ONCE, _BY_LINE = BLOCK // 8, 32 * LANES  # samples per task
 _TWIST = 1e-4  # [rad], of the twin over its length
 _OF_TWIN = 1e-3  # [L], its tolerance, as postures are polished on the arm
 _DOUBTFUL = 0.02  # margin below which what is found from the unloaded arm may not be its posture
+_BESIDE = 0.03  # [rad], by which the arm differs from its twin but near a pitchfork
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
 _PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
 _HANGING = 4.0  # [rad] of phase, from which on the unloaded arm tells nothing of one that hangs
+_TURNS = np.pi / 16 * np.array([0, *(sign * k for k in range(1, 17) for sign in (1, -1))])
+"""Azimuths beside the one to which the unloaded arm bends, at which the arm is looked for."""
+_STRAIGHT = 1e-8  # [L], aside, of an arm that no activation leans to any side
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,14 +85,14 @@ class Postures:
         return np.clip(0.0, self.box.low, self.box.high)[None]
 
     @lazy
-    def rest(self) -> Shots:
+    def rest(self) -> Equilibria:
         """The twin at rest, as it was hung; not found where nothing holds it there."""
-        return self._hung(self.rest_activation).shots
+        return self._hung(self.rest_activation).last
 
     @property
     def is_held_at_rest(self) -> bool:
         """True if the arm has a stable posture at rest."""
-        return bool(self.rest.is_found[0])
+        return bool(self.rest.is_stable[0])
 
     def _hung(self, gamma: Array) -> Followed:
         """Loads put on the twin at fixed activations."""
@@ -98,9 +107,22 @@ class Postures:
         """Postures at activations (n, bundles), on the calling thread."""
         equilibria = self.solver.empty(len(gamma))
         self.direct(gamma, slice(None), equilibria)
-        rows = np.flatnonzero(equilibria.status != TipStatus.STABLE)
+        rows = np.flatnonzero(~equilibria.is_stable)
         if len(rows):
             self.by_line(gamma, rows, equilibria)
+        return equilibria
+
+    def find_all(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
+        """The same on all threads, on request by lines where they are not found at once.
+
+        What is to be searched again is gathered, so that kernels get whole blocks.
+        """
+        equilibria = self.solver.empty(len(gamma))
+        blocks = parallel.blocks(len(gamma), _AT_ONCE)
+        parallel.run(partial(self.direct, gamma, b, equilibria) for b in blocks)
+        rows = np.flatnonzero(~equilibria.is_stable & by_lines)
+        blocks = parallel.blocks(len(rows), _BY_LINE)
+        parallel.run(partial(self.by_line, gamma, rows[b], equilibria) for b in blocks)
         return equilibria
 
     def direct(self, gamma: Array, rows: slice, equilibria: Equilibria) -> None:
@@ -110,13 +132,13 @@ class Postures:
         at = np.arange(len(gamma))[rows]
         order, guesses = self._guesses(gamma[at])
         at = at[order]
-        shots = self.solver.quick(gamma[at], guesses)
-        good = shots.is_found & (shots.margin > self._least)
+        found = self.solver.quick(gamma[at], guesses)
+        good = found.margin > self._least
         if guesses is not None:
-            good &= turn_between(shots.frame, guesses) < self._nearness
-        self.solver.put(gamma, at, shots._replace(is_found=good), equilibria)
+            good &= turn_between(found.frame, guesses) < self._nearness
+        self.solver.put(gamma, at, found.only(good), equilibria)
 
-    def _guesses(self, gamma: Array) -> tuple[NDArray[np.intp], Array | None]:
+    def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
         """Rows, and frames of the unloaded arm there, or of one that hangs along it."""
         tables, every = self.solver.tables, np.arange(len(gamma))
         if tables.phase.entire <= _HANGING or tables.axes[0, 2] < _PULLED:
@@ -136,45 +158,39 @@ class Postures:
     def _unloaded(self) -> FreeRod:
         return FreeRod(self.solver.tables.arm, 1e-4)
 
-    def by_line(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
+    def by_line(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """Postures at some rows along the straight lines from rest."""
         followed = self.followed(gamma[rows])
-        self._polish(gamma, rows, followed, equilibria)
-        snaps = followed.has_ended & (followed.shots.margin < _LOST)
+        found = polished(self.solver, gamma[rows], followed.last, _POLISHED)
+        self.solver.put(gamma, rows, found, equilibria)
+        snaps = followed.has_ended & (followed.last.margin < _LOST)
         gone = equilibria.status[rows] == TipStatus.UNDECIDED
         equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
         if not self.is_held_at_rest and gone.any():
             self._unstable(gamma, rows[gone], equilibria)
 
-    def _polish(
-        self, gamma: Array, rows: NDArray[np.intp], followed: Followed, equilibria: Equilibria
-    ) -> None:
-        """Put down the postures of the arm beside those of its twin."""
-        shots = polished(self.solver, gamma[rows], followed.shots, _POLISHED)
-        self.solver.put(gamma, rows, shots, equilibria)
-
-    def _unstable(self, gamma: Array, rows: NDArray[np.intp], equilibria: Equilibria) -> None:
+    def _unstable(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
-        shots = self.solver.careful(gamma[rows], None)
+        found = self.solver.careful(gamma[rows], None)
         at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
-        good = shots.is_found & ((shots.margin <= 0.0) | at_rest)  # no stable ones of others
-        self.solver.put(gamma, rows, shots._replace(is_found=good), equilibria)
+        found = found.only(~found.is_stable | at_rest)  # no stable ones of others
+        self.solver.put(gamma, rows, found, equilibria)
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
         if self.is_held_at_rest:
             begin = np.repeat(self.rest_activation, len(gamma), axis=0)
-            start = self.rest.of(np.zeros(len(gamma), np.intp))
+            start = self.rest.of(np.zeros(len(gamma), int))
         else:
             begin, start = self._leaning(gamma)
         return follow(self.twin, begin, gamma, start)
 
-    def _leaning(self, gamma: Array) -> tuple[Array, Shots]:
+    def _leaning(self, gamma: Array) -> tuple[Array, Equilibria]:
         """Places on lines where the twin leans that nothing holds at rest, and how it does."""
         rest, ring = self.rest_activation, self._ring
         begin = rest + _FIRST_PARTS[0] * (gamma - rest)
         if ring is None:
-            return begin, self._hung(begin).shots
+            return begin, self._hung(begin).last
         start = ring.near(self.twin, begin)
         for part in _FIRST_PARTS[1:]:
             left = np.flatnonzero(~start.is_found)
@@ -188,6 +204,14 @@ class Postures:
             self.solver, self.box, self.side, origin=self, at=gamma, frame=frame
         )
 
+    def is_uncut(self, gamma: Array) -> Mask:
+        """Mask of activations in cells of the flooded grid that are on one branch."""
+        return np.zeros(len(gamma), bool)
+
+    def differ(self, mirrored: Postures, gamma: Array) -> Mask:
+        """Mask of activations beside which the other side may hold another posture."""
+        return np.ones(len(gamma), bool)
+
     @lazy
     def mirrored(self) -> Postures:
         """Those of the twin with the other twist."""
@@ -198,15 +222,18 @@ class Postures:
         sizes = grid_sizes(self.box)
         if sizes is None or not self.is_held_at_rest:
             return self
-        flood = Flood.over(self.twin, self.box, sizes, self.rest_activation[0], self.rest)
+        grid = Flooding(self.twin, self.box, sizes)
+        flood = grid.run(self.rest_activation, self.rest)
+        on_arm = polished(self.solver, grid.gamma, flood.held, _BESIDE)
+        flood.held.put(np.flatnonzero(on_arm.is_found), on_arm.of(on_arm.is_found))
         return FloodedPostures(self.solver, self.box, self.side, flood=flood)
 
 
-def polished(solver: Solver, gamma: Array, on_twin: Shots, within: float) -> Shots:
+def polished(solver: Solver, gamma: Array, on_twin: Equilibria, within: float) -> Equilibria:
     """Stable equilibria of an arm beside those of its twin; found where they are so near [rad]."""
-    shots = solver.careful(gamma, on_twin.frame)
-    good = on_twin.is_found & shots.is_found & (shots.margin > 0.0)
-    return shots._replace(is_found=good & (turn_between(shots.frame, on_twin.frame) < within))
+    found = solver.careful(gamma, on_twin.frame)
+    near = turn_between(found.frame, on_twin.frame) < within
+    return found.only(on_twin.is_found & found.is_stable & near)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +244,18 @@ class FloodedPostures(Postures):
     _nearness: ClassVar[float] = 0.15
     _least: ClassVar[float] = 0.0
 
-    def _guesses(self, gamma: Array) -> tuple[NDArray[np.intp], Array | None]:
+    def is_uncut(self, gamma: Array) -> Mask:
+        return self.flood.is_uncut(gamma)
+
+    def differ(self, mirrored: Postures, gamma: Array) -> Mask:
+        if not isinstance(mirrored, FloodedPostures):
+            return super().differ(mirrored, gamma)
+        return self.flood.differ(mirrored.flood, gamma)
+
+    def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
         """Those of uncut cells, rough ones last: lanes wait for the slowest among them."""
         frames, rough = self.flood.at(gamma)
-        order = np.argsort(rough, kind="stable")[: np.isfinite(rough).sum()]
+        order = np.argsort(rough, kind="stable")[: (rough < CUT).sum()]
         return order, frames[order]
 
     def followed(self, gamma: Array) -> Followed:
@@ -233,14 +268,14 @@ class FloodedPostures(Postures):
             begin[cut], of_cut, slopes[cut] = self._before_cuts(gamma[cut])
             start.put(cut, of_cut)
         followed = follow(self.twin, begin, gamma, start, slopes)
-        lost = np.flatnonzero(uncut & ~followed.shots.is_found)
+        lost = np.flatnonzero(uncut & ~followed.last.is_found)
         if len(lost):
             by_line = super().followed(gamma[lost])
             followed.has_ended[lost] = by_line.has_ended
-            followed.shots.put(lost, by_line.shots)
+            followed.last.put(lost, by_line.last)
         return followed
 
-    def _before_cuts(self, gamma: Array) -> tuple[Array, Shots, Array]:
+    def _before_cuts(self, gamma: Array) -> tuple[Array, Equilibria, Array]:
         """Where lines meet their first cut, else rest; postures there, and changes of frames."""
         rest, clear = self.rest_activation, self.flood.clear(self.rest_activation, gamma)[:, None]
         way = gamma - rest
@@ -249,9 +284,9 @@ class FloodedPostures(Postures):
         before = self.flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
         slopes = (1.0 - clear) * PARTS * (guesses - before)
         start = self.twin.careful(begin, guesses)
-        lost = ~start.is_found | (start.margin <= 0.0)
-        lost = np.flatnonzero(lost | (turn_between(start.frame, guesses) > self._nearness))
-        start.put(lost, self.rest.of(np.zeros(len(lost), np.intp)))
+        near = turn_between(start.frame, guesses) <= self._nearness
+        lost = np.flatnonzero(~(start.is_stable & near))
+        start.put(lost, self.rest.of(np.zeros(len(lost), int)))
         begin[lost], slopes[lost] = rest, 0.0
         return begin, start, slopes
 
@@ -286,13 +321,13 @@ class ContinuedPostures(Postures):
         return follow(twin, self.at[near], gamma, rest.of(near))
 
     @lazy
-    def _begun(self) -> tuple[Solver, Shots, NDArray[np.bool_]]:
+    def _begun(self) -> tuple[Solver, Equilibria, Mask]:
         """The twin that has most of these postures, on it, and which; of two that of the side."""
         sides = []
         for postures in (self.origin, self.origin.mirrored):
             rest = postures.twin.careful(self.at, self.frame)
             near = turn_between(rest.frame, self.frame) < _POLISHED
-            sides.append((postures.twin, rest, rest.is_found & (rest.margin > 0.0) & near))
+            sides.append((postures.twin, rest, rest.is_stable & near))
             if sides[-1][2].all():
                 break
         return max(sides, key=lambda side: side[2].sum())
@@ -302,9 +337,74 @@ class ContinuedPostures(Postures):
         return self._begun[0]
 
     @lazy
-    def rest(self) -> Shots:
+    def rest(self) -> Equilibria:
         return self._begun[1]
 
     @property
     def is_held_at_rest(self) -> bool:
         return True
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """The ring of one arm under loads along one direction."""
+
+    frame: Array
+    """As in `Equilibria`, of one arm of the ring, shape (component,)."""
+    azimuth: float
+    """To which this one leans, about the first axis of the world [rad]."""
+
+    @classmethod
+    def at_rest(cls, solver: Solver, rest: Array) -> Ring | None:
+        """The ring of an arm at rest (1, bundles).
+
+        None where there is none, loads have several directions, or are too heavy for a search.
+        """
+        tables, axis = solver.tables, solver.tables.axes[0]
+        if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
+            return None
+
+        image = solver.base_map(rest)
+        if not is_axisymmetric(image, axis, SYMMETRIC):
+            return None
+        rings = pole_rings(image, axis, axis)
+        points = rings.points[rings.signs > 0]
+        whole = replace(solver, tables=tables.in_one_segment)
+        many, tip = np.repeat(rest, len(points), axis=0), np.array([tables.arm.length])
+        shapes, margin = whole.shapes_facing(many, points, tip)
+        if not (margin > -NEUTRAL).any():
+            return None
+        first = int((margin > -NEUTRAL).argmax())
+        frame = solver.frames_facing(rest, points[[first]])[0]
+        return cls(frame, float(_azimuth(shapes.frames.position[:, 0], tables.axes)[first]))
+
+    def near(self, twin: Solver, gamma: Array) -> Equilibria:
+        """Stable equilibria of the twin near the ring, under small activations (n, bundles).
+
+        They lean to about where the activations bend the unloaded arm; without a bend none is
+        found.
+        """
+        leaning, tables = twin.careful(gamma, None).only(np.zeros(len(gamma), bool)), twin.tables
+        bent = FreeRod(tables.arm, 1e-6).tips(gamma)
+        bends = np.linalg.norm(bent @ tables.axes[1:].T, axis=1) > _STRAIGHT * tables.arm.length
+        there = _azimuth(bent, tables.axes) - self.azimuth
+        for turn in _TURNS:
+            left = np.flatnonzero(bends & ~leaning.is_found)
+            found = twin.careful(gamma[left], self._turned(there[left] + turn, tables.axes))
+            leaning.put(left[found.is_stable], found.of(found.is_stable))
+        return leaning
+
+    def _turned(self, angles: Array, axes: Array) -> Array:
+        """Frames of other arms of the ring, shape (n, component)."""
+        turns = np.zeros((len(angles), 3, 3))
+        turns[:, 0, 0] = 1.0
+        turns[:, 1, 1] = turns[:, 2, 2] = np.cos(angles)
+        turns[:, 2, 1] = np.sin(angles)
+        turns[:, 1, 2] = -turns[:, 2, 1]
+        turned = self.frame.reshape(-1, 3) @ axes.T @ turns.transpose(0, 2, 1) @ axes
+        return turned.reshape(len(angles), self.frame.size)
+
+
+def _azimuth(places: Array, axes: Array) -> Array:
+    """About the first axis [rad]."""
+    return np.arctan2(places @ axes[2], places @ axes[1])

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.loaded.postures import Postures
@@ -18,11 +17,10 @@ from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus, position_slopes
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 
 __all__ = ["PushingTip", "TipResponse"]
-
-Array = NDArray[np.float64]
 
 _MOST_STEPS = 256
 _SHORTEST = 2.0**-12  # part of a force by which it is raised
@@ -89,9 +87,9 @@ class PushingTip:
             known = solver.near(sample, near.equilibrium)
         response = solver.respond(sample, known, compliance=True)
         slopes = np.empty_like(response.twists[:, :3])
-        position_slopes(response.tips, response.twists, slopes)
+        position_slopes(known.tips, response.twists, slopes)
         retreat = response.compliance[0] @ self.direction
-        return TipResponse(response.tips[0], slopes[0], retreat, known)
+        return TipResponse(known.tips[0], slopes[0], retreat, known)
 
     def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if this equilibrium is stable; in doubt steps half as long decide."""

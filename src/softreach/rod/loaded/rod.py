@@ -1,15 +1,25 @@
-"""The loaded rod: an arm under gravity, payload and forces, and the stability of its equilibria."""
+"""The loaded rod: an arm under gravity, payload and forces, and the steps that it needs.
+
+Steps, theory (72): the pilot of the free rod is solved with n and with 2n steps; n is the smallest
+number, no smaller than the phase of the loads needs, whose largest difference, doubled for safety,
+is within `tol`. Few of the pilot are solved first, all of them once these agree.
+
+Near the loss of stability every error is magnified. Activations there are left out: those of small
+margin, and the few that differ more than tenfold what 99 % of all do.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softreach.arm.body import load_number
 from softreach.arm.loads import Loads
-from softreach.kernels.lanes import LANES
+from softreach.arm.manipulator import Manipulator
 from softreach.rod.free import (
     ArmRod,
     FreeRod,
@@ -20,19 +30,9 @@ from softreach.rod.free import (
 )
 from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
-from softreach.rod.loaded.shapes import LoadedShapes
-from softreach.rod.loaded.shooting import Equilibria, Shots, turn_between
+from softreach.rod.loaded.shooting import Equilibria, LoadedShapes, turn_between
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.steps import (
-    UNJUDGED,
-    Differences,
-    check_steps,
-    checked,
-    fewest_steps,
-    shape_differences,
-    tip_differences,
-)
-from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
+from softreach.rod.loaded.tables import ArmBody, LoadPhase, LoadTables
 from softreach.rod.response import (
     NodeTables,
     linear_response,
@@ -40,7 +40,7 @@ from softreach.rod.response import (
     rod_state,
     step_grid,
 )
-from softreach.rod.steps import pilot_activations
+from softreach.rod.steps import enough_for_all_breaks, pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
@@ -54,16 +54,25 @@ from softreach.rod.tip_map import (
     position_slopes,
 )
 from softreach.support import parallel
+from softreach.support.arrays import Array, Mask
+from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
-__all__ = ["LoadedRod"]
-
-Array = NDArray[np.float64]
+Differences = Callable[[Solver, Array, Equilibria], Array]
+"""Distances [m] between what a solver and its judge find, near known equilibria."""
 
 _BLOCK = BLOCK // 8  # samples per task
 _RESPONSE_STEPS = 48
-_OF_LINES = 32 * LANES  # samples per task that follows branches
 _SIDES = 1e-3  # [rad], between postures of two sides
+_SAFETY = 2.0
+_FEWEST_STEPS, _MOST_STEPS = 4, 256
+_FINER = 8  # times as many as let one end at every breakpoint are tried
+_UNJUDGED = 0
+"""Instead of a number of steps: no activation can judge any."""
+_CRITICAL = 0.02
+_BULK, _OUTLYING = 0.99, 10.0
+_FEW = 64
+_STATIONS = 9
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,7 +94,7 @@ class LoadedRod(ArmRod):
         return loads.seen_from(self.arm.base)
 
     @property
-    def body(self) -> Body:
+    def body(self) -> ArmBody:
         """Compliance and weight of the arm."""
         return ArmBody(self.arm)
 
@@ -97,17 +106,17 @@ class LoadedRod(ArmRod):
             InvalidInput: Loads so heavy that no number of steps resolves what they do.
         """
         tables = LoadTables(self.arm, self.loads, self.body)
-        check_steps(self.arm, tables.phase)
+        _check_steps(self.arm, tables.phase)
         return tables
 
     @property
     def steps(self) -> int:
-        """The number of steps that `tol` needs for tips; see `rod.loaded.steps` for the rule.
+        """The number of steps that `tol` needs for tips; theory (72).
 
         Raises:
             InvalidInput: None is enough.
         """
-        return checked(self._tip_steps, self._tip_tol)
+        return _checked(self._tip_steps, self._tip_tol)
 
     @lazy
     def _tip_steps(self) -> int | None:
@@ -122,8 +131,8 @@ class LoadedRod(ArmRod):
 
     def _fewest(self, steps: int, differences: Differences) -> int | None:
         gamma = pilot_activations(self.arm, self.box)
-        enough = fewest_steps(self._solver_of, gamma, steps, differences)
-        return max(steps, self.unloaded_steps) if enough == UNJUDGED else enough
+        enough = _fewest_steps(self._solver_of, gamma, steps, differences)
+        return max(steps, self.unloaded_steps) if enough == _UNJUDGED else enough
 
     @lazy
     def unloaded_steps(self) -> int:
@@ -145,7 +154,7 @@ class LoadedRod(ArmRod):
 
     @lazy
     def _shape_solver(self) -> Solver:
-        return self._solver_of(checked(self._shape_steps, self._tip_tol))
+        return self._solver_of(_checked(self._shape_steps, self._tip_tol))
 
     @lazy
     def _mirrored(self) -> Postures:
@@ -162,18 +171,10 @@ class LoadedRod(ArmRod):
         return rod
 
     def equilibria(self, activations: ArrayLike) -> Equilibria:
-        """Tips with their status, the margin of stability, and how each was found.
-
-        What is to be searched again is gathered from all samples, so that kernels get whole blocks.
-        """
+        """Tips with their status, and the margin of stability."""
         self.prepare()
         gamma, lost = self.with_arms(self.box.check(activations))
-        postures, equilibria = self.postures, self.solver.empty(len(gamma))
-        blocks = parallel.blocks(len(gamma), _BLOCK)
-        parallel.run(partial(postures.direct, gamma, b, equilibria) for b in blocks)
-        rows = np.flatnonzero(equilibria.status != TipStatus.STABLE)
-        blocks = parallel.blocks(len(rows), _OF_LINES)
-        parallel.run(partial(postures.by_line, gamma, rows[b], equilibria) for b in blocks)
+        equilibria = self.postures.find_all(gamma)
         drop(lost, equilibria.status, equilibria.tips, equilibria.margin)
         return equilibria
 
@@ -186,22 +187,12 @@ class LoadedRod(ArmRod):
         twists: Array | None = None,
         status: Status | None = None,
         directions: Array | None = None,
+        known: Equilibria | None = None,
     ) -> None:
         """Put tips, and what else is asked for, into place; each equilibrium is found once."""
-        known = self.postures.find(gamma)
+        known = known or self.postures.find(gamma)
         if status is not None:
             status[:] = known.status
-        self._fill(gamma, known, tips, slopes, twists, directions)
-
-    def _fill(
-        self,
-        gamma: Array,
-        known: Equilibria,
-        tips: Array,
-        slopes: Array | None = None,
-        twists: Array | None = None,
-        directions: Array | None = None,
-    ) -> None:
         is_moving = slopes is not None or twists is not None
         if self.end < self.length:
             shapes = self._shape_solver.shapes(gamma, np.array([self.end]), known)
@@ -240,43 +231,37 @@ class LoadedRod(ArmRod):
         self.prepare()
         return held_over(self.postures, self._mirrored, gamma, sizes, self._points)
 
-    def _points(self, gamma: Array, shots: Shots) -> Array:
+    def _points(self, gamma: Array, known: Equilibria) -> Array:
         """Places of the point that stands for the tip [m], shape (n, 3)."""
-        stable, points = np.zeros(len(gamma), np.int8), np.empty((len(gamma), 3))
+        points, stable = np.empty((len(gamma), 3)), np.zeros(len(gamma), np.int8)
+        known = known._replace(status=stable)
         for rows in parallel.blocks(len(gamma), _BLOCK):
-            some = Equilibria(shots.tips[rows], stable[rows], shots.margin[rows], shots.frame[rows])
-            self._fill(gamma[rows], some, points[rows])
+            self.fill(gamma[rows], points[rows], known=known.of(rows))
         return points
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
         self.prepare()
         gamma, solver = self.box.check(activations), self.solver
-        compliance = np.empty((len(gamma), 3, 3))
+        known, compliance = self.postures.find_all(gamma), np.empty((len(gamma), 3, 3))
 
-        def fill(block: slice) -> None:
-            known = self.postures.find(gamma[block])
-            compliance[block] = solver.respond(gamma[block], known, compliance=True).compliance
+        def fill(rows: slice) -> None:
+            response = solver.respond(gamma[rows], known.of(rows), compliance=True)
+            compliance[rows] = response.compliance
 
-        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
+        parallel.run(partial(fill, rows) for rows in parallel.blocks(len(gamma), _BLOCK))
         return compliance
 
-    def leans(self, activations: ArrayLike) -> NDArray[np.bool_]:
+    def leans(self, activations: ArrayLike) -> Mask:
         """Mask of activations at which the arm leans to one of two sides, shape (n,).
 
         With the other twist it leans to the other.
         """
         self.prepare()
-        gamma, sides = self.box.check(activations), (self.postures, self._mirrored)
-        leans = np.empty(len(gamma), bool)
-
-        def fill(block: slice) -> None:
-            here, there = (side.find(gamma[block]) for side in sides)
-            leans[block] = has_tip(here.status) & has_tip(there.status)
-            leans[block] &= turn_between(here.frame, there.frame) > _SIDES
-
-        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
-        return leans
+        gamma = self.box.check(activations)
+        here, there = (side.find_all(gamma) for side in (self.postures, self._mirrored))
+        apart = turn_between(here.frame, there.frame) > _SIDES
+        return here.is_found & there.is_found & apart
 
     def shapes(
         self,
@@ -290,44 +275,42 @@ class LoadedRod(ArmRod):
         Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
         """
         gamma = self.box.check(activations)
-        z, at, found = np.asarray(framed, float), np.asarray(strained, float), self._found(gamma)
-        framed_shapes = strained_shapes = self._walked(found, z, status)
+        z, at, known = (
+            np.asarray(framed, float),
+            np.asarray(strained, float),
+            self.equilibria(gamma),
+        )
+        framed_shapes = strained_shapes = self._walked(gamma, known, z, status)
         if not np.array_equal(z, at):
-            strained_shapes = self._walked(found, at, status)
+            strained_shapes = self._walked(gamma, known, at, status)
         return Shapes(*framed_shapes.frames, *self.strains_under(gamma, at, strained_shapes))
 
     def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
-        shapes = self._walked(self._found(gamma), z, status)
+        shapes = self._walked(gamma, self.equilibria(gamma), z, status)
         return shapes.frames, shapes.moment
 
-    def _found(self, gamma: Array) -> tuple[Array, NDArray[np.intp], Equilibria]:
-        gamma, lost = self.with_arms(gamma)
-        return gamma, lost, self.equilibria(gamma)
-
     def _walked(
-        self, found: tuple[Array, NDArray[np.intp], Equilibria], z: Array, status: Status | None
+        self, gamma: Array, known: Equilibria, z: Array, status: Status | None
     ) -> LoadedShapes:
-        gamma, lost, known = found
         if not len(z):
             return LoadedShapes.empty(len(gamma), 0)
-        shapes = self._shape_solver.shapes(gamma, z, known, status=status)
+        shapes = self._shape_solver.shapes(gamma, z, known)
         if status is not None:
-            gone = np.isnan(shapes.frames.position[:, 0, 0])
-            status[gone & has_tip(status)] = TipStatus.UNDECIDED
-        drop(lost, status, *shapes.frames, shapes.moment, shapes.force)
+            gone = known.is_found & np.isnan(shapes.frames.position[:, 0, 0])
+            status[:] = np.where(gone, TipStatus.UNDECIDED, known.status)
         return shapes
 
     def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
         """The strains at stations Z [m], from m and n in the directors of the shapes there."""
         axial, bending, torsion = _compliance_at(self.body, z.tobytes())
-        u, extension, growth = linear_strains(tables_at(self.arm, z), gamma)
-        extension = extension + growth * shapes.force[..., 2] * axial
+        u, extension, eta = linear_strains(tables_at(self.arm, z), gamma)
+        extension = extension + eta * shapes.force[..., 2] * axial
         yielded = np.stack([bending, bending, torsion], axis=1)
-        return per_length(u + shapes.moment * yielded, extension, growth)
+        return per_length(u + shapes.moment * yielded, extension, eta)
 
 
 @lru_cache(maxsize=64)
-def _compliance_at(body: Body, stations: bytes) -> tuple[Array, Array, Array]:
+def _compliance_at(body: ArmBody, stations: bytes) -> tuple[Array, Array, Array]:
     return body.compliance(np.frombuffer(stations))
 
 
@@ -348,3 +331,99 @@ class _ContinuedRod(LoadedRod):
     @lazy
     def _shape_solver(self) -> Solver:
         return self.origin._shape_solver
+
+
+def _fewest_steps(
+    solver_of: Callable[[int], Solver], pilot: Array, steps: int, differences: Differences
+) -> int | None:
+    """The fewest steps for the tolerance of the solvers.
+
+    Args:
+        solver_of: A solver of so many steps.
+        pilot: Activations to judge by, shape (n, bundles).
+        steps: The fewest to try.
+        differences: Differences that must be within the tolerance.
+
+    Returns:
+        Steps; None where even the most are too few, `_UNJUDGED` where nothing can be judged.
+    """
+    steps = max(steps, _FEWEST_STEPS)
+    others = pilot[_FEW:]  # behind the first, which are corners
+    few = np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
+    enough = _enough(solver_of, few, steps, differences)
+    if enough is None:
+        return None
+    return _enough(solver_of, pilot, enough or steps, differences)
+
+
+def _enough(
+    solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
+) -> int | None:
+    tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
+    known: Equilibria | None = None
+    while steps <= max(_MOST_STEPS, _FINER * at_all):
+        solver = solver_of(steps)
+        allowed = tol * solver.tables.arm.length / _SAFETY
+        if known is None:
+            known = Postures.of(solver).find(gamma)
+            held = has_tip(known.status)
+            gamma, known = gamma[held], known.of(held)
+        equilibria = solver.near(gamma, known)
+        settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
+        errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
+        if not len(errors):
+            return _UNJUDGED
+        error = float(errors.max())
+        if error <= allowed:
+            return steps
+        steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
+        if steps > _MOST_STEPS:
+            steps = max(steps, at_all)
+    return None
+
+
+def _bulk(distances: Array) -> Array:
+    """Without those that are far larger than nearly all."""
+    known = distances[np.isfinite(distances)]
+    if not len(known):
+        return known
+    return known[known <= _OUTLYING * np.quantile(known, _BULK, method="lower")]
+
+
+def tip_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
+    """Between tips."""
+    return _distances(known.tips, solver.judge().near(gamma, known).tips)
+
+
+def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
+    """Between centerlines, along the arm."""
+    stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
+    shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.judge())]
+    return _distances(*(shape.frames.position for shape in shapes)).max(axis=1, initial=0.0)
+
+
+def _distances(a: Array, b: Array) -> Array:
+    return np.linalg.norm(a - b, axis=-1)
+
+
+def _check_steps(arm: Manipulator, phase: LoadPhase) -> None:
+    """Refuse loads that turn tangents more often than any number of steps can tell.
+
+    Raises:
+        InvalidInput: Too heavy loads.
+    """
+    if phase.fewest_steps > _MOST_STEPS:
+        load, most = f"of load number {load_number(arm):.3g}", f"at most {_MOST_STEPS} allowed"
+        allowed = f"lighter: they need {phase.fewest_steps:,} steps, {most}"
+        raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
+
+
+def _checked(steps: int | None, tol: float) -> int:
+    """The steps that a tolerance needs.
+
+    Raises:
+        InvalidInput: None are enough.
+    """
+    if steps is None:
+        raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
+    return steps

@@ -6,33 +6,31 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import tables
 from softreach.geometry.sphere_maps import Map
 from softreach.kernels.loaded.response import TRACE
 from softreach.rod.free import linear_strains
-from softreach.rod.loaded.shapes import LoadedShapes, shapes_of
 from softreach.rod.loaded.shooting import (
     ALL_LOADS,
     MARGIN_ALONE,
     QUICK,
     Equilibria,
+    LoadedShapes,
     Response,
-    Shots,
     base_directions,
+    shapes_of,
     shoot,
     units,
     walk,
 )
 from softreach.rod.loaded.tables import LoadTables, StepTables
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import TipStatus, has_tip
+from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index
 from softreach.support.lazy import lazy
-
-Array = NDArray[np.float64]
 
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
@@ -72,11 +70,11 @@ class Solver:
         steps = max(2 * self.steps, enough_for_all_breaks(self.tables.arm))
         return Solver(self.tables, steps, self.tol)
 
-    def quick(self, gamma: Array, guesses: Array | None) -> Shots:
+    def quick(self, gamma: Array, guesses: Array | None) -> Equilibria:
         """Searches from frames as in `Equilibria`, or from the unloaded arm."""
         return shoot(gamma, self.tables, guesses, self._steps, self._tiny, QUICK)
 
-    def careful(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Shots:
+    def careful(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Equilibria:
         """The same under shares of the loads, to follow a branch."""
         return shoot(gamma, self.tables, guesses, self._steps, self._tiny, shares=shares)
 
@@ -91,32 +89,21 @@ class Solver:
         return equilibria
 
     def put(
-        self,
-        gamma: Array,
-        rows: slice | NDArray[np.intp],
-        shots: Shots,
-        equilibria: Equilibria,
+        self, gamma: Array, rows: slice | Index, found: Equilibria, equilibria: Equilibria
     ) -> None:
         """Put down what is found at some rows of all activations."""
-        tips, frame, margin, good = shots
-        stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
-        equilibria.tips[rows] = np.where(good[:, None], tips, np.nan)
-        equilibria.frame[rows], equilibria.margin[rows] = frame, margin
-        equilibria.status[rows] = np.where(good, stable, TipStatus.UNDECIDED)
+        equilibria.put(rows, found.without_lost_tips())
         if self.tables.phase.squeeze >= 1.0:
-            self._give_up_squeezed(gamma, rows, equilibria)
+            self._give_up_squeezed(gamma, np.arange(len(gamma))[rows], equilibria)
 
-    def _give_up_squeezed(
-        self, gamma: Array, rows: slice | NDArray[np.intp], equilibria: Equilibria
-    ) -> None:
+    def _give_up_squeezed(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out."""
-        squeezed = np.arange(len(gamma))[rows]
         edges = self.tables.edges(np.array([]), self.steps)[::-1]
         z = self.tables.arm.profile.station(edges)
-        force = self.shapes(gamma[squeezed], z, equilibria.of(squeezed)).force[..., 2]
-        _, extension, growth = linear_strains(tables(self.tables.arm, z), gamma[squeezed])
-        extension = extension + growth * force * self.tables.body.compliance(z)[0]
-        squeezed = squeezed[(extension <= 0.0).any(axis=1)]
+        force = self.shapes(gamma[rows], z, equilibria.of(rows)).force[..., 2]
+        _, extension, eta = linear_strains(tables(self.tables.arm, z), gamma[rows])
+        extension = extension + eta * force * self.tables.body.compliance(z)[0]
+        squeezed = rows[(extension <= 0.0).any(axis=1)]
         equilibria.tips[squeezed] = np.nan
         equilibria.status[squeezed] = TipStatus.NO_EQUILIBRIUM
 
@@ -146,7 +133,7 @@ class Solver:
         is_uniform = len(edges) == len(self._steps.lengths) + 1  # stations at ends of steps alone
         table = self._steps if is_uniform else self.tables.of_edges(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
-        trace = walk(gamma, self.tables, directions, table, trace=True).trace
+        trace = walk(gamma, self.tables, directions, table, trace=True)[2]
         margin = shoot(gamma, self.tables, directions, table, 0.0, MARGIN_ALONE).margin
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
         shapes = shapes_of(at, trace, rows, self._force_at(table, rows), nowhere)
@@ -156,7 +143,7 @@ class Solver:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
         whole = self._steps._replace(firsts=np.array([0, len(self._steps.lengths)]))
         tables = self.tables.in_one_segment
-        trace = walk(gamma, tables, directions, whole, trace=True).trace
+        trace = walk(gamma, tables, directions, whole, trace=True)[2]
         seen = trace[:, self._steps.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
         return units(seen.reshape(len(gamma), self.tables.frame_size))
 
@@ -168,7 +155,7 @@ class Solver:
         compliance: bool = False,
         directors: bool = False,
     ) -> Response:
-        """Tips with their derivatives, theory (74); NaN where there is no equilibrium.
+        """Derivatives of tips, theory (74); NaN where there is no equilibrium.
 
         Args:
             gamma: Activations (n, bundles).
@@ -176,63 +163,50 @@ class Solver:
             compliance: Whether to tell ∂r/∂F.
             directors: Whether to tell the directors of the tips.
         """
-        lost = ~has_tip(known.status)
+        lost = ~known.is_found
         rows = np.where(lost, lost.argmin(), np.arange(len(gamma)))  # none is walked in vain
-        answers = {"slopes": True, "compliance": compliance, "trace": directors}
-        walked = walk(gamma[rows], self.tables, known.frame[rows], self._steps, **answers)
-        tips, at_tips = known.tips.copy(), np.empty((0, 3, 3))
-        for values in (tips, walked.slopes, walked.compliance):
-            if len(values):
-                values[lost] = np.nan
-        if directors:
-            at, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
-            shapes = shapes_of(tips, walked.trace, at, self._force_at(self._steps, at), at_tip)
-            at_tips = shapes.frames.directors[:, 0]
-        return Response(tips, walked.slopes, walked.compliance, at_tips, known.status)
+        wanted = {"slopes": True, "compliance": compliance, "trace": directors}
+        twists, yields, trace = walk(
+            gamma[rows], self.tables, known.frame[rows], self._steps, **wanted
+        )
+        for values in (twists, yields):
+            values[lost[: len(values)]] = np.nan
+        if not directors:
+            return Response(twists, yields, np.empty((0, 3, 3)))
+        at, at_tip = np.zeros(1, int), np.array([self.tables.arm.length])
+        shapes = shapes_of(known.tips, trace, at, self._force_at(self._steps, at), at_tip)
+        return Response(twists, yields, shapes.frames.directors[:, 0])
 
-    def shapes(
-        self,
-        gamma: Array,
-        stations: Array,
-        known: Equilibria,
-        *,
-        status: NDArray[np.int8] | None = None,
-    ) -> LoadedShapes:
+    def shapes(self, gamma: Array, stations: Array, known: Equilibria) -> LoadedShapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
 
         Args:
             gamma: Activations (n, bundles).
             stations: Ascending Z [m].
             known: Their equilibria, with these steps or others.
-            status: Room for the `TipStatus` of each, shape (n,).
         """
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
-        shapes = LoadedShapes.empty(len(gamma), len(stations))
+        force, shapes = self._force_at(table, rows), LoadedShapes.empty(len(gamma), len(stations))
 
         def fill(block: slice) -> None:
-            equilibria = known.of(block)
-            lost = ~has_tip(equilibria.status)
-            tips, trace = self._traced(gamma[block], equilibria.frame, lost, table)
-            shapes.put(block, shapes_of(tips, trace, rows, self._force_at(table, rows), stations))
-            if status is not None:
-                status[block] = equilibria.status
+            tips, trace = self._traced(gamma[block], known.of(block), table)
+            shapes.put(block, shapes_of(tips, trace, rows, force, stations))
 
         size = max(1, _TRACED // (len(edges) * TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
         return shapes
 
-    def _traced(
-        self, gamma: Array, frame: Array, lost: NDArray[np.bool_], table: StepTables
-    ) -> tuple[Array, Array]:
+    def _traced(self, gamma: Array, known: Equilibria, table: StepTables) -> tuple[Array, Array]:
         """Tips and sections of arms near known ones on the steps of a table."""
+        lost = ~known.is_found
         at = np.where(lost, lost.argmin(), np.arange(len(gamma)))
-        shots = shoot(gamma[at], self.tables, frame[at], table, 1e-12)
-        trace = walk(gamma[at], self.tables, shots.frame, table, trace=True).trace
-        return np.where((lost | ~shots.is_found)[:, None], np.nan, shots.tips), trace
+        found = shoot(gamma[at], self.tables, known.frame[at], table, 1e-12)
+        trace = walk(gamma[at], self.tables, found.frame, table, trace=True)[2]
+        return np.where((lost | ~found.is_found)[:, None], np.nan, found.tips), trace
 
-    def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
+    def _force_at(self, table: StepTables, rows: Index) -> Array:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
         at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
         return at_ends[rows]

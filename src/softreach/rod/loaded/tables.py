@@ -1,42 +1,37 @@
-"""Tables of a loaded rod for its kernels, at the nodes of every step, from tip to base."""
+"""Tables of a loaded rod for its kernels, and the phase that bounds the length of its steps.
+
+The tangents of theory (68) obey Jacobi's equation: where a force w pushes, they swing like
+cos ∫ √(w/K) ds, so that conjugate points are about π of this phase apart; where it pulls, they grow
+like cosh of the same.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import compliance, tables
+from softreach.arm.tables import both_sides, compliance, ends_over, tables
 from softreach.kernels.loaded import unloaded_frames as rest_frames
 from softreach.kernels.loaded.explicit_rk8 import NODES
 from softreach.kernels.rod import magnus
 from softreach.kernels.rod import tips as rod
-from softreach.rod.loaded.phase import LoadPhase, load_phase, phase_stations
 from softreach.rod.steps import edges_between, ends_of_steps
+from softreach.support.arrays import Array, Index
 from softreach.support.lazy import lazy
-
-Array = NDArray[np.float64]
 
 PHASE_OF_SEGMENT = 4.0  # [rad]
 MOST_SEGMENTS = 64
+SHOT_AT_ONCE = 20.0
+"""Phase up to which one segment is shot [rad]; e^20 roundings are 1e-7 rad."""
+_MOST_PHASE = math.pi / 2.0
+_MOST_STEPS = 1 << 16
+_STATIONS = 65
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-
-
-class Body(Protocol):
-    """Compliance and weight of an arm, at stations Z [m]."""
-
-    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
-        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
-        ...
-
-    def mass_per_length(self, z: Array) -> Array:
-        """[kg/m], before activation."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -56,6 +51,83 @@ class ArmBody:
         return self.arm.section.mass_per_length_at(self.arm.profile, z)
 
 
+class LoadPhase(NamedTuple):
+    """Bounds of the phase of the tangents, theory (85)."""
+
+    entire: float
+    """Over the entire arm [rad]."""
+    steepest: float
+    """Over the entire arm, were it everywhere as steep in S as where it is steepest [rad]."""
+    squeeze: float
+    """The largest force over K0, times the largest η/ζ̂ [-]: from 1 on it could squeeze the arm to
+    nothing."""
+
+    stations: Array
+    """Z from base to tip [m], shape (station,)."""
+    along: Array
+    """Phase from the base to there [rad], shape (station,)."""
+
+    def parted(self, count: int) -> Array:
+        """Z between so many parts of equal phase [m], from tip to base, shape (count - 1,)."""
+        wanted = self.along[-1] * (1.0 - np.arange(1, count) / count)
+        return np.interp(wanted, self.along, self.stations)
+
+    @property
+    def fewest_steps(self) -> int:
+        """Uniform ones in S, of which none makes more than a quarter of a swing.
+
+        Half of what is between conjugate points in a straight arm leaves room for the moment of a
+        bent one, which makes the phase at most about √2 as large.
+        """
+        return max(2, math.ceil(min(self.steepest / _MOST_PHASE, _MOST_STEPS)))
+
+
+def load_phase(arm: Manipulator, loads: Loads, body: ArmBody) -> LoadPhase:
+    """The phase that loads give the tangents of an arm at most.
+
+    Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the sizes of
+    all forces and moments beyond, added whatever their directions, and ζ̂ the largest within bounds,
+    or η where that is larger.
+    """
+    even = np.linspace(0.0, arm.profile.slender_length, _STATIONS)
+    z = both_sides(arm, arm.profile.station(even))
+    axial, bending, torsion = body.compliance(z)
+    mass = body.mass_per_length(z)
+    with np.errstate(over="ignore"):
+        force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
+        swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
+        table = tables(arm, z)
+        longest, grown = (
+            1.0 + ends_over(part, arm.bounds).T
+            for part in (table.extension, table.rest_length_factor)
+        )
+        relative = grown[1] / longest[0] if table.has_forces else 1.0
+        squeeze = float((force * axial * relative).max())
+        rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
+    steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
+    along = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(z)))
+    return LoadPhase(float(along[-1]), float(steepest.max()), squeeze, z, along)
+
+
+def _force(loads: Loads, z: Array, mass: Array) -> Array:
+    """The sizes of all forces beyond each station, added [N]."""
+    gravity, at_tip = math.hypot(*loads.gravity), math.hypot(*loads.tip_force)
+    per_length = math.hypot(*loads.force_per_length) + mass * gravity
+    each = 0.5 * (per_length[1:] + per_length[:-1]) * np.diff(z)
+    along = np.append(np.cumsum(each[::-1])[::-1], 0.0)
+    points = sum((math.hypot(*load.force) * (load.station >= z) for load in loads.point_loads), 0.0)
+    at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
+    return at_tip + along + points
+
+
+def _moment(loads: Loads) -> float:
+    """The sizes of all moments, added, that of the payload on its lever among them [N m]."""
+    weight = loads.payload * math.hypot(*loads.gravity)
+    moments = [loads.tip_moment, loads.follower_moment]
+    moments += [load.moment for load in loads.point_loads]
+    return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*moment) for moment in moments)
+
+
 class StepTables(NamedTuple):
     """Steps from tip to base."""
 
@@ -69,7 +141,7 @@ class StepTables(NamedTuple):
     """U at the nodes, (step, 5, 3, bundle)."""
     moments: Array
     """Dead moment at the tip end of each step along the world's axes, (step, 3)."""
-    firsts: NDArray[np.int64]
+    firsts: Index
     """The first step of each segment, and the number of steps, (segment + 1,)."""
 
 
@@ -79,7 +151,7 @@ class LoadTables:
 
     arm: Manipulator
     loads: Loads
-    body: Body
+    body: ArmBody
     longest: float = field(default=PHASE_OF_SEGMENT, kw_only=True)
     """Phase of the longest segment between nodes [rad]."""
     twist: float = field(default=0.0, kw_only=True)
@@ -119,10 +191,7 @@ class LoadTables:
         Without gravity that of the largest dead force, so that a tip force alone needs no more than
         one direction.
         """
-        forces = [self._at_tip, *(np.array(load.force) for load in self.loads.point_loads)]
-        forces = [np.array(self.loads.gravity), np.array(self.loads.force_per_length), *forces]
-        last = np.array([0.0, 0.0, -1.0]) if self.direction is None else self.direction
-        first = next((f for f in forces if np.any(f)), last)
+        first = next((f for f in self._dead_forces if f.any()), np.array([0.0, 0.0, -1.0]))
         first = first / np.linalg.norm(first)
         other = np.eye(3)[np.argmin(np.abs(first))]
         second = np.cross(first, other)
@@ -132,12 +201,9 @@ class LoadTables:
     @lazy
     def one_direction(self) -> bool:
         """True if all forces are dead and along the first axis, so that two unknowns are enough."""
-        loads = self.loads
-        dead = [self._at_tip, loads.gravity, loads.force_per_length]
-        dead += [load.force for load in loads.point_loads]
-        dead += [] if self.direction is None else [self.direction]
-        across = np.array(dead) @ self.axes[1:].T
-        size = np.abs(np.array(dead)).max(axis=1, keepdims=True)
+        loads, dead = self.loads, self._dead_forces
+        across = dead @ self.axes[1:].T
+        size = np.abs(dead).max(axis=1, keepdims=True)
         moments = [loads.tip_moment, loads.follower_force]
         moments += [load.moment for load in loads.point_loads]
         return bool((np.abs(across) <= 1e-14 * size).all()) and not np.any(moments)
@@ -164,12 +230,19 @@ class LoadTables:
     def _at_tip(self) -> Array:
         return self._weight + np.array(self.loads.tip_force)
 
+    @property
+    def _dead_forces(self) -> Array:
+        """Along which dead forces act, shape (force, 3)."""
+        loads, last = self.loads, [] if self.direction is None else [self.direction]
+        points = [load.force for load in loads.point_loads]
+        return np.array(
+            [loads.gravity, loads.force_per_length, self._at_tip, *points, *last], float
+        )
+
     @lazy
     def phase(self) -> LoadPhase:
         """Phase that the loads give the tangents."""
-        z = phase_stations(self.arm)
-        mass = self.body.mass_per_length(z)
-        return load_phase(self.arm, self.loads, self.body.compliance(z), mass)
+        return load_phase(self.arm, self.loads, self.body)
 
     @lazy
     def _made(self) -> dict[int, StepTables]:
@@ -221,7 +294,7 @@ class LoadTables:
             rest_frames.pack_lengths(
                 measure,
                 at.extension.reshape(*z.shape, bundles),
-                at.growth.reshape(*z.shape, bundles),
+                at.rest_length_factor.reshape(*z.shape, bundles),
             ),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
@@ -236,11 +309,11 @@ class LoadTables:
         gauss = s[:, 1:].ravel()[:, None] + wide[:, None] * np.array(magnus.NODES)
         z = profile.station(gauss)
         at = tables(self.arm, z.ravel())
-        growth = at.growth.reshape(*z.shape, bundles)  # whose rotations alone are asked for
+        resting = at.rest_length_factor.reshape(*z.shape, bundles)  # only rotations are needed
         pieces = rod.pack(
             wide[:, None] * profile.radius(z),
-            growth,
-            growth,
+            resting,
+            resting,
             at.curvature.reshape(*z.shape, 3, bundles),
         )
         pieces[:, 3::4, -1] += self.twist  # u3 at rest
@@ -269,7 +342,7 @@ class LoadTables:
             moments[step : step + 1] += self.axes @ np.array(load.moment)
         return moments
 
-    def _firsts(self, ends: Array) -> NDArray[np.int64]:
+    def _firsts(self, ends: Array) -> Index:
         inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
         return np.array([0, *inner, len(ends) - 1], np.int64)
 

@@ -1,7 +1,8 @@
-"""Camera of a tab: its place and lens, what hides the arm from it, what a click hits."""
+"""Camera of a tab and the axes that it sees; what hides the arm from it, what a click hits."""
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -9,11 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.picture.axes_box import axes_box, round_box, seen_from
 from softreach.studio.state import Camera, vector
 from softreach.support.errors import InvalidInput
+from softreach.support.units import in_lengths
 
 if TYPE_CHECKING:
-    from viser import ClientHandle
+    from viser import ClientHandle, SceneApi
+
+    from softreach.arm.manipulator import Manipulator
 
 Array = NDArray[np.float64]
 
@@ -33,8 +38,10 @@ _LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without bl
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
+_TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
 _POINTER = 0.012  # radius of what is clicked [L]
-_ROOM = 1.12  # times what would just fill the picture
+_ROOM, _ROOM_UPRIGHT = 1.12, 1.22  # times what would just fill the picture, with its numbers
+_GRAY = 170, 170, 175  # of the axes
 
 
 def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
@@ -46,7 +53,8 @@ def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
         direction: From the middle of the box to the camera.
         aspect: Width of the picture over its height.
     """
-    middle, radius = (low + high) / 2, _ROOM * float(np.linalg.norm(high - low)) / 2
+    room = _ROOM_UPRIGHT if aspect < _UPRIGHT else _ROOM
+    middle, radius = (low + high) / 2, room * float(np.linalg.norm(high - low)) / 2
     distance = radius / _half_sine(aspect)
     toward = direction / np.linalg.norm(direction)
     if aspect < _UPRIGHT:  # the sheet of a phone covers the lower half
@@ -148,10 +156,59 @@ class TabCamera:
             raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
 
 
+# A box with numbers around everything; the camera decides which edges have them.
+
+
+class NumberedBox:
+    """One box, drawn into one scene."""
+
+    def __init__(self, api: SceneApi) -> None:
+        self._api, self._lock = api, threading.RLock()
+        self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+        self._unit, self._scale = in_lengths(1.0), 1.0  # of the numbers, and L in it
+        self._camera: tuple[Array, float] = np.array([50.0, -80.0, 30.0]), np.inf
+
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """The lowest and the highest [L]."""
+        low, high = self._box
+        return low / self._scale, high / self._scale
+
+    def draw(self, *points: Array, arm: Manipulator) -> None:
+        """Surround points [L], shapes (n, 3), with numbers in the unit of the arm."""
+        with self._lock:
+            self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
+            self._box = round_box(*(self._scale * each for each in points))
+            self._draw()
+
+    def turn(self, camera: Array, focal: float = np.inf) -> None:
+        """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
+        with self._lock:
+            before, self._camera = self._side(), (camera, focal)
+            if self._api.get_handle_by_name("/axes/lines") is not None and self._side() != before:
+                self._draw()
+
+    def _side(self) -> object:
+        return seen_from(self._scale * self._camera[0], *self._box, self._camera[1])
+
+    def _draw(self) -> None:
+        if self._api.get_handle_by_name("/axes") is not None:
+            self._api.remove_by_name("/axes")
+        (camera, focal), ends = self._camera, [corner[None] for corner in self._box]
+        label = self._unit.label
+        box = axes_box(*ends, camera=self._scale * camera, focal=focal, label=label)
+        lines = (box.lines / self._scale).astype(np.float32)
+        self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
+        for k, (text, at) in enumerate(box.labels):
+            add_label(self._api, f"/axes/label {k}", text, at / self._scale)
+
+
+def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
+    """Words at a place [L], as large on the screen wherever the camera is."""
+    api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
+
+
 # What stands between the camera and a place.
-
-
-_TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
 
 
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
@@ -206,10 +263,8 @@ def picked_point(
     Returns:
         The point's number, or None if the ray passes all of them by.
     """
-    ray = np.asarray(direction, float) / np.linalg.norm(direction)
-    offset = points - np.asarray(origin, float)
-    depth = offset @ ray
-    aside = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset) - depth**2, 0.0))
+    direction = np.asarray(direction, float) / np.linalg.norm(direction)
+    depth, aside = _beside(points, np.asarray(origin, float), direction)
     with np.errstate(divide="ignore", invalid="ignore"):
         angle = np.where(depth > 0, aside / depth, np.inf)
     near = np.flatnonzero(angle <= tolerance)

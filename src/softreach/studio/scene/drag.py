@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.studio.scene.axes import add_label
+from softreach.studio.scene.camera import add_label
 
 if TYPE_CHECKING:
     from viser import SceneApi
-
-__all__ = ["DragBall", "along_axis"]
 
 Array = NDArray[np.float64]
 OnDrag = Callable[[str, Array], None]
@@ -42,8 +40,6 @@ class DragBall:
         """
         self._api, self._on_drag, self._eye = api, on_drag, eye
         self._nodes: tuple[Any, Any] | None = None
-        self._lag: tuple[Any, Any, Any] | None = None
-        self._offset = np.zeros(3)
         self._dark = False
 
     def move(
@@ -57,50 +53,45 @@ class DragBall:
             dark: Whether the page is dark, and the ball light.
             clear: Whether what is inside is seen, such as where a path begins.
         """
-        if tip is None:
-            if self._nodes is not None:
-                self._nodes[0].visible = False
-            return
-        if self._nodes is None:
+        if self._nodes is None and tip is not None:
             self._nodes = self._drawn(tip)
+        if self._nodes is None:
+            return
         halo, ball = self._nodes
-        ball.radius = max(1.2 * radius, _SMALLEST)
-        halo.radius = max(1.6 * radius, _HALO)
+        halo.visible = tip is not None
+        if tip is None:
+            return
         halo.position = tip
+        ball.radius, halo.radius = max(1.2 * radius, _SMALLEST), max(1.6 * radius, _HALO)
         if dark != self._dark:
             self._dark = dark
             halo.color = ball.color = _LIGHT if dark else _COLOR
         if (opacity := _CLEAR if clear else None) != ball.opacity:
             ball.opacity = opacity
-        halo.visible = True
 
     def show_lag(self, wanted: Array | None, tip: Array | None, gap: str = "") -> None:
         """A line from the tip to where it is dragged to [L], and how long it is; "" for none."""
         if wanted is None or tip is None or not gap:
-            for node in self._lag or ():
-                node.visible = False
+            if self._api.get_handle_by_name("/lag") is not None:
+                self._api.remove_by_name("/lag")
             return
-        if self._lag is None:
-            self._lag = self._drawn_lag()
-        pointer, line, label = self._lag
-        pointer.position, label.position = wanted, wanted
-        line.points = np.stack([tip, wanted])[None].astype(np.float32)
-        label.text = f"{gap} short"
-        for node in self._lag:
-            node.visible = True
+        line = np.stack([tip - wanted, np.zeros(3)])[None].astype(np.float32)
+        self._api.add_icosphere("/lag", _POINTER, _LAG, cast_shadow=False, position=wanted)
+        self._api.add_line_segments("/lag/line", line, _LAG, thickness=0.004)
+        self._api.add_label("/lag/label", f"{gap} short", anchor="bottom-center")
 
     def _drawn(self, tip: Array) -> tuple[Any, Any]:
-        halo = self._api.add_icosphere(
-            "/grip", _HALO, _COLOR, opacity=0.25, cast_shadow=False, position=tip
-        )
-        ball = self._api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, cast_shadow=False)
+        look: Any = {"cast_shadow": False}
+        halo = self._api.add_icosphere("/grip", _HALO, _COLOR, opacity=0.25, position=tip, **look)
+        ball = self._api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, **look)
+        offset = np.zeros(3)
 
         @halo.on_drag("left")
         async def _(event: Any) -> None:  # on the event loop, which keeps phases in order
-            end = np.array(event.end_position)
+            nonlocal offset
             if event.phase == "start":
-                self._offset = np.array(halo.position) - event.start_position
-            self._on_drag(event.phase, end + self._offset)
+                offset = np.array(halo.position) - event.start_position
+            self._on_drag(event.phase, np.array(event.end_position) + offset)
 
         for axis, name in enumerate(_AXES):
             self._draw_axis(halo, axis, name)
@@ -109,8 +100,7 @@ class DragBall:
     def _draw_axis(self, halo: Any, axis: int, name: str) -> None:
         from trimesh.creation import revolve
 
-        direction = np.eye(3)[axis]
-        mesh = revolve(_ARROW, sections=12)
+        direction, mesh = np.eye(3)[axis], revolve(_ARROW, sections=12)
         vertices = np.roll(mesh.vertices, axis + 1, axis=1).astype(np.float32)
         arrow = self._api.add_mesh_simple(
             f"/grip/{name}", vertices, mesh.faces, color=_AXES[name], cast_shadow=False
@@ -127,13 +117,6 @@ class DragBall:
                 pressed = along_axis(begin, direction, eye, np.array(event.start_position))
             reached = along_axis(begin, direction, eye, np.array(event.end_position))
             self._on_drag(event.phase, begin + (reached - pressed) * direction)
-
-    def _drawn_lag(self) -> tuple[Any, Any, Any]:
-        pointer = self._api.add_icosphere("/lag", _POINTER, _LAG, cast_shadow=False)
-        points = np.zeros((1, 2, 3), np.float32)
-        line = self._api.add_line_segments("/lag line", points, _LAG, thickness=0.004)
-        label = self._api.add_label("/lag label", "", anchor="bottom-center")
-        return pointer, line, label
 
 
 def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:

@@ -1,1 +1,63 @@
-"""Tabs beside the scene, one a file; what stands above all of them is in `status`."""
+"""Tabs of the page: each panel declares its fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from softreach.studio.fields import Fields, attempt
+from softreach.studio.session import Session
+from softreach.studio.tabs.compare import compare
+from softreach.studio.tabs.design import arm_parts, design, loads
+from softreach.studio.tabs.export import export
+from softreach.studio.tabs.goals import add_place, calibrate, needs
+from softreach.studio.tabs.move import activation, drag, extend_path, path, take, target
+from softreach.studio.tabs.status import status
+from softreach.studio.tabs.view import plots, view
+
+TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
+    "Design": (design,),
+    "Parts": (loads, arm_parts),
+    "Move": (drag, activation, target, path),
+    "View": (view,),
+    "Plots": (plots,),
+    "Compare": (compare,),
+    "Goals": (needs, calibrate),
+    "Export": (export,),
+}
+
+
+def furnish(session: Session) -> None:
+    """Add all panels to the page of a session."""
+    gui = session.client.gui
+    panels = [Fields(session)]
+    status(panels[0])
+    tabs = gui.add_tab_group()
+    for name, declared in TABS.items():
+        with tabs.add_tab(name):
+            for declare in declared:
+                panels.append(Fields(session))
+                declare(panels[-1])
+    session.panels = [panel.show for panel in panels]
+
+    @session.client.scene.on_click()
+    def _(event: Any) -> None:
+        attempt(session, lambda: click(session, event.ray_origin, event.ray_direction))
+
+
+def click(session: Session, origin: Any, direction: Any) -> None:
+    """Do what the mouse is for with the place under the cursor, or take the shape there."""
+    uses: dict[str, Callable[[Any], object]] = {
+        "target": session.aim,
+        "path": lambda place: extend_path(session, place),
+        "place": lambda place: add_place(session, place),
+    }
+    use, answer = uses.get(session.state.appearance.mouse), session.found.answer
+    if use is not None:
+        place = session.picked_place(origin, direction)
+        if place is not None:
+            use(place)
+    elif answer is not None:
+        ghost = session.scene.ghost_under(origin, direction)
+        if ghost is not None and ghost < len(answer):
+            take(session, answer.activations[ghost])

@@ -4,65 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
 from softreach.studio import markup
-from softreach.studio.captions import told_error
-from softreach.studio.fields import Fields
+from softreach.studio.captions import size_unit, told_error
+from softreach.studio.fields import GRAY, Fields
+from softreach.studio.found import Found
 from softreach.studio.reach import Reach
 from softreach.studio.shown_parameters import ShownParameter, named_parameters, slider_parameters
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import Line, show_where
 from softreach.support.errors import SoftreachError
-
-if TYPE_CHECKING:
-    from viser import GuiApi
-
-    from softreach.studio.session import Session
 
 _HINT = "Keep this design to see what a change of it costs and gains."
 _EQUAL = 1e-9  # relative difference that is rounding
-_MINUS = "\N{MINUS SIGN}"
-_MOST = 24
-"""Rows of parameters; designs that differ in more are other arms altogether."""
+_MOST = 24  # rows of parameters; designs that differ in more are other arms altogether
 
 Value = float | None
+Candidate = tuple[Manipulator, Reach | None]
 
 
-class ComparePanel:
+def compare(panel: Fields) -> None:
     """Keeps a design, and compares the design with it."""
-
-    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._fields = Fields(session, dragged=False)
-        self._known: object = None
-        with tab:
-            self._table = Line(gui, _HINT)
-            self._fields.button("Keep this design", kept, "Draws its boundary in gray from now on")
-            self._others = gui.add_folder("kept design", visible=False)
-            with self._others:
-                self._fields.button("Swap", swapped, "Makes the kept design the design, and back")
-                forget = "Compares no more, and takes the gray boundary away"
-                self._fields.button(
-                    "Forget", lambda state: state.replace(reference=None), forget, color="gray"
-                )
-
-    def show(self, session: Session) -> None:
-        """Bring the table in line with both designs and what is known of them."""
-        self._fields.show(session)
-        design, reference = session.state.design, session.state.reference
-        show_where(reference is not None, self._others)
-        known = (design, reference, session.found.reach, session.found.reference)
-        if known == self._known:
-            return
-        self._known = known
-        if reference is None:
-            self._table.say(_HINT)
-        else:
-            before = _known_reach(session.found.reference, reference)
-            now = _known_reach(session.found.reach, design)
-            self._table.show(comparison_html(compared((reference, before), (design, now))))
+    known = "design", "reference", "found.reach", "found.reference"
+    panel.html(*known, content=_compared)
+    panel.change("Keep this design", kept, "Draws its boundary in gray from now on")
+    with panel.folder("kept design", lambda state, _: state.reference is not None):
+        panel.change("Swap", swapped, "Makes the kept design the design, and back")
+        forget = "Compares no more, and takes the gray boundary away"
+        panel.change("Forget", lambda state: state.replace(reference=None), forget, **GRAY)
 
 
 def kept(state: StudioState) -> StudioState:
@@ -75,15 +46,19 @@ def swapped(state: StudioState) -> StudioState:
     return state.replace(design=state.reference or state.design, reference=state.design)
 
 
-def _known_reach(reach: Reach | None, design: Manipulator) -> Reach | None:
-    return reach if reach is not None and reach.fine and reach.arm == design else None
+def _compared(state: StudioState, found: Found) -> str:
+    design, reference, before = state.design, state.reference, found.reference
+    if reference is None:
+        return markup.paragraph(_HINT)
+    is_known = before is not None and before.fine and before.arm == reference
+    now = design, found.complete_reach(design)
+    return comparison_html(compared((reference, before if is_known else None), now))
 
 
 class Row(NamedTuple):
     """A quantity of the kept design and of the present one; None where it is not known."""
 
-    title: str
-    """With its unit."""
+    title: str  # with its unit
     kept: Value
     now: Value
     errors: tuple[Value, Value] = (None, None)
@@ -98,42 +73,35 @@ class Comparison(NamedTuple):
     """What differs between two designs."""
 
     rows: tuple[Row, ...]
-    is_complete: bool
-    """True if the designs differ in these numbers alone."""
-
-
-Candidate = tuple[Manipulator, Reach | None]
+    is_complete: bool  # the designs differ in these numbers alone
 
 
 def compared(kept: Candidate, now: Candidate) -> Comparison:
     """Compare what two designs reach, and the parameters in which they differ."""
-    parameters, is_complete = _parameter_rows(kept[0], now[0])
-    return Comparison((*_reach_rows(kept, now), *parameters), is_complete)
+    rows = _differing(slider_parameters(kept[0]), slider_parameters(now[0]))
+    is_complete = _explained(kept[0], now[0], list(rows))
+    if not is_complete:
+        rows = rows | _differing(named_parameters(kept[0]), named_parameters(now[0])) | rows
+    return Comparison((*_reach_rows(kept, now), *[*rows.values()][:_MOST]), is_complete)
 
 
 def comparison_html(comparison: Comparison) -> str:
     """A row for each quantity: kept, now, and the change."""
-    rows = [[(row.title,), *map(_one, _texts(row))] for row in comparison.rows]
+    rows = [[(text,) for text in _texts(row)] for row in comparison.rows]
     others = "The designs differ in more than these numbers."
     more = "" if comparison.is_complete else markup.paragraph(others)
     return markup.table(["", "kept", "now", "change"], rows) + more
 
 
-def _one(text: str) -> tuple[str]:
-    return (text,)
-
-
-def _texts(row: Row) -> tuple[str, str, str]:
+def _texts(row: Row) -> tuple[str, str, str, str]:
     values = zip((row.kept, row.now), row.errors, strict=True)
     kept, now = ("–" if value is None else _digits(value, error) for value, error in values)
-    return kept, now, _change_text(row)
+    return row.title, kept, now, _change_text(row)
 
 
 def _change_text(row: Row) -> str:
-    if row.change is None:
-        return "–"
-    if row.change == 0:
-        return "="
+    if row.change is None or row.change == 0:
+        return "–" if row.change is None else "="
     before, now = row.errors
     if before is None or now is None:
         return _digits(row.change, None, "+")
@@ -149,47 +117,39 @@ def _digits(value: float, error: Value, sign: str = "") -> str:
     usual = f"{sign}.5g"
     if error is not None and 0 < error < math.inf:
         usual = f"{sign}.{max(0, -math.floor(math.log10(error)))}f"
-    return f"{value:{usual}}".replace("-", _MINUS)
+    return f"{value:{usual}}".replace("-", "\N{MINUS SIGN}")
 
 
 def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
     """Volume, area or length, whatever each has, in the unit of the present design, and UNR."""
-    sizes = [reach.size if reach else None for _, reach in (kept, now)]
-    kinds = dict.fromkeys((size.name, size.power) for size in sizes if size is not None)
-    unit, rows = now[0].length_unit, []
-    for name, power in kinds or {("volume", 3): None}:
-        scale = unit.scale(power) if power else 1.0
+    reaches, arm, rows = (kept[1], now[1]), now[0], list[Row]()
+    sizes = [reach.size if reach else None for reach in reaches]
+    for name in dict.fromkeys(size.name for size in sizes if size) or ("volume",):
         same = [size if size and size.name == name else None for size in sizes]
-        values = [None if size is None else size.value / scale for size in same]
-        errors = [None if size is None else told_error(size, now[0]) / scale for size in same]
-        title = unit.label(name, power) if power else name
-        rows.append(Row(title, values[0], values[1], (errors[0], errors[1])))
-    shares = [_finite(100 * reach.unreachability) if reach else None for _, reach in (kept, now)]
-    if any(share is not None for share in shares):
-        before, after = (None if share is None else round(share, 2) for share in shares)
+        latest = next((size for size in reversed(same) if size), None)
+        power = 3 if latest is None else latest.power
+        unit = arm.length_unit if latest is None else size_unit(latest, arm)
+        scale, title = (unit.scale(power), unit.label(name, power)) if power else (1.0, name)
+        before, after = (size and size.value / scale for size in same)
+        first, second = (size and told_error(size, arm) / scale for size in same)
+        rows.append(Row(title, before, after, (first, second)))
+    shares = [_finite(100 * reach.unreachability) if reach else None for reach in reaches]
+    if shares != [None, None]:
+        before, after = (share and round(share, 2) for share in shares)
         rows.append(Row("UNR [%]", before, after))
     return rows
 
 
-def _parameter_rows(kept: Manipulator, now: Manipulator) -> tuple[list[Row], bool]:
-    """Sliders that differ, then other parameters; and whether they tell all."""
-    shown = _differing(slider_parameters(kept), slider_parameters(now))
-    if _explained(kept, now, list(shown)):
-        return list(shown.values()), True
-    every = _differing(named_parameters(kept), named_parameters(now))
-    others = [row for name, row in every.items() if name not in shown]
-    return [*shown.values(), *others][:_MOST], False
-
-
 def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) -> dict[str, Row]:
     """Rows of the parameters whose values differ, by name."""
-    both = [{parameter.name: parameter for parameter in each} for each in (kept, now)]
+    before, after = ({each.name: each for each in shown} for shown in (kept, now))
     rows = {}
-    for name in {**both[0], **both[1]}:
-        label = (both[1].get(name) or both[0][name]).label
-        values = [_finite(each[name].shown) if name in each else None for each in both]
-        if not _same(*values):
-            rows[name] = Row(label, values[0], values[1])
+    for name in before | after:
+        first, second = (
+            _finite(each[name].shown) if name in each else None for each in (before, after)
+        )
+        if not _same(first, second):
+            rows[name] = Row((after.get(name) or before[name]).label, first, second)
     return rows
 
 

@@ -1,149 +1,111 @@
-"""The body of the design: sliders, numbers that have none, and named designs to start from."""
+"""The design: sliders of the body, numbers of its parts, base and loads; parts come and go."""
 
 from __future__ import annotations
 
-import threading
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from softreach.arm import designs
+from softreach.arm import designs, edits
+from softreach.arm.base import POINTS
+from softreach.arm.design_file import in_file_terms
+from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed, find_parameter
-from softreach.studio.fields import Attribute, Fields
+from softreach.arm.material import material_names
+from softreach.studio.captions import tip_text
+from softreach.studio.fields import GRAY, Attribute, Fields, of_design
+from softreach.studio.found import Found
 from softreach.studio.shown_parameters import (
+    Part,
     ShownParameter,
     body_numbers,
+    owner_label,
+    part_parameters,
+    parts,
     refusal,
-    slider_ends,
     slider_parameters,
 )
 from softreach.studio.slopes import NO_BAR, slope_bars
-from softreach.studio.state import StudioState, rod_of
-from softreach.studio.tabs.parts import typed_number
-from softreach.studio.widgets import Line, SliderField
-from softreach.support.errors import SoftreachError
+from softreach.studio.state import StudioState, rod_of, vector
+from softreach.studio.widgets import Line, SliderField, TextKind, TypedField
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 
-if TYPE_CHECKING:
-    from viser import GuiApi
-
-    from softreach.studio.session import Session
+# Sliders, numbers that have none, and named designs to start from
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
-_OWN = "this design"
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
 
 
-class DesignPanel:
-    """All sliders of a design together; a change may be valid only together with others."""
+def design(panel: Fields) -> None:
+    """Sliders of a design, each with the change of the volume by it."""
+    with panel.folder("design") as folder:
+        about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
+        panel.text("design", "found.slopes", content=about)
+    _numbers(panel, folder, slider_parameters, _sliders)
+    with panel.folder("body") as folder:
+        pass
+    _numbers(panel, folder, body_numbers, _typed)
+    names = {"": "this design"} | {name: name for name in designs.__all__}
+    panel.dropdown("start from", names, Attribute(_name, _named), _ABOUT_START)
 
-    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._gui, self._session, self._lock = gui, session, threading.RLock()
-        self._rows: list[tuple[ShownParameter, SliderField]] = []
-        self._bars: dict[str, Line] = {}
-        """Under each slider, by the name of its parameter."""
-        self._base: Manipulator | None = None
-        """The design that the sliders were made for."""
-        self._made: Manipulator | None = None
-        """The design that they made of it last."""
-        self._ended: Manipulator | None = None
-        """The design at whose limits they end."""
-        self._typed: list[str] = []
-        """Names of the numbers of the body that have fields."""
-        self._revision, self._refused = -1, False
-        self._sliders, self._numbers = Fields(session), Fields(session)
-        self._others = Fields(session, dragged=False)
-        with tab:
-            self._folder = gui.add_folder("design")
-            with self._folder:
-                self._about_bars = Line(gui)
-            self._body = gui.add_folder("body")
-            names = {"": _OWN} | {name: name for name in designs.__all__}
-            self._others.dropdown("start from", names, Attribute(_name, _named), _ABOUT_START)
 
-    def show(self, session: Session) -> None:
-        """Make the sliders anew for a design that they did not make."""
-        self._others.show(session)
-        with self._lock:
-            self._follow_body(session.state.design)
-            if session.revision != self._revision:
-                self._revision = session.revision
-                if session.state.design != self._made or self._refused:
-                    self._build(session.state.design)
-            if not session.busy and session.state.design != self._ended:
-                self._end(session.state.design)
-            self._show_slopes(session)
+def _numbers(
+    panel: Fields,
+    folder: Any,
+    shown: Callable[[Manipulator], Sequence[ShownParameter]],
+    build: Callable[[Fields, Sequence[ShownParameter]], object],
+) -> None:
+    """Fields of parameters, made anew for a design that has others."""
+    arm = lambda: panel.session.state.design
+    panel.anew(
+        folder,
+        "design",
+        key=lambda state, _: [each[:2] for each in shown(state.design)],
+        build=lambda fields, _: build(fields, shown(arm())),
+        words=lambda error: refusal(error, shown(arm()), arm()),
+    )
 
-    def _show_slopes(self, session: Session) -> None:
-        slopes, design = session.found.slopes, session.state.design
-        if slopes is None:
-            bars = dict.fromkeys(self._bars, NO_BAR) if rod_of(design).box.dimension > 2 else {}
-        else:
-            sliders = {row.name: (row, field.ends[1] - field.ends[0]) for row, field in self._rows}
-            bars = slope_bars(slopes, sliders, old=slopes.arm != design)
-        self._about_bars.say(*([_ABOUT_BARS] if bars else []))
-        for name, line in self._bars.items():
-            line.show(bars.get(name, ""))
 
-    def _end(self, arm: Manipulator) -> None:
-        """End the sliders where the design does, once nobody drags."""
-        self._ended, ends = arm, slider_ends(arm)
-        for parameter, field in self._rows:
-            low, high = ends.get(parameter.name, field.ends)
-            if (low, high) != field.ends and low < high:
-                field.ends = low, high
+def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
+    for each in numbers:
+        panel.number(each.label, of_design(each.read, each.write), each.hint)
 
-    def _build(self, arm: Manipulator) -> None:
-        self._sliders.remove()
-        for line in self._bars.values():
-            line.remove()
-        self._bars = {}
-        self._base = self._made = arm
-        self._ended, self._refused = None, False
-        self._sliders = Fields(self._session, words=self._words)
-        with self._folder:
-            self._rows = [
-                (parameter, self._slider(parameter)) for parameter in slider_parameters(arm)
-            ]
 
-    def _follow_body(self, arm: Manipulator) -> None:
-        numbers = body_numbers(arm)
-        if [number.name for number in numbers] == self._typed:
-            self._numbers.show(self._session)
-            return
-        self._typed = [number.name for number in numbers]
-        self._numbers.remove()
-        self._numbers = Fields(self._session, words=self._words, dragged=False)
-        with self._body:
-            for number in numbers:
-                self._numbers.number(number.label, typed_number(number), number.hint)
+def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
+    rows, bars = dict[str, SliderField](), dict[str, Line]()
+    for each in shown:
+        at = of_design(each.read, each.write)
+        rows[each.name] = panel.slider(each.label, each.limits, each.step, at, each.hint)
+        if not each.whole:  # what jumps has no slope
+            bars[each.name] = panel.kept(Line(panel.gui))
 
-    def _slider(self, parameter: ShownParameter) -> SliderField:
-        at = Attribute(lambda _: parameter.shown, lambda state, _: self._changed(state))
-        field = self._sliders.slider(
-            parameter.label, parameter.limits, parameter.step, at, parameter.hint
-        )
-        assert self._base is not None
-        if not find_parameter(self._base, parameter.name).whole:  # what jumps has no slope
-            self._bars[parameter.name] = Line(self._gui)
-        return field
+    def end(_: StudioState, found: Found) -> None:
+        for name, row in rows.items():
+            low, high = found.ends.get(name, row.ends)
+            if (low, high) != row.ends and low < high:
+                row.ends = low, high
 
-    def _changed(self, state: StudioState) -> StudioState:
-        """The design of all sliders; a slider may show rounded what stays as it is."""
-        with self._lock:
-            assert self._base is not None
-            values = {
-                parameter.name: field.value * parameter.scale
-                for parameter, field in self._rows
-                if field.value != parameter.shown
+    def draw_bars(state: StudioState, found: Found) -> None:
+        slopes, drawn = found.slopes, dict.fromkeys(bars, NO_BAR * _has_bars(state, found))
+        if slopes is not None:
+            sliders = {
+                each.name: (each, rows[each.name].ends[1] - rows[each.name].ends[0])
+                for each in shown
             }
-            self._refused = True
-            new = state.replace(design=changed(self._base, values))
-            self._refused, self._made = False, new.design
-        return new
+            drawn |= slope_bars(slopes, sliders, old=slopes.arm != state.design)
+        for name, line in bars.items():
+            line.show(drawn[name])
 
-    def _words(self, error: SoftreachError) -> str:
-        rows = [parameter for parameter, _ in self._rows]
-        return refusal(error, rows, self._session.state.design)
+    panel.follow("found.ends", show=end)
+    panel.follow("design", "found.slopes", "found.ends", show=draw_bars)
+
+
+def _has_bars(state: StudioState, found: Found) -> bool:
+    """True if there is a volume to change, as far as that is known."""
+    slopes = found.slopes
+    return rod_of(state.design).box.dimension > 2 if slopes is None else bool(slopes.slopes)
 
 
 @cache
@@ -157,3 +119,291 @@ def _name(state: StudioState) -> str:
 
 def _named(state: StudioState, name: str) -> StudioState:
     return state.replace(design=_designs()[name]) if name else state
+
+
+# Rings and actuators
+
+_AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
+_NEW_RING = "ring"
+_ABOUT_MADE_OF = "Material of all rings, which an actuator that pulls with a force needs"
+_OFFER = (
+    "A {kind} needs Young's modulus E, which this arm leaves open: choose what it is made of, and "
+    "press Add again."
+)
+_NAME = TextKind("a name", lambda text: text.strip() or None, str)
+_ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
+
+
+def arm_parts(panel: Fields) -> None:
+    """A list of parts, the fields of the one that is chosen, and new parts."""
+    session = panel.session
+    with panel.folder("add a part", expanded=False):
+        kinds = (*edits.ACTUATOR_KINDS, _NEW_RING)
+        hint = "An actuator, or a ring of the cross-section"
+        kind = panel.gui.add_dropdown("kind", kinds, hint=hint)
+        made_of = panel.gui.add_dropdown(
+            "made of", tuple(material_names()), hint=_ABOUT_MADE_OF, visible=False
+        )
+
+        def add() -> None:
+            """Where the arm lacks the modulus for it, offer a material first."""
+            arm = session.state.design
+            lacking = _lacks_material(arm, kind.value)
+            made_of.visible = lacking and not made_of.visible
+            offer.warn(_OFFER.format(kind=kind.value) if made_of.visible else "")
+            if not made_of.visible:
+                matter = made_of.value if lacking else ""
+                panel.apply(lambda state: _with_part(state, kind.value, matter))
+            if session.state.design != arm:
+                session.learn({"part": _place_of_new(session.state.design, kind.value)})
+
+        panel.button("Add", add, "Adds this part, with numbers to be changed below")
+        offer = Line(panel.gui)
+    with panel.folder("part") as folder:
+        pass
+    message = panel.kept(Line(panel.gui))
+
+    def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
+        fields.message = message
+        _part(fields, *chosen[:2])
+
+    def words(error: SoftreachError) -> str:
+        arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
+        return refusal(error, part_parameters(arm, known[label]), arm)
+
+    panel.anew(folder, "design", "found.part", key=_chosen, build=build, words=words)
+
+
+def _with_part(state: StudioState, kind: str, matter: str) -> StudioState:
+    arm = edits.with_material(state.design, matter) if matter else state.design
+    new = edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
+    return state.replace(design=new)
+
+
+def _place_of_new(arm: Manipulator, kind: str) -> int:
+    """Number of a part that was just added, in the list of parts."""
+    known = [part for label, part in parts(arm).items() if label != "body"]
+    rings = [k for k, part in enumerate(known) if part.ring is not None]
+    return rings[-1] if kind == _NEW_RING else len(known) - 1
+
+
+def _lacks_material(arm: Manipulator, kind: str) -> bool:
+    try:
+        _ = kind == _NEW_RING or edits.with_actuator(arm, kind)
+    except InvalidDesign as error:
+        return any(
+            fault.value is None and fault.path.endswith("young_modulus") for fault in error.faults
+        )
+    return False
+
+
+def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, object]:
+    """The parts by their labels, the label of the chosen one, and names of its numbers."""
+    known = {label: part for label, part in parts(state.design).items() if label != "body"}
+    label = [*known][min(found.part, len(known) - 1)]
+    return known, label, [each.name for each in part_parameters(state.design, known[label])]
+
+
+def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
+    """The fields of the part that is chosen."""
+    session, part, labels = panel.session, known[label], tuple(known)
+    chosen = Attribute(
+        lambda found: min(found.part, len(labels) - 1),
+        lambda found, number: replace(found, part=number),
+        "found",
+    )
+    hint = "The part whose numbers are below"
+    panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
+    own = part.ring is not None or bool(part.actuator)
+    if own:
+        at = of_design(lambda _: part.name, lambda arm, name: _renamed(arm, part, name))
+        hint = "What tables and files call it"
+        panel.bind(TypedField(panel.gui, "name", part.name, hint, _NAME), at)
+    _add_matter(panel, part)
+    _typed(panel, part_parameters(session.state.design, part))
+    if own:
+        remove = lambda state: state.replace(design=_without(state.design, part))
+        panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
+
+
+def _add_matter(panel: Fields, part: Part) -> None:
+    """What a ring is made of, and the ring that an actuator is in."""
+    ring, arm = part.ring, panel.session.state.design
+    if ring is not None:
+        of_ring = of_design(
+            lambda arm: arm.section.rings[ring].material.name,
+            lambda arm, name: edits.with_ring_material(arm, ring, name) if name else arm,
+        )
+        _material(panel, "material", _AS_TYPED, of_ring)
+    if ring == 0:
+        core = lambda arm: arm.section.core.name if arm.section.core else ""
+        _material(panel, "core", _AS_INNERMOST, of_design(core, edits.with_core))
+    if part.home is not None and len(arm.section.rings) > 1:
+        rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}
+        at = of_design(
+            lambda arm: arm.section.rings.index(arm.section.ring(_home(arm, part))),
+            lambda arm, ring: edits.with_actuator_ring(arm, part.actuator, ring),
+        )
+        panel.dropdown("in ring", rings, at, "The ring that it lies in")
+
+
+def _material(panel: Fields, label: str, none: str, at: Attribute) -> None:
+    names = {"": none} | {name: name for name in material_names()}
+    known = at._replace(read=lambda state: name if (name := at.read(state)) in names else "")
+    panel.dropdown(label, names, known, _ABOUT_MATERIAL)
+
+
+def _home(arm: Manipulator, part: Part) -> int | str:
+    return next(one.home or 0 for one in parts(arm).values() if one.actuator == part.actuator)
+
+
+def _renamed(arm: Manipulator, part: Part, name: str) -> Manipulator:
+    if part.ring is not None:
+        return edits.with_ring_name(arm, part.ring, name)
+    return edits.with_actuator_name(arm, part.actuator, name)
+
+
+def _without(arm: Manipulator, part: Part) -> Manipulator:
+    if part.ring is not None:
+        return edits.without_ring(arm, part.ring)
+    return edits.without_actuator(arm, part.actuator)
+
+
+# Base and loads
+
+_WAYS = {name: name for name in POINTS} | {
+    "up": "up (upright)",
+    "down": "down (hanging)",
+    "": "as the file says",
+}
+_NONE = Loads(gravity=GRAVITIES["none"])
+_MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
+_SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
+_LOADS = {
+    "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
+    "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
+    "payload_arm": (
+        "lever arm",
+        "mm",
+        1e-3,
+        "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
+    ),
+    "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
+}
+"""Loads that are typed: field -> label, unit, SI units per unit, and meaning."""
+
+
+def loads(panel: Fields) -> None:
+    """Base, gravity, a payload and a force on the tip, as they are typed."""
+    loaded = panel.session.state.design.loads is not None
+    with panel.folder("base and loads", expanded=loaded):
+        way = "Which way the straight arm points from its base, in the world"
+        points = of_design(
+            lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
+            lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
+        )
+        panel.dropdown("base", _WAYS, points, way)
+        where = "r(0): where the arm is clamped, as x, y, z in the world"
+        panel.vector("base at [mm]", base_field("position"), where)
+        turn = "ψ: turn of the base about the way the arm points"
+        panel.number("turn [deg]", base_field("turn"), turn)
+        names = {name: name for name in GRAVITIES} | {"": "as typed"}
+        gravity = load_field("gravity")
+        fall = Attribute(
+            gravity_name,
+            lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
+        )
+        falls = "Which way things fall in the world; the base says how the arm stands in it"
+        panel.dropdown("gravity", names, fall, falls)
+        for name, (label, unit, _, hint) in _LOADS.items():
+            add = panel.number if name == "payload" else panel.vector
+            add(f"{label} [{unit}]", load_field(name), hint)
+        panel.message = panel.kept(Line(panel.gui))
+        panel.change(
+            "Take all loads off",
+            lambda state: state.replace(design=state.design.replace(loads=None)),
+            "Gravity, payload and all forces",
+            lambda state, _: state.design.loads is not None,
+            **GRAY,
+        )
+        follows = "design", "found.tip", "found.pointing", "found.posture"
+        panel.text(
+            *follows, content=lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+        )
+
+        def others(state: StudioState, _: Found) -> list[str]:
+            more = ", ".join(other_loads(state.design))
+            return [f"From the design file act too: {more}."] if more else []
+
+        panel.text("design", content=others)
+
+
+def other_loads(arm: Manipulator) -> list[str]:
+    """Loads of a design that have no field, in words."""
+    loads = arm.loads or _NONE
+    names = ("tip_moment", "follower_force", "follower_moment", "force_per_length")
+    others = [name.replace("_", " ") for name in names if any(getattr(loads, name))]
+    count = len(loads.point_loads)
+    return others + ([f"point loads ({count})"] if count else [])
+
+
+def gravity_name(state: StudioState) -> str:
+    """Name of the gravity in the list of directions; "" for any other."""
+    gravity = (state.design.loads or _NONE).gravity
+    return next((name for name, known in GRAVITIES.items() if known == gravity), "")
+
+
+def base_field(name: str) -> Attribute:
+    """Position in mm, or turn in degrees."""
+    scale = math.radians(1.0) if name == "turn" else 1e-3
+    return of_design(
+        lambda arm: _over(getattr(arm.base, name), scale),
+        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale)})),
+    )
+
+
+def load_field(name: str) -> Attribute:
+    """A load in the unit that is typed; other loads stay, and without any the arm has no loads.
+
+    Writing raises:
+        InvalidInput: A number that no load can have.
+        InvalidDesign: Matter that lacks what loads need, and where to give it.
+    """
+    label, unit, scale, _ = _LOADS[name]
+    low = 0.0 if name == "payload" else -_MOST
+
+    def write(arm: Manipulator, value: Any) -> Manipulator:
+        for number in value if isinstance(value, tuple) else (value,):
+            if not low <= number <= _MOST:
+                allowed = f"{low:,.0f} to {_MOST:,.0f} {unit}"
+                raise InvalidInput(label, f"{number:g} {unit}", allowed)
+        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale)})
+        try:
+            return arm.replace(loads=None if loads == _NONE else loads)
+        except InvalidDesign as error:
+            raise _in_words(error) from None
+
+    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale), write)
+
+
+def _times(value: Any, scale: float) -> Any:
+    return vector(scale * v for v in value) if isinstance(value, tuple) else scale * value
+
+
+def _over(value: Any, scale: float) -> Any:
+    if isinstance(value, tuple):
+        return vector(_over(each, scale) for each in value)
+    return value if scale == 1.0 else float(f"{value / scale:.10g}")
+
+
+def _in_words(error: InvalidDesign) -> InvalidDesign:
+    """Moduli and densities that loads need and an arm lacks, in one line."""
+    lacking: dict[str, list[str]] = {}
+    for fault in error.faults:
+        owner, _, field = fault.path.rpartition(".")
+        if field not in _SYMBOLS:
+            return in_file_terms(error, "")
+        lacking.setdefault(owner_label(owner), []).append(_SYMBOLS[field])
+    needed = "; ".join(f"{' and '.join(what)} of {owner}" for owner, what in lacking.items())
+    line = f"need {needed}: choose a material or type the numbers on the tab Parts"
+    return InvalidDesign([Fault("loads", None, line)])

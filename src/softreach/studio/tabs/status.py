@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from softreach.studio import markup
 from softreach.studio.captions import legend_text, loaded_share, reach_text
-from softreach.studio.fields import attempt, bind_button
-from softreach.studio.markup import Part, Strong, fields_style
-from softreach.studio.needs import verdict_text
-from softreach.studio.scene.clouds import key_html
-from softreach.studio.widgets import Line, show_where
-
-if TYPE_CHECKING:
-    from viser import GuiApi
-
-    from softreach.studio.session import Session
+from softreach.studio.fields import Fields
+from softreach.studio.found import Found
+from softreach.studio.markup import Part, Strong
+from softreach.studio.scene.colors import key_html
+from softreach.studio.session import Session
+from softreach.studio.state import StudioState
+from softreach.studio.tabs.goals import verdict_text
 
 _HISTORY_HINT = (
     "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
@@ -25,80 +19,76 @@ _HISTORY_HINT = (
 _NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
 _ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
+_WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.compiled", "tab.canceled"
 
 
-class StatusPanel:
-    """Numbers, key and notes above all tabs."""
+def status(panel: Fields) -> None:
+    """Numbers, key and notes above all tabs; keys of the page press undo and redo."""
+    session = panel.session
+    known = "found.reach", "found.free", "found.check", "found.key", "found.refusal"
+    panel.html("design", *known, *_WORK, content=lambda _, found: _numbers(session, found))
+    cancel = panel.button(
+        _CANCEL,
+        lambda: (session.cancel if session.busy else session.resume)(),
+        _ABOUT_CANCEL,
+        visible=False,
+    )
 
-    def __init__(self, gui: GuiApi, session: Session) -> None:
-        Line(gui).show(fields_style())
-        self._known = Line(gui, "computing ...")
-        self._note, self._toast = "", None
-        self._cancel = gui.add_button(_CANCEL, visible=False, hint=_ABOUT_CANCEL)
-        bind_button(
-            self._cancel, session, lambda: (session.cancel if session.busy else session.resume)()
+    def offer(_: StudioState, found: Found) -> None:
+        lacking = is_behind(session) and not found.refusal
+        label = _GO_ON if lacking and not session.busy else _CANCEL
+        if cancel.label != label:
+            cancel.label = label
+        if cancel.visible != (session.busy or lacking):
+            cancel.visible = not cancel.visible
+
+    panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
+    toast = None
+
+    def note(_: StudioState, __: Found) -> None:
+        nonlocal toast
+        if toast is not None:
+            toast.remove()
+        toast = session.note and session.client.add_notification(
+            "", session.note, auto_close_seconds=_NOTE_SECONDS
         )
+        toast = toast or None
 
-    def show(self, session: Session) -> None:
-        """Show what is known, and whether it is about to change."""
-        check = session.found.check
-        lines = [_numbers_text(session), [verdict_text(check)] if check is not None else []]
-        marks = [markup.paragraph(*line) for line in _marks(session)]
-        self._known.show(
-            markup.status(
-                *(markup.paragraph(*line) for line in lines),
-                key_html(session.found.key),
-                *marks,
-            )
-        )
-        self._tell(session)
-        self._offer(session)
-
-    def _tell(self, session: Session) -> None:
-        if session.note == self._note:
-            return
-        self._note = session.note
-        if self._toast is not None:
-            self._toast.remove()
-        self._toast = (
-            session.client.add_notification("", self._note, auto_close_seconds=_NOTE_SECONDS)
-            if self._note
-            else None
-        )
-
-    def _offer(self, session: Session) -> None:
-        busy, lacking = session.busy, is_behind(session) and not session.found.refusal
-        label = _GO_ON if lacking and not busy else _CANCEL
-        if self._cancel.label != label:
-            self._cancel.label = label
-        show_where(busy or lacking, self._cancel)
+    panel.follow("tab.note", show=note)
+    actions = {
+        "Undo": lambda: session.step(back=True),
+        "Redo": lambda: session.step(back=False),
+        "Reset": session.reset,
+    }
+    panel.choices("history", actions, _HISTORY_HINT)
 
 
-def _marks(session: Session) -> list[list[Part]]:
-    reach = session.found.reach
-    if reach is None:
-        return []
-    free = session.found.free is not None
-    lines = [legend_text(reach, free=free)]
-    if reach.refusal:
-        lines.append([f"No exact volume: {reach.refusal}"])
-    if reach.fine and reach.notes:
-        lines.append([f"{'; '.join(reach.notes)}."])
-    return lines
+def _numbers(session: Session, found: Found) -> str:
+    """What is known, and whether it is about to change."""
+    check, reach = found.check, found.reach
+    lines = [_reach_line(session), [verdict_text(check)] if check is not None else []]
+    marks: list[list[Part]] = []
+    if reach is not None:
+        marks.append(legend_text(reach, free=found.free is not None))
+        if reach.refusal:
+            marks.append([f"No exact volume: {reach.refusal}"])
+        if reach.fine and reach.notes:
+            marks.append([f"{'; '.join(reach.notes)}."])
+    above, below = ([markup.paragraph(*line) for line in each] for each in (lines, marks))
+    return markup.status(*above, key_html(found.key), *below)
 
 
 def is_behind(session: Session) -> bool:
     """True if results of the design in the fields are missing."""
-    reach = session.found.reach
-    return reach is None or reach.arm != session.state.design or not reach.fine
+    return session.found.complete_reach(session.state.design) is None
 
 
-def _numbers_text(session: Session) -> list[Part]:
-    reach, work = session.found.reach, _work(session)
-    if reach is None:
-        return [session.found.refusal or work]
-    parts = reach_text(reach, loaded_share(session.found, session.state.design))
-    if reach.arm != session.state.design:
+def _reach_line(session: Session) -> list[Part]:
+    found, design, work = session.found, session.state.design, _work(session)
+    if found.reach is None:
+        return [found.refusal or work]
+    parts = reach_text(found.reach, loaded_share(found, design))
+    if found.reach.arm != design:
         parts = [Strong("of the design before: "), *parts]
     return [*parts, *([f" · {work}"] if work else [])]
 
@@ -114,14 +104,3 @@ def _work(session: Session) -> str:
     if session.busy:
         return "computing ..."
     return "canceled" if session.canceled else "not computed"
-
-
-def add_history(gui: GuiApi, session: Session) -> None:
-    """Add undo, redo and reset; keys of the page press the first two."""
-    actions: dict[str, Callable[[], None]] = {
-        "Undo": lambda: session.step(back=True),
-        "Redo": lambda: session.step(back=False),
-        "Reset": session.reset,
-    }
-    row = gui.add_button_group("history", tuple(actions), hint=_HISTORY_HINT)
-    row.on_click(lambda _: attempt(session, actions[row.value]))

@@ -1,20 +1,18 @@
-"""View of the scene: colors, slice, surfaces, camera."""
+"""Looks of a tab: colors, slice, surfaces, camera, and the plots beside the scene."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from operator import attrgetter
 
-from softreach.studio.fields import Attribute, Fields, attribute, bind_button
+from softreach.studio.fields import Attribute, Fields, attribute
+from softreach.studio.figures import Picture, swept_parameter
+from softreach.studio.found import Found
 from softreach.studio.scene.camera import VIEWS
-from softreach.studio.scene.clouds import color_names
+from softreach.studio.scene.colors import color_names
+from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
-from softreach.studio.widgets import show_where
-
-if TYPE_CHECKING:
-    from viser import GuiApi
-
-    from softreach.studio.session import Session
-    from softreach.support.units import LengthUnit
+from softreach.support.units import LengthUnit
 
 _ACROSS = {axis: axis for axis in ("none", "x", "y", "z")}
 _TOGGLES = {
@@ -26,68 +24,120 @@ _TOGGLES = {
 }
 
 
-class ViewPanel:
+def view(panel: Fields) -> None:
     """Fields of the appearance."""
-
-    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._fields = fields = Fields(session)
-        with tab:
-            fields.dropdown(
-                "color by",
-                lambda state: color_names(state.design),
-                Attribute(_color, lambda state, name: state.showing(color=name)),
-                "What the color of a point says; the key is above the tabs",
-            )
-            with gui.add_folder("show"):
-                for name, (label, hint) in _TOGGLES.items():
-                    fields.checkbox(label, attribute(f"appearance.{name}"), hint)
-            views = gui.add_button_group(
-                "look from", tuple(VIEWS), hint="Along an axis of the world, or between them"
-            )
-            fields.dropdown(
-                "slice across",
-                _ACROSS,
-                attribute("appearance.slice.axis"),
-                "Hides all but a slab across this axis",
-            )
-            self._slab = gui.add_folder("slab", visible=False)
-        self._session, self._centers = session, Fields(session)
-        self._unit: LengthUnit | None = None
-        bind_button(views, session, lambda: session.look_from(views.value))
-
-    def show(self, session: Session) -> None:
-        """Bring the widgets in line with the state."""
-        self._fields.show(session)
-        if session.state.design.length_unit != self._unit:
-            self._add_center(session.state)
-        self._centers.show(session)
-        show_where(session.state.appearance.slice.axis != "none", self._slab)
-
-    def _add_center(self, state: StudioState) -> None:
-        """The middle of the slab, in the unit of the design that there is now."""
-        self._unit = state.design.length_unit
-        size = state.design.length / self._unit.size
-        self._centers.remove()
-        self._centers = Fields(self._session)
-        with self._slab:
-            ends, hint = (-1.5 * size, 1.5 * size), "Middle of the slab along the axis"
-            self._centers.slider(self._unit.label("center"), ends, 0.01 * size, _CENTER, hint)
+    panel.dropdown(
+        "color by",
+        lambda state: color_names(state.design),
+        Attribute(_color, lambda state, name: state.showing(color=name)),
+        "What the color of a point says; the key is above the tabs",
+    )
+    with panel.folder("show"):
+        for name, (label, hint) in _TOGGLES.items():
+            panel.checkbox(label, attribute(f"appearance.{name}"), hint)
+    looks = {name: lambda name=name: panel.session.look_from(name) for name in VIEWS}
+    panel.choices("look from", looks, "Along an axis of the world, or between them")
+    axis = attribute("appearance.slice.axis")
+    panel.dropdown("slice across", _ACROSS, axis, "Hides all but a slab across this axis")
+    with panel.folder("slab", lambda state, _: axis.read(state) != "none") as slab:
+        size = lambda state, _: (state.design.length_unit, state.design.length)
+        panel.anew(slab, "design", key=size, build=_center)
 
 
-def _centered(state: StudioState, value: float) -> StudioState:
-    center = value * state.design.length_unit.size / state.design.length
-    return attribute("appearance.slice.center").write(state, center)
-
-
-_CENTER = Attribute(
-    lambda state: float(
-        f"{state.appearance.slice.center * state.design.length / state.design.length_unit.size:.9g}"
-    ),
-    _centered,
-)
+def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
+    """The middle of the slab, in the unit of the design."""
+    (unit, length), center = size, attribute("appearance.slice.center")
+    over = length / unit.size
+    at = Attribute(
+        lambda state: float(f"{over * center.read(state):.9g}"),
+        lambda state, value: center.write(state, value / over),
+    )
+    ends = -1.5 * over, 1.5 * over
+    panel.slider(unit.label("center"), ends, 0.01 * over, at, "Middle of the slab along the axis")
 
 
 def _color(state: StudioState) -> str:
     """The color that is shown: a design may have none of the one that is asked for."""
     color = state.appearance.color
     return color if color in color_names(state.design) else "rgb"
+
+
+# Plots beside the scene
+
+_HINT = (
+    "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
+    "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
+)
+_PLOTS = {
+    "section": (
+        "section",
+        "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
+        "boundary, and how many activations reach each place",
+    ),
+    "sweep": (
+        "V against parameter",
+        "Volume of designs that differ from this one in one parameter, computed as you look",
+    ),
+}
+_WIDTH = 380  # pixels
+_COMPUTING = "computing ..."
+
+
+def plots(panel: Fields) -> None:
+    """Check boxes in the tab; a folder for each plot in the window."""
+    panel.say(_HINT)
+    for name, (label, hint) in _PLOTS.items():
+        panel.checkbox(label, _switch(name), hint)
+    about = "What changes in the plot of V against a parameter"
+    panel.dropdown("parameter", _offered, Attribute(_swept, _sweeping), about)
+    window = panel.gui.add_panel(visible=False)
+
+    def place(state: StudioState, _: Found) -> None:
+        shown = bool(state.appearance.plots.shown)
+        if shown and not window.visible:
+            window.visible = True
+            window.dock_left()  # a page forgets where a hidden window was
+            window.set_width(_WIDTH)
+        window.visible = shown
+
+    panel.follow("appearance.plots", show=place)
+    with window.add_tab("Figures"):
+        for name in _PLOTS:
+            _figure(panel, name)
+
+
+def _figure(panel: Fields, name: str) -> None:
+    """A folder with a picture and a line on it."""
+    known: Callable[[Found], Picture | None] = attrgetter(name)
+
+    def text(state: StudioState, found: Found) -> tuple[str, ...]:
+        picture = known(found)
+        if picture is None:
+            return (_COMPUTING,)
+        old = picture.arm != state.design
+        return (picture.text, " · of the design before, computing ..." if old else "")
+
+    shown = lambda state, _: name in state.appearance.plots.shown
+    with panel.folder(_PLOTS[name][0], shown) as folder:
+        panel.text("design", f"found.{name}", content=text)
+    panel.picture(folder, f"found.{name}", image=lambda _, f: (p := known(f)) and p.image)
+
+
+def _switch(name: str) -> Attribute:
+    return Attribute(
+        lambda state: name in state.appearance.plots.shown,
+        lambda state, on: state.showing(plots=state.appearance.plots.showing(name, on)),
+    )
+
+
+def _offered(state: StudioState) -> dict[str, str]:
+    return {slider.name: slider.label for slider in slider_parameters(state.design)} or {"": ""}
+
+
+def _swept(state: StudioState) -> str:
+    parameter = swept_parameter(state)
+    return "" if parameter is None else parameter.name
+
+
+def _sweeping(state: StudioState, name: str) -> StudioState:
+    return state.showing(plots=state.appearance.plots.showing("sweep", parameter=name))

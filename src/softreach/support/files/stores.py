@@ -23,7 +23,7 @@ import google_crc32c
 from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
 
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.files.atomic import place_to_read, sync
+from softreach.support.files.atomic import sync
 
 if TYPE_CHECKING:
     import zarr
@@ -364,7 +364,7 @@ def attributes_of(path: str | os.PathLike[str]) -> Mapping[str, Any]:
         InvalidInput: No store of softreach.
     """
     try:
-        return unsealed(Path(place_to_read(path), ROOT).read_bytes())
+        return unsealed(Path(path, ROOT).read_bytes())
     except (OSError, ValueError) as error:
         raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], str(error)) from None
 

@@ -1,0 +1,284 @@
+"""`softreach calibrate` and `plan-poses`: the arm on the bench from measured poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from softreach.cli import options
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.values import Number, Whole, as_read, pairs_in, read_positive
+from softreach.support.errors import InvalidInput
+from softreach.support.units import TYPED, read_length
+
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
+    from softreach.arm.written import Written
+    from softreach.calibration import Calibration, PlacementErrors
+    from softreach.calibration.free_numbers import FreeNumber
+    from softreach.support.units import LengthUnit
+
+_COLUMNS = Group("Column names", sort_key=1)
+Free = Annotated[
+    list[str],
+    Parameter(
+        help="Numbers that may change, comma-separated: names of softreach list parameters DESIGN, "
+        "with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for "
+        "the base. May be repeated.",
+    ),
+]
+_POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
+
+
+def calibrate(
+    design: options.Design,
+    data: Path,
+    /,
+    *,
+    free: Free,
+    prior: list[str] | None = None,
+    hold_out: Number = 0.0,
+    noise: str | None = None,
+    robust: Annotated[bool, Parameter(negative="--no-robust")] = True,
+    rivals: Annotated[bool, Parameter(negative="--no-rivals")] = True,
+    seed: Whole = 0,
+    inputs: Annotated[list[str] | None, Parameter(name="--input", group=_COLUMNS)] = None,
+    markers: Annotated[list[str] | None, Parameter(name="--marker", group=_COLUMNS)] = None,
+    run: Annotated[str | None, Parameter(group=_COLUMNS)] = None,
+    order: Annotated[str | None, Parameter(group=_COLUMNS)] = None,
+    changes: Changes = UNCHANGED,
+    out: options.Out = None,
+    report: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
+    table: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> None:
+    """Fit numbers of a design to measured poses, with honest errors.
+
+    Prints the numbers with their standard deviations, the error of predicted
+    places beside that of simpler laws, and what limits the fit.
+
+    Example: softreach calibrate arm.toml poses.csv --free pose --free "rings*modulus" -o bench.toml
+
+    Args:
+        data: Measured poses (.csv .parquet): a column for each input and x, y, z of each marker,
+            with units in their names, such as tension1_N and tip_x_mm.
+        prior: What is known of a number beforehand, its width about the value of the design or
+            MEAN:WIDTH: taper=1deg, rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
+        hold_out: Fraction of samples held out at random.
+        noise: Standard deviation of a measured coordinate, against which priors are weighed: 0.2mm.
+            That of the residuals if left out.
+        robust: Down-weight outliers.
+        rivals: Fit constant curvature and a quadratic law beside it.
+        seed: Seed of the held-out samples.
+        inputs: Column of an input: "tendon 1=tension1_N". May be repeated.
+        markers: Start of the columns of a marker: tip=disk3. May be repeated.
+        run: Column that groups samples into runs, if not run.
+        order: Column to sort by, if not time_s.
+        out: Write the calibrated design to this TOML file.
+        report: Write a report with pictures to this .html file.
+        table: Write what was predicted and missed to this .csv file.
+    """
+    from softreach import calibration
+    from softreach.arm.design_file import DESIGN_FILE
+    from softreach.support import progress
+    from softreach.support.files.formats import TABLES
+    from softreach.support.files.text import write_table
+    from softreach.support.report import REPORT
+
+    arm = design_from(design, changes, unit)
+    outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
+    for path, formats in outputs or [(None, {})]:
+        options.check_output(path, formats, overwrite)
+    with progress.bar("fitting", None) as step:
+        result = calibration.calibrate(
+            arm,
+            data,
+            free=free_names(arm, free),
+            prior=priors(arm, prior or ()),
+            hold_out=hold_out,
+            noise=None if noise is None else _noise(noise),
+            robust=robust,
+            rivals=rivals,
+            inputs=pairs_in("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"') or None,
+            markers=pairs_in("marker", markers, "NAME=START, such as tip=disk3") or None,
+            run=run,
+            order=order,
+            seed=seed,
+            progress=step,
+        )
+    if json:
+        console.json(_record(result))
+    else:
+        console.line(f"calibration of {design}: {result.report(arm.length_unit.name)}")
+    if out is not None:
+        result.save(out, overwrite=overwrite)
+    if table is not None:
+        write_table(table, result.table(options.written_unit(arm).name), overwrite=overwrite)
+        console.written(table, options.written_unit(arm))
+    if report is not None:
+        result.report(arm.length_unit.name).save(report, overwrite=overwrite)
+
+
+def _noise(text: str) -> float:
+    return read_positive("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})")
+
+
+def _record(result: Calibration) -> dict[str, Any]:
+    """All of it for machines: lengths in m, angles in degrees."""
+    fit, held = result.fit, result.held
+    rows = zip(fit.free.numbers, result.values.values(), fit.at_bound.tolist(), strict=True)
+    return {
+        "samples": len(result.data),
+        "held_out": int(held.sum()),
+        "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
+        "numbers": [
+            _number(number, result.sigma, value) | {"at_bound": at_bound}
+            for number, value, at_bound in rows
+        ],
+        "errors": [
+            {"law": row.law, "samples": row.samples, **_errors(row.errors)} for row in result.errors
+        ],
+        "correlated": result.correlated,
+        "outlier_rows": result.outliers,
+        "repeatability_rms_m": result.repeatability.rms,
+        "repeated_samples": result.repeatability.pairs,
+        "limit": result.verdict.limit,
+        "verdict": result.verdict.sentence,
+        "converged": fit.converged,
+        "seconds": result.seconds,
+        "data": result.data.source,
+        "data_sha256": result.data.digest,
+    }
+
+
+def _number(number: FreeNumber, sigma: Mapping[str, float], value: float) -> dict[str, Any]:
+    read, unit = as_read(value, number.unit)
+    start, width = (as_read(x, number.unit)[0] for x in (number.start, sigma[number.name]))
+    return {"number": number.name, "value": read, "sigma": width, "start": start, "unit": unit}
+
+
+def _errors(errors: PlacementErrors) -> dict[str, float]:
+    keys = ("median_m", "mean_m", "rms_m", "below_95_percent_m", "places")
+    return dict(zip(keys, errors, strict=True))
+
+
+def plan_poses(
+    design: options.Design,
+    /,
+    *,
+    free: Free,
+    n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 20,
+    noise: str = "1mm",
+    markers: str | None = None,
+    candidates: Whole = 2000,
+    seed: Whole = 0,
+    changes: Changes = UNCHANGED,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> None:
+    """Choose the poses to measure for a calibration.
+
+    Prints how well the free numbers will be known. The CSV file has a row for
+    each pose, in the order in which to take them, with empty columns for the
+    places of the markers; softreach calibrate reads it once it is filled in.
+
+    Example: softreach plan-poses arm.toml --free pose --free "rings*modulus" -o poses.csv
+
+    Args:
+        n: Number of poses.
+        noise: Standard deviation of a measured coordinate, with model error.
+        markers: Markers that will be measured, comma-separated: all if left out.
+        candidates: Number of poses to choose from.
+        seed: Seed of candidates and of their order.
+        out: Write the poses as a CSV file to fill in.
+    """
+    from softreach import calibration
+    from softreach.support.files.formats import TABLES
+    from softreach.support.quantity import columns
+
+    arm = design_from(design, changes, unit)
+    width = _noise(noise)
+    options.check_output(out, TABLES, overwrite)
+    plan = calibration.plan_poses(
+        arm,
+        free_names(arm, free),
+        n,
+        markers=None if markers is None else [name.strip() for name in markers.split(",")],
+        candidates=candidates,
+        seed=seed,
+    )
+    sigma = plan.sigma(width)
+    if json:
+        numbers = [_number(number, sigma, number.start) for number in plan.free.numbers]
+        names = arm.input_names
+        found = {"noise_m": width, "inputs": names, "poses": plan.activations, "numbers": numbers}
+        console.json(found)
+    else:
+        seen = ", ".join(plan.markers)
+        console.line(
+            f"{n} poses of {design} with {seen}, "
+            f"noise {arm.length_unit.rounded(width, digits='.6g')}"
+        )
+        rows = _rows(plan.free.numbers, sigma.values(), arm.length_unit)
+        for line in columns([("number", "to be known", "share"), *rows]):
+            console.line(f"  {line}")
+    if out is not None:
+        plan.save(out, overwrite=overwrite)
+
+
+def _rows(
+    numbers: Iterable[FreeNumber], sigma: Iterable[float], unit: LengthUnit
+) -> Iterator[tuple[str, str, str]]:
+    from softreach.support.quantity import quantity
+    from softreach.support.units import readable_unit
+
+    for number, width in zip(numbers, sigma, strict=True):
+        name, size = readable_unit(number.unit, number.start, unit)
+        share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
+        yield number.name, quantity(number.start / size, name, width / size, digits=2), share
+
+
+def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
+    """Names of free numbers as Python takes them, from names that may have their units."""
+    from softreach.arm.written import Written
+
+    names = Written.of(arm)
+    given = [name.strip() for text in texts for name in text.split(",")]
+    return [_tied(names, name) for name in given if name]
+
+
+def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Width, or mean and width, of numbers in their units by name, from NAME=MEAN:WIDTH.
+
+    Raises:
+        InvalidInput: Text that is anything else, or no such number.
+    """
+    from softreach.arm.written import Written
+
+    names, result = Written.of(arm), {}
+    allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
+    for name, text in pairs_in("prior", texts, allowed).items():
+        first = name.split("=")[0].strip()
+        unit = None if first not in _POSE else "m" if _POSE.index(first) < 3 else "rad"
+        if unit is None and first not in names.by_key:
+            raise InvalidInput("prior", name, "of a number that is free, by its full name")
+        try:
+            values = tuple(names.number(first, part, unit) for part in text.split(":"))
+        except ValueError:
+            allowed = names.allowed(first, unit)
+            raise InvalidInput(f"prior of {name}", text, allowed) from None
+        result[_tied(names, name)] = values
+    return result
+
+
+def _tied(names: Written, name: str) -> str:
+    parts = (part.strip() for part in name.split("="))
+    return " = ".join(names.by_key[x].name if x in names.by_key else x for x in parts)

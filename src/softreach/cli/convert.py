@@ -1,0 +1,166 @@
+"""`softreach export` and `import`: clouds, arms and designs of other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from softreach.cli import options
+from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
+from softreach.cli.console import console
+from softreach.cli.values import Number, Rows
+from softreach.support.errors import InvalidInput, NotPossible
+
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
+
+Format = Annotated[
+    str | None,
+    Parameter(help="activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."),
+]
+_OTHER = "for ActiveFilaments.jl, whose lengths are in m"
+
+
+def export(
+    source: options.Source,
+    out: Path,
+    /,
+    *,
+    activation: options.Activation = None,
+    format: Format = None,
+    changes: Changes = UNCHANGED,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+) -> None:
+    """Convert a cloud or an arm for other programs.
+
+    A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
+    A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
+    .glb .vtu), or the source of a filament of ActiveFilaments.jl (.jl).
+
+    Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
+
+    Args:
+        out: The file to write; its suffix chooses the format.
+    """
+    if format not in (None, "activefilaments"):
+        raise InvalidInput("format", format, "activefilaments, or left out")
+    if options.is_stored(source):
+        options.refuse("on a cloud, which has many", activation=activation)
+        options.refuse("on a stored cloud: give the design instead", **changes.given)
+        write = _export_pair if format else _export_cloud
+        write(source, out, overwrite, unit)
+    elif format is not None and out.suffix != ".jl":
+        raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
+    elif out.suffix == ".jl":
+        options.refuse("on a filament's definition, which has none", activation=activation)
+        _export_filament(design_from(source, changes), out, overwrite, unit)
+    else:
+        _export_arm(design_from(source, changes, unit), out, activation, overwrite)
+
+
+def _export_cloud(source: str, out: Path, overwrite: bool, unit: str | None) -> None:
+    from softreach.cloud.clouds import design_of, open_cloud
+    from softreach.export.clouds import CLOUD_FILES, export_cloud
+
+    options.check_output(out, CLOUD_FILES, overwrite)
+    cloud = open_cloud(source)
+    written = options.written_unit(shown_in(unit, design_of(cloud)))
+    export_cloud(cloud, out, unit=written, overwrite=overwrite)
+    console.written(out, written)
+    console.line(out)
+
+
+def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> None:
+    from softreach.cloud.clouds import open_cloud
+    from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
+
+    options.refuse(_OTHER, unit=unit)
+    written = out, gamma_path(out)
+    for path in written:
+        options.check_output(path, CLOUD_PAIR, overwrite)
+    write_cloud(open_cloud(source), out, overwrite=overwrite)
+    for path in written:
+        console.line(path)
+
+
+def _export_filament(arm: Manipulator, out: Path, overwrite: bool, unit: str | None) -> None:
+    from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
+
+    options.refuse(_OTHER, unit=unit)
+    options.check_output(out, FILAMENT_SCRIPT, overwrite)
+    write_design(arm, out, overwrite=overwrite)
+    console.line(out)
+
+
+def _export_arm(arm: Manipulator, out: Path, activation: str | None, overwrite: bool) -> None:
+    from softreach.export import export_arm
+    from softreach.export.surfaces import SURFACE_FILES
+
+    options.check_output(out, SURFACE_FILES, overwrite)
+    shape, written = options.shape_of(activation, arm), options.written_unit(arm)
+    export_arm(arm, shape, out, unit=written, overwrite=overwrite)
+    console.written(out, written)
+    console.line(out)
+
+
+def import_file(
+    source: Path,
+    out: Path,
+    /,
+    *,
+    design: str | None = None,
+    tol: Number | None = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> None:
+    """Convert a filament or a cloud of ActiveFilaments.jl.
+
+    The docs show how Julia writes a filament as JSON. A cloud is NAME.csv with
+    NAME_gamma.csv beside it; its tips are compared with softreach's own.
+
+    Example: softreach import filament.json filament.toml
+
+    Args:
+        source: Filament (.json), or cloud: NAME.csv of two files.
+        out: Design (.toml) or cloud (.zarr) to write.
+        design: Design that a cloud belongs to: .toml, .json or built-in.
+        tol: Largest error of the tips that a cloud is compared with, in L (1e-6).
+    """
+    from softreach.arm.design_file import DESIGN_FILE
+    from softreach.cloud.clouds import CLOUD_STORE, save_cloud
+    from softreach.exchange.activefilaments import read_cloud, read_design
+
+    rows: Rows
+    if source.suffix == ".json":
+        options.refuse("on a filament, only on a cloud", design=design, tol=tol)
+        options.check_output(out, DESIGN_FILE, overwrite)
+        arm = shown_in(unit, read_design(source))
+        arm.save(out, overwrite=overwrite)
+        rows = {
+            "length": (arm.length, "m"),
+            "rings": (len(arm.section.rings), ""),
+            "bundle names": (list(arm.bundle_names), ""),
+            "design": (str(out), ""),
+        }
+    elif source.suffix != ".csv":
+        raise InvalidInput("source", source, "a file name ending in .json or .csv")
+    elif design is None:
+        raise NotPossible("a cloud needs the design that it was computed for: --design NAME.toml")
+    else:
+        given = read_design(design) if design.endswith(".json") else design_from(design)
+        arm = shown_in(unit, given)
+        options.check_output(out, CLOUD_STORE, overwrite)
+        cloud = read_cloud(arm, source, tol=1e-6 if tol is None else tol)
+        save_cloud(cloud, out, overwrite=overwrite)
+        rows = {
+            "samples": (cloud.sizes["sample"], ""),
+            "largest difference of tips": (float(cloud.attrs["largest_tip_difference"]), "m"),
+            "cloud": (str(out), ""),
+        }
+    console.rows(
+        f"{'filament' if source.suffix == '.json' else 'cloud'} of {source}", rows, json, arm
+    )

@@ -1,0 +1,204 @@
+"""`softreach solve`, `track` and `equilibria`: activations that lead to places, and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from softreach.cli import options
+from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
+from softreach.cli.console import console
+from softreach.cli.values import Whole, activation_text, record
+from softreach.support.errors import NotPossible, counted
+from softreach.support.units import LengthUnit
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.arm.manipulator import Manipulator
+    from softreach.inverse import Solution
+    from softreach.rod import AllEquilibria
+
+_EXACT = 1e-6  # of L, the error of tips
+
+
+def solve(
+    design: options.Design,
+    /,
+    *,
+    target: Signed = None,
+    targets: Path | None = None,
+    within: str | None = None,
+    family: Whole | None = None,
+    changes: Changes = UNCHANGED,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> None:
+    """Find every activation that puts the tip at a target.
+
+    Where none does, the nearest point that can be reached and a bound on its
+    distance. Places are in the world: --base hanging turns the arm in it.
+
+    Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
+
+    Args:
+        target: Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.
+        targets: CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.
+        within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
+        family: With more than three free bundles: solutions for each target (1).
+    """
+    from softreach.inverse import solve_inverse
+    from softreach.inverse.request import length_in, position_in
+
+    if (target is None) == (targets is None):
+        raise NotPossible("give either --target or --targets")
+    arm = design_from(design, changes, unit)
+    if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
+        options.refuse("on up to three free bundles, where all solutions are found", family=family)
+    if targets is None:
+        points = [position_in("target", target or "", arm.length)]
+    else:
+        points = options.points_in("targets", targets, arm)
+    reach = 0.0 if within is None else length_in("within", within, arm.length)
+    count = 1 if family is None else family
+    solutions = solve_inverse(arm, points, within=reach, family=count)
+    if json:
+        lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
+        known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]
+        console.json([record(each, arm.length, *lengths) for each in known])
+        return
+    for solution in solutions:
+        _print(solution, arm, count)
+
+
+def _print(solution: Solution, arm: Manipulator, family: int) -> None:
+    unit = arm.length_unit
+    status = solution.status.name.lower().replace("_", " ")
+    if len(solution) and solution.gap > _EXACT * arm.length:
+        status += f" within {unit.rounded(solution.gap)}"
+    console.line(f"target {unit.place(solution.target)}: {status}")
+    numbers = solution.residuals, solution.conditions, solution.margins, solution.sheets
+    for gamma, residual, condition, margin, sheet in zip(
+        solution.activations, *numbers, strict=True
+    ):
+        quality = f"residual {unit.rounded(residual, digits='.1e')}"
+        quality += f", condition {condition:.3g}, margin {margin:.3g}" if gamma.size else ""
+        quality += ", in a posture that it does not take straight from rest" if sheet else ""
+        console.line(f"  {activation_text(arm, gamma)}  ({quality})")
+    if not len(solution):
+        least = unit.rounded(solution.gap_bound)
+        bound = f", proved to be at least {least}" if solution.gap_bound else ""
+        gap = unit.rounded(solution.gap)
+        console.line(f"  nearest {unit.place(solution.nearest)}, {gap} away{bound}")
+        console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
+    elif len(solution) < family:
+        known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
+        console.line(f"  no others found: further searches end at {known}")
+
+
+def track(
+    design: options.Design,
+    path: Path,
+    /,
+    *,
+    start: Signed = None,
+    changes: Changes = UNCHANGED,
+    out: Annotated[Path, options.OUT] = Path("activations.csv"),
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+) -> None:
+    """Follow a path of tip positions, and say where it ends.
+
+    The activations change continuously along the path and go into a CSV file.
+
+    Example: softreach track minimal_trunk path.csv --out activations.csv
+
+    Args:
+        path: CSV file with columns x, y, z, in order; m or as it says.
+        start: Activations to start from: -1,0,-0.5
+        out: CSV file for the activations.
+    """
+    from softreach.export.clouds import path_csv
+    from softreach.inverse.path import track_path
+    from softreach.support.files.formats import TABLES
+    from softreach.support.files.text import write_text
+
+    arm = design_from(design, changes, unit)
+    options.check_output(out, TABLES, overwrite)
+    first = None if start is None else options.activation_of(start, arm)
+    tracked = track_path(arm, options.points_in("path", path, arm), first)
+    write_text(out, path_csv(tracked), overwrite=overwrite)
+    followed = int((tracked.status == 0).sum())
+    share = f"{followed} of {tracked.sizes['point']} points followed"
+    console.line(f"{share}, up to {_end(tracked, arm.length_unit)}: {out}")
+
+
+def _end(tracked: xr.Dataset, unit: LengthUnit) -> str:
+    end = tracked.attrs["end"]
+    at = f"{unit.rounded(float(tracked.end_length), digits='.7g')} of path"
+    bundle, bound = tracked.attrs["end_bundle"], tracked.attrs["end_bound"]
+    error = unit.rounded(float(tracked.end_length_error), digits=".1g")
+    ends = {
+        "": "the end of the path",
+        "fold": f"{at}, where the branch turns back (a fold)",
+        "no_start": "nowhere: the first point is not reached",
+        "snaps": f"{at} (± {error}), where the arm snaps",
+    }
+    return ends.get(end, f"{at}, where {bundle} is at its {bound} bound")
+
+
+def equilibria(
+    design: options.Design,
+    /,
+    *,
+    activation: options.Activation = None,
+    view: options.View = None,
+    changes: Changes = UNCHANGED,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+    json: options.AsJson = False,
+) -> None:
+    """Find every equilibrium of a loaded arm at given activations.
+
+    Stable ones come first. The posture of the arm that hangs first is marked.
+
+    Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
+
+    Args:
+        out: Draw them: .png .pdf .svg, or .html to turn
+    """
+    from softreach.plot import plot_3d, plot_equilibria
+    from softreach.rod import equilibria as all_of
+
+    options.check_picture(out, overwrite, view=view, page=True)
+    arm = design_from(design, changes, unit)
+    result = all_of(arm, options.activation_of(activation, arm))
+    if json:
+        fields = vars(result) | {"status": _statuses(result), "degree": result.degree}
+        del fields["rod"], fields["solver"]
+        console.json(record(fields, arm.length, "tips"))
+    else:
+        _print_all(result, arm)
+    if out is not None:
+        look = {"view": view or "oblique", "unit": arm.length_unit}
+        page = options.is_page(out)
+        figure = plot_3d([result], **look) if page else plot_equilibria(result, **look)
+        options.save_picture(figure, out, overwrite)
+
+
+def _statuses(result: AllEquilibria) -> list[str]:
+    from softreach.rod import TipStatus
+
+    return [TipStatus(status).name.lower() for status in result.status]
+
+
+def _print_all(result: AllEquilibria, arm: Manipulator) -> None:
+    at = activation_text(arm, result.activation)
+    count = counted(len(result), "solution")
+    console.line(f"equilibria{f' at {at}' if at else ''}: {count}, degree {result.degree}")
+    for k, status in enumerate(_statuses(result)):
+        kind = f"{status}, any way around" if result.is_ring[k] else status
+        which = ", the posture" if k == result.followed else ""
+        tip = arm.length_unit.place(result.tips[k])
+        console.line(f"  tip {tip}: {kind}, margin {result.margin[k]:.3g}{which}")

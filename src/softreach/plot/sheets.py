@@ -1,0 +1,308 @@
+"""Sheets of an atlas, a small picture for each design, and all figures that it has numbers for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.atlas import DamagedStore, atlas_cloud, over_length
+from softreach.atlas.store import DONE
+from softreach.cloud.clouds import design_of
+from softreach.cloud.curvature import curvature_statistics
+from softreach.cloud.volume import concave_hull
+from softreach.geometry.hull import Hull
+from softreach.picture.projection import View, view_angles, view_axes
+from softreach.picture.shading import draw_mesh
+from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.plot.arm import plot_arm
+from softreach.plot.atlas import SheetAxis, plot_metric_map, sheet_axes
+from softreach.plot.axes import bounding_box, view_extent
+from softreach.plot.clouds import drawn_tips, plot_cloud, point_size
+from softreach.plot.coloring import bundle_activations, bundle_names, color_samples, draw_figure_key
+from softreach.plot.lengths import Unit, unit_of
+from softreach.plot.statistics import plot_curvature
+from softreach.plot.style import DPI, PAGE, as_box, figure_style, place_panels, pyplot
+from softreach.schema import a_cloud, is_stable
+from softreach.support import parallel
+from softreach.support.arguments import as_integer, as_mapping
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput, warn
+from softreach.support.palette import STEEL, activation_colors
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
+_VIEW = "oblique"  # of sheets
+_METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
+
+
+def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any]]:
+    """Name and figure (or axes) of each figure that an atlas has the numbers for.
+
+    They are drawn one after the other, so that few clouds are held at once.
+
+    Args:
+        atlas: A grid of two parameters, from `open_atlas`.
+        panels: Columns and rows of the sheets at most.
+    """
+    for metric in _METRICS:
+        if metric in atlas and np.isfinite(atlas[metric].values).any():
+            yield f"map_{metric}", plot_metric_map(atlas, metric)
+    if "x_min" not in atlas:
+        return
+    yield "clouds", plot_cloud_sheet(atlas, panels=panels)
+    ends = _thinned(atlas, 2)
+    yield "corners", plot_opposite_sides(_corners(ends), box_over_length=box_over_length(atlas))
+    if (curvature := _curvature(ends)) is not None:
+        yield "curvature", curvature
+    yield "hulls", plot_hull_sheet(atlas, panels=panels)
+
+
+def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
+    """A sheet of the clouds of an atlas at one scale, colored by activation (figure 2a).
+
+    Each is drawn in its own L. Designs that are not done leave a gap.
+
+    Args:
+        atlas: A grid of two parameters with the metrics "extent", from `open_atlas`.
+        panels: Columns and rows at most; the designs at the ends are always among them.
+
+    Raises:
+        InvalidInput: No grid of two parameters, no bounding boxes, or no design is done.
+        MissingExtra: matplotlib is not installed.
+    """
+    box = box_over_length(atlas)
+
+    def image(cloud: xr.Dataset, extent: Extent, columns: int) -> ZBuffer:
+        tips = drawn_tips(cloud, unit_of(cloud["tip"]))
+        pixels = point_size(len(tips), box) * columns / extent.size[0]
+        buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
+        colors = activation_colors(bundle_activations(cloud).values)
+        buffer.draw_points(tips, colors, max(1.0, pixels), view=_VIEW)
+        return buffer
+
+    return _sheet(atlas, panels, box, image)
+
+
+def plot_hull_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
+    """A sheet of the lit α-shapes of an atlas at one scale (figure 3a).
+
+    Their radius is that of the metric `volume` of the atlas, 0.05 L without it. What is not
+    described here is as in `plot_cloud_sheet`.
+
+    Args:
+        atlas: As in `plot_cloud_sheet`.
+        panels: As in `plot_cloud_sheet`.
+
+    Raises:
+        InvalidInput: As `plot_cloud_sheet`.
+        MissingExtra: matplotlib is not installed.
+    """
+    alpha = float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
+
+    def image(cloud: xr.Dataset, extent: Extent, columns: int) -> ZBuffer:
+        hull = hull_over_length(cloud, alpha)
+        buffer = ZBuffer(extent, columns, oversample=3, color_step=4)
+        draw_mesh(buffer, hull.vertices, hull.faces, STEEL, _VIEW)
+        return buffer
+
+    return _sheet(atlas, panels, box_over_length(atlas), image)
+
+
+def hull_over_length(cloud: xr.Dataset, alpha: float) -> Hull:
+    """The α-shape of the stable tips of a cloud; it, its radius and its volume in L of the arm."""
+    tips = cloud.tip.values[is_stable(cloud.tip)]
+    return concave_hull(tips / cloud.tip.attrs["length"], alpha)
+
+
+def box_over_length(atlas: xr.Dataset) -> Array:
+    """Corners around all clouds, each in its own L [-], shape (2, 3).
+
+    Raises:
+        InvalidInput: The atlas has no bounding boxes, or no design is done.
+    """
+    if "x_min" not in atlas:
+        raise InvalidInput("atlas", "without bounding boxes", 'built with the metrics "extent"')
+    low = [float(over_length(atlas, f"{axis}_min").min()) for axis in "xyz"]
+    high = [float(over_length(atlas, f"{axis}_max").max()) for axis in "xyz"]
+    if not np.isfinite([low, high]).all():
+        raise InvalidInput("atlas", "no design is done", "at least one design")
+    return np.array([low, high])
+
+
+def panel_extent(box: Array, view: View) -> Extent:
+    """Extent of a panel: tighter than a box in space, whose corners are empty.
+
+    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
+    clouds that bulge beyond it.
+    """
+    middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
+    limits = view_extent(box, view)
+    axes = view_axes(view)[:2]
+    x, y = axes @ middle
+    w, h = 1.2 * np.linalg.norm(axes * half, axis=1)
+    left, right = max(limits.left, x - w), min(limits.right, x + w)
+    return Extent(left, right, max(limits.bottom, y - h), min(limits.top, y + h))
+
+
+def plot_opposite_sides(
+    clouds: Mapping[str, xr.Dataset],
+    *,
+    view: View = "oblique",
+    box_over_length: ArrayLike | None = None,
+    unit: Unit = None,
+) -> Figure:
+    """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
+
+    Args:
+        clouds: Clouds by the title of their column; each says which arm it belongs to.
+        view: Of the upper row, as in `plot_cloud`; the lower row is opposite.
+        box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3); None
+            for all points.
+        unit: Of the axes, as in `plot_cloud`.
+
+    Raises:
+        InvalidInput: No clouds, clouds of different bundles, an unknown view, or no finite tip.
+        MissingExtra: matplotlib is not installed.
+    """
+    clouds = as_mapping("clouds", clouds, a_cloud)
+    around = None if box_over_length is None else as_box("box_over_length", box_over_length)
+    bundles = {bundle_names(cloud) for cloud in clouds.values()}
+    if len(bundles) != 1:
+        raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
+    azimuth, elevation = view_angles(view)
+    sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
+    if around is None:
+        tips = (drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values())
+        around = bounding_box(*tips)
+    with figure_style():
+        figure = pyplot().figure(figsize=(PAGE, 2 * PAGE / len(clouds) + 0.5))
+        panels = figure.subplots(2, len(clouds), squeeze=False)
+        figure.subplots_adjust(0.085, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
+        for k, (title, cloud) in enumerate(clouds.items()):
+            arm = design_of(cloud)
+            box = np.asarray(around) * arm.length
+            panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
+            for ax, side in zip(panels[:, k], sides, strict=True):
+                plot_cloud(cloud, ax=ax, view=side, color="rgb", key=False, box=box, unit=unit)
+                plot_arm(arm, ax=ax, view=side, box=box, unit=unit)
+        draw_figure_key(figure, color_samples(next(iter(clouds.values())), "rgb").key, 0.09)
+    return figure
+
+
+def _sheet(
+    atlas: xr.Dataset,
+    panels: int,
+    box: Array,
+    image: Callable[[xr.Dataset, Extent, int], ZBuffer],
+) -> Figure:
+    """A sheet of images of clouds; the threads read and draw them, the caller places them."""
+    picked = _thinned(atlas, as_integer("panels", panels, 1))
+    across, up = sheet_axes(picked)
+    with figure_style():
+        extent = panel_extent(box, _VIEW)
+        wide, high = extent.size.tolist()
+        columns, rows = [wide] * len(across.values), [high] * len(up.values)
+        figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, _TOP))
+        grid = grid[::-1]  # row 0 at the bottom
+        _label_sheet(figure, grid, across, up)
+        across_each = max(16, round(grid[0, 0].get_position().width * PAGE * DPI))
+
+        def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
+            cloud = _cloud_at(picked, column, row)
+            return None if cloud is None else image(cloud, extent, across_each).rgba()
+
+        tasks = (partial(pixels, *place) for place in np.ndindex(grid.shape))
+        for ax, rgba in zip(grid.ravel().tolist(), parallel.in_order(tasks), strict=True):
+            if rgba is not None:
+                ax.imshow(rgba, extent=extent, interpolation="none", aspect="auto")
+            ax.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
+        _draw_scale(figure, grid[0, 0])
+    return figure
+
+
+def _label_sheet(figure: Figure, grid: NDArray[Any], across: SheetAxis, up: SheetAxis) -> None:
+    for ax in grid.ravel().tolist():
+        ax.patch.set_visible(False)
+        ax.spines[:].set(color="0.88", linewidth=0.4)
+    for ax, value in zip(grid[0], across.values, strict=True):
+        ax.set_xlabel(f"{value:.4g}", labelpad=3)
+    for ax, value in zip(grid[:, 0], up.values, strict=True):
+        ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
+    width, height = figure.get_size_inches()
+    middle = (_LEFT + width - _RIGHT) / 2 / width, (_BOTTOM + height - _TOP) / 2 / height
+    figure.text(middle[0], 0.12 / height, across.label, ha="center", fontsize=9)
+    figure.text(0.1 / width, middle[1], up.label, va="center", rotation=90, fontsize=9)
+
+
+def _draw_scale(figure: Figure, panel: Axes) -> None:
+    width, height = figure.get_size_inches()
+    ax = figure.add_axes((0.04 / width, 0.02 / height, _LEFT / width, (_BOTTOM - 0.1) / height))
+    left, right = panel.get_xlim()
+    inch = (right - left) / (panel.get_position().width * width)  # in L
+    ax.set(xlim=(0, _LEFT * inch), ylim=(0, (_BOTTOM - 0.1) * inch))
+    ax.set_axis_off()
+    start, center = 0.08 * inch, np.array([0.22, 0.27]) * inch
+    # of a sheet of few columns it is longer than the margin is wide
+    style = {"color": "0.2", "lw": 1.2, "solid_capstyle": "butt", "clip_on": False}
+    ax.plot([start, start + 0.5], [start] * 2, **style)
+    ax.text(start + 0.5 + 0.04 * inch, start, "L/2", fontsize=7, va="center")
+    for name, direction in zip("xyz", view_axes(_VIEW)[:2].T, strict=True):
+        x, y = center + 0.15 * inch * direction
+        arrow = {"arrowstyle": "-|>,head_width=0.1,head_length=0.2", "lw": 0.6, "shrinkA": 0}
+        ax.annotate("", (x, y), tuple(center), arrowprops=arrow | {"color": "0.2", "shrinkB": 0})
+        x, y = center + 0.22 * inch * direction
+        ax.text(x, y, name, fontsize=7, ha="center", va="center")
+
+
+def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
+    """As many designs along each parameter as there are panels, the ends among them."""
+    sizes = {str(dim): atlas.sizes[dim] for dim in atlas["status"].dims}
+    ends = {dim: np.linspace(0, size - 1, min(size, panels)) for dim, size in sizes.items()}
+    return atlas.isel({dim: np.unique(np.rint(at).astype(int)) for dim, at in ends.items()})
+
+
+def _cloud_at(atlas: xr.Dataset, column: int, row: int) -> xr.Dataset | None:
+    """The cloud of the design there, if it is done and not damaged."""
+    if int(atlas["status"][column, row]) != DONE:
+        return None
+    across, up = map(str, atlas["status"].dims)
+    try:
+        at = {across: float(atlas[across][column]), up: float(atlas[up][row])}
+        return atlas_cloud(atlas, **at)
+    except DamagedStore as error:
+        warn(f"a cloud is left out: {error}")
+        return None
+
+
+def _corners(ends: xr.Dataset) -> dict[str, xr.Dataset]:
+    """Title and cloud at the ends of both parameters, in the paper's order."""
+    across, up = sheet_axes(ends)
+    clouds = {
+        f"{across.text(column)}, {up.text(row)}": _cloud_at(ends, column, row)
+        for column, row in np.ndindex(len(across.values), len(up.values))
+    }
+    return {title: cloud for title, cloud in clouds.items() if cloud is not None}
+
+
+def _curvature(ends: xr.Dataset) -> Axes | None:
+    """The first against the last value of the second parameter, at the last of the first.
+
+    None if neither design is done.
+    """
+    across, up = sheet_axes(ends)
+    clouds = {up.text(k): _cloud_at(ends, -1, k) for k in range(len(up.values))}
+    done = {k: curvature_statistics(cloud) for k, cloud in clouds.items() if cloud is not None}
+    if not done:
+        return None
+    ax = plot_curvature(done)
+    ax.set_title(across.text(-1), fontsize=9)
+    return ax

@@ -1,0 +1,250 @@
+"""Figures in panels: a section of the reachable set, volumes over a parameter, a path's inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import changed
+from softreach.geometry.surface import plane_cut
+from softreach.inverse.path import PathStatus
+from softreach.picture.projection import View, plane_of
+from softreach.plot.sets import plot_slice
+from softreach.studio.reach import Quality, Reach, exact_set
+from softreach.studio.shown_parameters import ShownParameter, slider_parameters
+from softreach.studio.state import Slice, StudioState, solvable_rod
+from softreach.studio.work import Budget, OverBudget, all_cores, check_wanted
+from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.palette import bundle_color
+from softreach.workspace import ReachableSolid, ReachableSurface
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
+_LINE, _HERE = "#2f6db5", "#d9731a"
+_INK = "#7d848b"  # legible on white and on black
+_WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
+_VALUES = 9  # of the parameter, beside that of the design
+_MOST_CURVES = 8  # of a path: more are not told apart
+_SECONDS = 10.0  # [s] for each volume
+
+
+class Picture(NamedTuple):
+    """Picture of a design."""
+
+    arm: Manipulator
+    image: NDArray[np.uint8]
+    """RGBA on a transparent ground, shape (rows, columns, 4)."""
+    text: str
+    """Its content in words."""
+
+
+def _axes(height: float) -> Axes:
+    from matplotlib.figure import Figure  # away from pyplot, which belongs to one thread
+
+    return Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained").subplots()
+
+
+def _pixels(ax: Axes) -> NDArray[np.uint8]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Text
+
+    figure = cast("Figure", ax.figure)
+    ax.tick_params(which="both", colors=_INK)
+    ax.spines[:].set_edgecolor(_INK)
+    for text in figure.findobj(Text):
+        text.set_color(_INK)
+    for paper in (figure.patch, ax.patch, *(key.get_frame() for key in [ax.get_legend()] if key)):
+        paper.set_alpha(0.0)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())
+
+
+# The section of the reachable set by the plane of the slice.
+
+
+def section_curves(reach: Reach, cut: Slice) -> list[Array]:
+    """The boundary of the reachable set in the middle plane of a slice [L], curves (n, 3).
+
+    Raises:
+        InvalidInput: There is no exact set with a surface.
+    """
+    if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
+        raise InvalidInput("section", reach.refusal or "no volume", "a set with a surface to cut")
+    plane, length = _plane(cut, reach.arm), reach.arm.length
+    surface = reach.exact.surface()
+    curves = plane_cut(surface, "xyz".index(plane.axis), plane.center * length)
+    return [curve / length for curve in curves]
+
+
+def section_picture(reach: Reach, cut: Slice) -> Picture:
+    """The section and how many activations reach each place, in the unit of the arm.
+
+    Args:
+        reach: Of the design.
+        cut: The slice, of which the middle plane is cut; without one that across y by the base.
+
+    Raises:
+        InvalidInput: As `section_curves`.
+    """
+    arm, plane = reach.arm, _plane(cut, reach.arm)
+    view, at, unit = _VIEWS[plane.axis], plane.center * arm.length, arm.length_unit
+    with all_cores:
+        curves = section_curves(reach, cut)
+        grid = reach.exact.grid if isinstance(reach.exact, ReachableSolid) and curves else None
+    ax = _axes(4.6)
+    if grid is not None:
+        plot_slice(grid, ax=ax, view=view, at=at, unit=unit.name)
+        (cells,) = ax.images
+        cells.set_alpha((np.asarray(cells.get_array()) > 0).astype(float))
+    names = cast("tuple[str, str]", plane_of(view))
+    across, up = map("xyz".index, names)
+    lines = [unit.of(curve[:, [across, up]] * arm.length) for curve in curves]
+    for line in lines:
+        ax.plot(*line.T, color=_LINE, lw=1.4)
+    if lines:
+        points = np.concatenate(lines)
+        room = 0.06 * np.ptp(points, axis=0).max()
+        low, high = points.min(axis=0) - room, points.max(axis=0) + room
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    where = f"{plane.axis} = {unit.rounded(at, digits='.3g')}"
+    ax.set(xlabel=unit.label(names[0]), ylabel=unit.label(names[1]), aspect="equal")
+    ax.set_title(f"section {where}")
+    return Picture(arm, _pixels(ax), f"{where}: {_described(curves, plane, arm)}")
+
+
+def _plane(cut: Slice, arm: Manipulator) -> Slice:
+    base = arm.base.position[1] / arm.length
+    return Slice(axis="y", center=base) if cut.axis == "none" else cut
+
+
+def _described(curves: list[Array], plane: Slice, arm: Manipulator) -> str:
+    if not curves:
+        return "nothing is reached"
+    if not all(np.array_equal(curve[0], curve[-1]) for curve in curves):
+        return f"{len(curves)} curves"
+    area = enclosed_area(curves, "xyz".index(plane.axis)) * arm.length**2
+    parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
+    return f"{parts}, {arm.length_unit.rounded(area, 2)}"
+
+
+def enclosed_area(curves: list[Array], axis: int) -> float:
+    """Area within closed curves in a plane across an axis, holes left out.
+
+    A curve bounds a hole if an odd number of the others surround it.
+    """
+    from matplotlib.path import Path
+
+    flat = [np.delete(curve, axis, axis=1) for curve in curves]
+    total = 0.0
+    for k, curve in enumerate(flat):
+        around = sum(Path(other).contains_point(curve[0]) for j, other in enumerate(flat) if j != k)
+        (x, y), sign = curve.T, -1.0 if around % 2 else 1.0
+        total += sign * abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
+    return total
+
+
+# The volume over the range of one slider.
+
+
+def swept_parameter(state: StudioState) -> ShownParameter | None:
+    """The parameter that is chosen, the first for an unknown one; None if there is none."""
+    sliders = {slider.name: slider for slider in slider_parameters(state.design)}
+    return sliders.get(state.appearance.plots.parameter) or next(iter(sliders.values()), None)
+
+
+def sweep_pictures(
+    arm: Manipulator, parameter: ShownParameter, quality: Quality
+) -> Iterator[Picture]:
+    """Volumes over the range of a slider, from the design's own value outwards, ever more.
+
+    Args:
+        arm: The design.
+        parameter: What the slider changes.
+        quality: How coarse, and how far off the tips may be.
+    """
+    known = dict[float, float | None]()
+    for value, volume in swept_volumes(arm, parameter, quality):
+        known[value] = volume
+        yield _sweep_picture(arm, parameter, known)
+
+
+def swept_volumes(
+    arm: Manipulator, parameter: ShownParameter, quality: Quality
+) -> Iterator[tuple[float, float | None]]:
+    """Values of a slider over its range, what is nearest to the present one first, and volumes.
+
+    The volume [m³] is None where there is no design, or one that takes too long.
+    """
+    low, high = parameter.limits
+    even = np.linspace(low, high, _VALUES)
+    steps = np.clip(low + np.round((even - low) / parameter.step) * parameter.step, low, high)
+    values = {round(float(value), 9) for value in steps} | {parameter.shown}
+    for value in sorted(values, key=lambda value: abs(value - parameter.shown)):
+        check_wanted()
+        try:
+            design = changed(arm, {parameter.name: value * parameter.scale})
+        except SoftreachError:
+            yield value, None
+        else:
+            yield value, _volume(design, quality.coarse_accuracy, quality.tol)
+
+
+@lru_cache(maxsize=512)
+def _volume(design: Manipulator, accuracy: float, tol: float) -> float | None:
+    try:
+        with all_cores:
+            solvable_rod(design)
+            return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
+    except (SoftreachError, OverBudget, MemoryError):
+        return None
+
+
+def _sweep_picture(
+    arm: Manipulator,
+    parameter: ShownParameter,
+    known: Mapping[float, float | None],
+) -> Picture:
+    unit, ax = arm.length_unit, _axes(3.0)
+    volumes = {value: known[value] for value in sorted(known) if known[value] is not None}
+    ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
+    ax.axvline(parameter.shown, color=_HERE, lw=1.2, ls="--")
+    ax.set(xlabel=parameter.label, ylabel=unit.label("V", 3), xlim=parameter.limits)
+    here, missing = volumes.get(parameter.shown), len(known) - len(volumes)
+    text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
+    if missing:
+        text += f" · {missing} values make no design or take too long"
+    return Picture(arm, _pixels(ax), text)
+
+
+# The activations along a path of the tip.
+
+
+def track_picture(track: xr.Dataset, arm: Manipulator) -> Picture:
+    """Activations of up to eight inputs over the way that the tip follows its path.
+
+    Args:
+        track: Result of `track_path`.
+        arm: The design.
+    """
+    followed = track.status.values == PathStatus.FOLLOWED
+    steps = np.linalg.norm(np.diff(track.position.values[followed], axis=0), axis=1)
+    way = np.concatenate([[0.0], np.cumsum(steps)]) / arm.length
+    ax = _axes(2.4)
+    for k, name in enumerate(track["bundle"].values[:_MOST_CURVES]):
+        values = track.activation.values[followed, k]
+        ax.plot(way, values, color=bundle_color(k), label=str(name))
+    ax.set(xlabel="way / L", ylabel="activation")
+    ax.legend()
+    return Picture(arm, _pixels(ax), "activations along the path")

@@ -1,1 +1,0 @@
-"""Plots beside the scene: how they are computed, and charts."""

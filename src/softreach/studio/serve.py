@@ -1,0 +1,308 @@
+"""Server of the page: this machine only, a free port, and every request checked.
+
+viser offers no public way to see a request, to refuse it, or to send headers with its page, so this
+file uses names that viser keeps to itself. Where requests cannot be checked, the server does not
+start. A second server in front of viser's would leave viser's own port open to every page and
+program of this machine.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hmac
+import io
+import re
+import secrets
+import socket
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout, suppress
+from functools import lru_cache
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+from softreach.studio.scene.camera import FOV
+from softreach.support.errors import InvalidInput, MissingExtra
+
+if TYPE_CHECKING:
+    from viser import GuiApi, ViserServer
+
+LOOPBACK, LOCAL = "127.0.0.1", ("localhost", "127.0.0.1", "::1")
+ANYWHERE = ("0.0.0.0", "::")
+
+_LAST_PORT = 65535
+_COOKIE = "softreach_token"
+_NO_TOKEN = "The address lacks the token that softreach printed with it.\n"
+_FOREIGN = "This page is for its own server alone.\n"
+_ELSEWHERE = "This address names another server, to which the page may not connect.\n"
+_PLAIN_HOST = re.compile(r"[A-Za-z0-9.\-]+(:\d+)?|\[[0-9A-Fa-f:.]+\](:\d+)?")
+_POLICY = {
+    "default-src": "'self'",
+    "script-src": "'self' 'unsafe-inline' 'unsafe-eval' blob:",
+    "script-src-attr": "'none'",
+    "style-src": "'self' 'unsafe-inline'",
+    "img-src": "'self' data: blob:",
+    "font-src": "'self' data:",
+    "worker-src": "'self' blob: data:",
+    **dict.fromkeys(
+        ("media-src", "frame-src", "object-src", "base-uri", "form-action", "frame-ancestors"),
+        "'none'",
+    ),
+}
+_starting = threading.Lock()
+
+
+def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
+    """Start serving the page.
+
+    Args:
+        host: Address to listen on; everyone who can reach it may use the studio.
+        port: None for a free one.
+        token: What every page has to know; "" for nothing.
+
+    Raises:
+        InvalidInput: The port is none or taken, the host is none or not this machine's, or viser
+            is a version whose requests cannot be checked.
+        MissingExtra: viser is not installed.
+    """
+    try:
+        import viser
+    except ModuleNotFoundError as error:
+        raise MissingExtra(("viser", "studio")) from error
+
+    check_address(host, port or 0)
+    _check_free(host, port or 0)
+    # viser prints a banner; we print our own line.
+    with redirect_stdout(io.StringIO()), guarding(host, token) as guard:
+        server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
+    if not guard.is_set():
+        stop_server(server)
+        allowed = "one whose requests can be checked"
+        raise InvalidInput("viser", viser.__version__, allowed, "install viser>=1.1,<1.2")
+    # Any client could ask for a public address: the button is not the only way.
+    server.request_share_url = lambda *_, **__: None  # pyright: ignore[reportAttributeAccessIssue]
+    # Shadows and a mirrored room cost seconds where no graphics card helps, and show nothing.
+    server.scene.configure_environment_map(None)
+    server.scene.configure_default_lights(cast_shadow=False)
+    server.scene.add_light_ambient("/light", intensity=1.6)
+    theme(server.gui, dark=False)
+    server.gui.main_panel.dock_right()
+    server.initial_camera.fov = FOV
+    return server
+
+
+def theme(gui: GuiApi, *, dark: bool) -> None:
+    """Set the looks of the page around the scene."""
+    gui.configure_theme(
+        control_width="large", show_logo=False, show_share_button=False, dark_mode=dark
+    )
+
+
+def stop_server(server: ViserServer) -> None:
+    """Stop serving, without the line that viser prints."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+# Requests that are answered, and headers of the answers.
+
+
+def new_token() -> str:
+    """A token that nobody guesses."""
+    return secrets.token_urlsafe(18)
+
+
+def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:
+    """Reason why a request is refused; "" for one that is welcome.
+
+    Args:
+        host: That the server listens on.
+        token: That a request shows in its address, or in the cookie that it got for that; "" for
+            none.
+        path: Of the request, with its query.
+        headers: Of the request.
+    """
+    if token and not _shows(token, path, headers):
+        return _NO_TOKEN
+    if not same_origin(headers, host):
+        return _FOREIGN
+    sockets = parse_qs(urlsplit(path).query).get("websocket", [])
+    own = headers.get("Host", "")
+    return "" if all(_place(socket) == own for socket in sockets) else _ELSEWHERE
+
+
+def _shows(token: str, path: str, headers: Mapping[str, str]) -> bool:
+    shown, cookies = parse_qs(urlsplit(path).query).get("token", []), SimpleCookie()
+    with suppress(CookieError):
+        cookies.load(headers.get("Cookie", ""))
+    if _COOKIE in cookies:
+        shown.append(cookies[_COOKIE].value)
+    return any(hmac.compare_digest(each.encode(), token.encode()) for each in shown)
+
+
+def _place(address: str) -> str:
+    """Name and port in an address; "" if it is none."""
+    try:
+        return urlsplit(address).netloc
+    except ValueError:
+        return ""
+
+
+def same_origin(headers: Mapping[str, str], host: str) -> bool:
+    """True if a connection comes from our own page, or from no page at all.
+
+    Browsers let any web page open a socket to this machine; they tell where it came from. On
+    loopback the name must be local too, as foreign names can be made to point here.
+    """
+    page = urlsplit(f"//{headers.get('Host', '')}")
+    if host in LOCAL and page.hostname not in LOCAL:
+        return False
+    origin = headers.get("Origin")
+    return origin is None or urlsplit(origin).netloc == page.netloc
+
+
+def page_headers(host: str) -> dict[str, str]:
+    """Headers that keep a page to its own server, whatever its address says.
+
+    viser's page is one file of inline scripts and styles; it would open a socket to any server that
+    `?websocket=` names, and read a scene from any address.
+
+    Args:
+        host: Name and port, as the request has them.
+    """
+    plain = _PLAIN_HOST.fullmatch(host) is not None
+    sockets = f" ws://{host} wss://{host}" if plain else ""  # older browsers: not part of 'self'
+    rules = _POLICY | {"connect-src": f"'self' data: blob:{sockets}"}
+    return {
+        "Content-Security-Policy": "; ".join(f"{name} {value}" for name, value in rules.items()),
+        "X-Frame-Options": "DENY",
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+    }
+
+
+@contextmanager
+def guarding(host: str, token: str) -> Iterator[threading.Event]:
+    """A server that starts inside the block checks every request, page and socket alike.
+
+    Yields:
+        Set once a server has taken the checks over; else it has none of them.
+    """
+    import websockets.asyncio.server as sockets
+
+    plain, taken = sockets.serve, threading.Event()
+
+    def add(connection: Any, request: Any, response: Any) -> None:
+        del connection
+        for name, value in page_headers(request.headers.get("Host", "")).items():
+            response.headers[name] = value
+        if token and "token" in parse_qs(urlsplit(request.path).query):
+            cookie = f"{_COOKIE}={token}; Path=/; HttpOnly; SameSite=Lax"
+            response.headers["Set-Cookie"] = cookie
+        if response.headers.get("Content-Type", "").startswith("text/html"):
+            zipped = response.headers.get("Content-Encoding") == "gzip"
+            response.body = headed(response.body, zipped=zipped)
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(response.body))
+
+    def serve(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
+        def admit(connection: Any, request: Any) -> Any:
+            if reason := refusal(host, token, request.path, request.headers):
+                return connection.respond(HTTPStatus.FORBIDDEN, reason)
+            return process_request(connection, request) if process_request else None
+
+        taken.set()
+        return plain(*arguments, process_request=admit, process_response=add, **options)
+
+    with _starting:
+        sockets.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            yield taken
+        finally:
+            sockets.serve = plain
+
+
+def close_sockets(server: ViserServer) -> None:
+    """Close the sockets of all tabs; without a way to do so the server's end closes them."""
+    sockets = getattr(server, "_websock_server", None)
+    getattr(sockets, "disconnect_all_clients", lambda: None)()
+
+
+@lru_cache(maxsize=4)
+def headed(body: bytes, *, zipped: bool) -> bytes:
+    """A page with our title, `page.css` and `page.js`; one without viser's title as it is."""
+    content = gzip.decompress(body) if zipped else body
+    place = files("softreach.studio")
+    style, script = (place.joinpath(name).read_bytes() for name in ("page.css", "page.js"))
+    title = b"<title>softreach</title>"
+    head = b"%b<style>%b</style><script>%b</script>" % (title, style, script)
+    ours = content.replace(b"<title>Viser</title>", head, 1)
+    if ours == content:
+        return body
+    return gzip.compress(ours) if zipped else ours
+
+
+# Addresses of the server.
+
+
+def page_url(server: ViserServer) -> str:
+    """Address of the page, for a browser on this machine."""
+    return page_address(server.get_host(), server.get_port())
+
+
+def _check_free(host: str, port: int) -> None:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            allowed = "an address of this machine and a free port"
+            raise InvalidInput("host:port", f"{host}:{port}", allowed, str(error)) from None
+
+
+def is_local(host: str) -> bool:
+    """True if only this machine can connect."""
+    return host in LOCAL or host.startswith("127.")
+
+
+def check_address(host: str, port: int) -> None:
+    """Refuse what is no host or no port.
+
+    Raises:
+        InvalidInput: No host is named, or the port is not from 1 to 65535 (0 for a free one).
+    """
+    if not host.strip():  # systems take it for every address of the machine
+        allowed = f"an address to listen on, such as {LOOPBACK}"
+        raise InvalidInput("host", repr(host), allowed, f"{ANYWHERE[0]} is for every address")
+    if not 0 <= port <= _LAST_PORT:
+        raise InvalidInput("port", port, f"1 to {_LAST_PORT}", "leave it out for a free one")
+
+
+def page_address(host: str, port: int) -> str:
+    """The address of the page on a host of this machine."""
+    shown = LOOPBACK if host in ANYWHERE else host
+    return f"http://{f'[{shown}]' if ':' in shown else shown}:{port}"
+
+
+def reachable_hosts(host: str) -> list[str]:
+    """Addresses by which others reach a server that listens on a host; none if it is local.
+
+    For every address of this machine: the one that it would call others from.
+    """
+    if is_local(host):
+        return []
+    if host not in ANYWHERE:
+        return [host]
+    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        line.connect(("192.0.2.1", 9))  # reserved for examples; nothing is sent
+        return [str(line.getsockname()[0])]
+    return []
+
+
+def with_token(address: str, token: str) -> str:
+    """An address that shows the token; the address alone without any."""
+    return f"{address}/?token={token}" if token else address

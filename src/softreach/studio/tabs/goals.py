@@ -1,0 +1,368 @@
+"""What the arm is for and what was measured on it: live requirements, poses and a fit to them."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softreach.calibration import Calibration
+from softreach.calibration.measurements import read_measurements, read_table
+from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target
+from softreach.studio import markup
+from softreach.studio.fields import GRAY, Attribute, Fields
+from softreach.studio.files import LARGEST
+from softreach.studio.found import Bench, Found
+from softreach.studio.markup import Part, Swatch, Term
+from softreach.studio.scene.needs import COLORS
+from softreach.studio.session import Session
+from softreach.studio.state import StudioState, needs_of_text, requirements_of
+from softreach.studio.widgets import number_of
+from softreach.support.errors import InvalidInput, counted
+from softreach.support.files.text import text_of
+from softreach.support.units import LengthUnit
+
+if TYPE_CHECKING:
+    from viser import UploadedFile
+
+_EMPTY = {
+    "place to reach": "x, y, z in {unit}; empty: where the tip is",
+    "place at the target": "nothing: the target of the tab Move",
+    "box to stay inside": "x, y, z, x, y, z of two corners in {unit}; empty: around what is drawn",
+    "box to avoid": "x, y, z, x, y, z of two corners in {unit}",
+    "payload": "mass at the tip in g",
+    "most shortening": "of any bundle, in %",
+}
+"""Kind of need -> contents of its field, in words."""
+_ALL = "everything"
+
+
+def needs(panel: Fields) -> None:
+    """Needs of the design, and what it misses of them."""
+    session, gui = panel.session, panel.gui
+    wanted = lambda state, _: state.needs
+    with panel.folder("requirements"):
+        panel.say("Say what the arm is for: what it misses is shown while you change it.")
+        about = "A place for the tip, a box for the arm at these places, or a limit"
+        kind = gui.add_dropdown("add", tuple(_EMPTY), hint=about)
+        field = gui.add_text("numbers", "", hint="Numbers with commas between them")
+        unit = lambda: session.state.design.length_unit.name
+        expected = panel.text("design", content=lambda *_: [_EMPTY[kind.value].format(unit=unit())])
+        kind.on_update(lambda _: expected.say(_EMPTY[kind.value].format(unit=unit())))
+
+        def add() -> None:
+            add_need(session, kind.value, field.value)
+            field.value = ""
+
+        panel.button("Add to the needs", add, about)
+        panel.html("design", "found.check", content=lambda state, found: verdict(found, state))
+        refused = lambda _, found: markup.alert(found.check_refusal) if found.check_refusal else ""
+        panel.html("found.check_refusal", content=refused)
+        one = "One of the needs, or all of them"
+        part: Any = gui.add_dropdown("remove", (_ALL,), hint=one, visible=False)
+
+        def offer(state: StudioState, _: Found) -> None:
+            parts = tuple(needs_parts(requirements_of(state.needs), state.design.length_unit))
+            part.visible = bool(parts)
+            if tuple(part.options) != (*parts, _ALL):
+                part.options = (*parts, _ALL)
+                part.value = part.options[0]
+
+        panel.follow("design", "needs", show=offer)
+        panel.button("Remove", lambda: _remove_need(session, part.value), one, wanted)
+        read = lambda file: read_needs(session, file.name, file.content)
+        about = "Requirements as softreach check and softreach search read them"
+        panel.upload("Load needs (TOML)", read, about, **GRAY)
+        save = lambda: session.send("needs.toml", session.state.needs.encode())
+        about = "The needs as a file for softreach check and softreach search"
+        panel.button("Save needs (TOML)", save, about, wanted, **GRAY)
+
+
+def verdict(found: Found, state: StudioState) -> str:
+    """What is met and what is missed, as HTML."""
+    check = found.check
+    lines = [] if check is None else [_line(check, finding) for finding in check.findings]
+    if check is not None and check.arm != state.design:
+        lines.append(("of the design before, computing ...",))
+    return "".join(markup.paragraph(*parts) for parts in lines)
+
+
+_SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
+
+
+def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
+    mark, sign = Swatch(COLORS[finding.verdict]), _SIGNS[finding.verdict]
+    text = _reach_text(check, finding) if finding.kind == "reach" else finding.text
+    return mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"
+
+
+def _reach_text(check: Check, finding: Finding) -> str:
+    """A target in words: reached, or missed by its largest gap."""
+    targets, unit = check.requirements.targets, check.arm.length_unit
+    index = next(k for k, target in enumerate(targets) if target.name == finding.name)
+    own = check.target_of == index
+    gap = float(check.gaps[:, own].max()) - targets[index].within
+    reached = int(check.reached[:, own].all(axis=0).sum())
+    many = f"{reached} of {int(own.sum())} places, " if own.sum() > 1 else ""
+    if finding.met:
+        return f"{many}reached"
+    if "not held" in finding.text:
+        return f"{many}not held: no stable equilibrium"
+    return f"{many}missed by {gap / unit.size:.3g} {unit.name}"
+
+
+def verdict_text(check: Check) -> str:
+    """Number of needs that are met, and the worst that is not, in words."""
+    missed = [finding for finding in check.findings if not finding.met]
+    text = f"needs: {len(check.findings) - len(missed)} of {len(check.findings)} met"
+    if not missed:
+        return text
+    worst = max(missed, key=lambda finding: finding.excess)
+    more = f" {_reach_text(check, worst)}" if worst.kind == "reach" else ""
+    more += " undecided" if worst.verdict == "undecided" else ""
+    return f"{text} · {worst.name}{more}"
+
+
+# Needs that are added and removed
+
+
+def add_need(session: Session, kind: str, text: str) -> None:
+    """Add one of the kinds of needs, as its field is filled.
+
+    Raises:
+        InvalidInput: The text has other numbers than this kind of need.
+    """
+    state, needs = session.state, requirements_of(session.state.needs)
+    size, empty = state.design.length_unit.size, not text.strip()
+    if kind == "place to reach" and empty:
+        if session.found.tip is None:
+            raise InvalidInput("tip", "nowhere", "in equilibrium, or type a place")
+        add_place(session, session.found.tip * state.design.length)
+    elif kind == "place to reach":
+        add_place(session, [size * x for x in _numbers(text, 3)])
+    elif kind == "place at the target":
+        if state.target is None:
+            raise InvalidInput("target", "none", "set in the tab Move")
+        add_place(session, state.target)
+    elif kind == "payload":
+        payload = _numbers(text, 1)[0] / 1e3
+        _keep(session, needs.replace(payloads=(*needs.payloads, payload)))
+    elif kind == "most shortening":
+        _keep(session, _limited(needs, shortening=_numbers(text, 1)[0] / 100.0))
+    else:
+        inside = kind == "box to stay inside"
+        corners = np.array(session.scene.axes.corners) * state.design.length
+        if not (inside and empty):
+            corners = size * np.array(_numbers(text, 6)).reshape(2, 3)
+        low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        keep = Keep(Box(tuple(low), tuple(high)), inside, name=_unused("box", needs.keeps))
+        _keep(session, needs.replace(keeps=(*needs.keeps, keep)))
+
+
+def add_place(session: Session, place: Iterable[float]) -> None:
+    """Add one more place to reach [m]."""
+    needs = requirements_of(session.state.needs)
+    target = Target(np.array([[*place]]), name=_unused("place", needs.targets))
+    _keep(session, needs.replace(targets=(*needs.targets, target)))
+
+
+def read_needs(session: Session, name: str, content: bytes) -> None:
+    """Make the requirements in a file the needs.
+
+    Raises:
+        InvalidInput: The file is too large, no text, or lists too many places.
+        InvalidDesign: It has no requirements, or names other files.
+    """
+    text, length = text_of("file", name, content, LARGEST), session.state.design.length
+    _keep(session, needs_of_text(text, length=length, source=name))
+
+
+def _keep(session: Session, needs: Requirements) -> None:
+    """Make them the needs of the state; none are an empty text."""
+    text = needs.to_toml()
+    text = "" if text == Requirements().to_toml() else text
+    session.update(lambda state: state.replace(needs=text))
+
+
+def _remove_need(session: Session, part: str) -> None:
+    needs = requirements_of(session.state.needs)
+    parts = needs_parts(needs, session.state.design.length_unit)
+    _keep(session, parts[part]() if part in parts else Requirements())
+
+
+def needs_parts(needs: Requirements, unit: LengthUnit) -> dict[str, Callable[[], Requirements]]:
+    """Every part in words -> the requirements without it."""
+
+    def without(field: str, out: object) -> Callable[[], Requirements]:
+        rest = tuple(each for each in getattr(needs, field) if each is not out)
+        return lambda: needs.replace(**{field: rest})
+
+    parts: dict[str, Callable[[], Requirements]] = {}
+    for target in needs.targets:
+        where = ""
+        if target.places is not None and len(target.places) == 1:
+            where = f" ({', '.join(f'{x / unit.size:.4g}' for x in target.places[0])}) {unit.name}"
+        parts[target.name + where] = without("targets", target)
+    for keep in needs.keeps:
+        parts[f"{keep.name}, to {keep.kind.replace('_', ' ')}"] = without("keeps", keep)
+    for mass in needs.payloads:
+        parts[f"payload {1e3 * mass:.6g} g"] = without("payloads", mass)
+    for name in needs.limits.given:
+        words = f"limit of {name.replace('_', ' ')}"
+        parts[words] = lambda name=name: _limited(needs, **{name: None})
+    for name in needs.measures:
+        rest = {each: ends for each, ends in needs.measures.items() if each != name}
+        parts[f"measure {name}"] = lambda rest=rest: needs.replace(measures=rest)
+    return parts
+
+
+def _limited(needs: Requirements, **limits: Any) -> Requirements:
+    return needs.replace(limits=Limits(**{**needs.limits.given, **limits}))
+
+
+def _unused(kind: str, parts: Sequence[Target | Keep]) -> str:
+    """The first of "place 1", "place 2" and so on that no part is called."""
+    names = {part.name for part in parts}
+    return next(name for k in range(1, len(names) + 2) if (name := f"{kind} {k}") not in names)
+
+
+def _numbers(text: str, count: int) -> list[float]:
+    """So many numbers that a text lists; anything else is refused."""
+    parts = text.replace(";", ",").replace(",", " ").split()
+    numbers = [number for part in parts if (number := number_of(part)) is not None]
+    if not len(parts) == len(numbers) == count:
+        words = {1: "a number", 3: "three numbers, such as 0.2, 0, 0.7", 6: "six numbers"}
+        raise InvalidInput("numbers", repr(text), words[count])
+    return numbers
+
+
+# Measured poses
+
+_ABOUT_LOAD = (
+    "A table with a column for each input and three for each marker, each with its unit: "
+    "tension1_N, tip_x_mm"
+)
+_ABOUT_SAMPLE = (
+    "Moves the arm to the inputs of a sample. Large dots were measured, small ones are predicted"
+)
+_ABOUT_FIT = "Finds the numbers with which predicted markers come nearest to measured ones"
+_FREE = {
+    "pose": "pose of the base",
+    "taper": "taper φ",
+    "revolution": "revolution Ω",
+    "*.offset": "offsets of bundles",
+    "*.young_modulus": "Young's moduli",
+}
+"""Numbers that a fit may change: name -> what the check box says."""
+
+
+def calibrate(panel: Fields) -> None:
+    """Measured poses: their markers over the arm, a fit to them, and the calibrated design."""
+    session = panel.session
+    with panel.folder("measured poses", expanded=False):
+        panel.upload(
+            "Load measured poses (CSV)", lambda file: _read_poses(session, file), _ABOUT_LOAD
+        )
+        panel.text("found.bench", content=lambda _, found: _bench_text(found.bench))
+        with panel.folder("samples", lambda _, found: found.bench is not None):
+            panel.steps(
+                "sample",
+                "found.bench",
+                at=lambda _, found: (
+                    (found.bench.number, len(found.bench.data) - 1) if found.bench else (0, 1)
+                ),
+                move=lambda number: _step_to(session, number),
+                hint=_ABOUT_SAMPLE,
+            )
+            follows = "design", "found.bench", "found.sample"
+            panel.text(*follows, content=lambda state, found: [_residuals_text(state, found)])
+            for name, label in _FREE.items():
+                panel.checkbox(label, _is_free(name), "Lets the fit change this number")
+            panel.button("Fit", lambda: session.follow("fit"), _ABOUT_FIT)
+            panel.html("found.bench", content=lambda _, found: _summary(found.bench))
+            about = "Makes the calibrated arm the design; can be undone"
+            fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
+            panel.button("Apply", lambda: _apply(session), about, fitted)
+
+
+def _is_free(name: str) -> Attribute:
+    """Whether a fit may change a number; that of the pose before there are data."""
+
+    def write(found: Found, on: bool) -> Found:
+        if found.bench is None:
+            return found
+        free = tuple(each for each in _FREE if (on if each == name else each in found.bench.free))
+        return replace(found, bench=replace(found.bench, free=free))
+
+    def read(found: Found) -> bool:
+        return name in (found.bench.free if found.bench is not None else ("pose",))
+
+    return Attribute(read, write, "found")
+
+
+def _read_poses(session: Session, file: UploadedFile) -> None:
+    arm = session.state.design
+    data = read_measurements(arm, read_table(io.BytesIO(file.content), file.name))
+    _pose(session, Bench(data=replace(data, source=file.name), arm=arm))
+
+
+def _pose(session: Session, bench: Bench) -> None:
+    """Show a pose, and bring the arm to its inputs."""
+    if not bench.fits(session.state.design):
+        allowed = "one with the inputs and markers of the data"
+        raise InvalidInput("design", "another one", allowed, "load the data again")
+    session.update(bench.posed, goes_on=True)
+    session.learn({"bench": bench})
+
+
+def _step_to(session: Session, number: int) -> None:
+    if session.found.bench is not None:
+        _pose(session, replace(session.found.bench, number=number))
+
+
+def _apply(session: Session) -> None:
+    bench = session.found.bench
+    arm = bench.fitted(session.state.design) if bench is not None else None
+    if arm is None:
+        raise InvalidInput("design", "changed since the fit", "the one that was fitted")
+    session.update(lambda state: state.replace(design=arm))
+
+
+def _bench_text(bench: Bench | None) -> list[str]:
+    if bench is None:
+        return []
+    data = bench.data
+    inputs = ", ".join(name or "none" for name in data.input_names)
+    samples = f"{counted(len(data), 'sample')} of {', '.join(data.marker_names)}"
+    return [f"{data.source}: {samples}; inputs {inputs}"]
+
+
+def _residuals_text(state: StudioState, found: Found) -> str:
+    sample, bench = found.sample, found.bench
+    if sample is None or bench is None:
+        return "The arm is not at a measured pose: move the slider."
+    known = zip(bench.data.marker_names, 1e3 * sample.distances, strict=True)
+    each = [f"{name} {d:.3g} mm" if np.isfinite(d) else f"{name} unknown" for name, d in known]
+    inputs, (low, high) = bench.data.inputs[bench.number], state.design.input_bounds.T
+    beyond = bool(((inputs < low) | (inputs > high)).any())
+    note = ". Its inputs are beyond the bounds, at which the arm is drawn" if beyond else ""
+    return f"predicted − measured: {', '.join(each)}{note}."
+
+
+def _summary(bench: Bench | None) -> str:
+    result: Calibration | None = None if bench is None else bench.result
+    if result is None:
+        return ""
+    report = result.report()
+    parts, lines = [], []
+    for part in report.sections:
+        if part.rows and part.printed:
+            parts.append(markup.table(part.head, [[(cell,) for cell in row] for row in part.rows]))
+        lines += part.points
+    lines.append(report.verdict)
+    if not result.fit.converged:
+        lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
+    return "".join([*parts, *map(markup.paragraph, lines)])

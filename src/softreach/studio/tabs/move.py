@@ -1,0 +1,338 @@
+"""The moving arm: dragged by its tip, by its activations, to a target, or along a path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softreach.arm.manipulator import Manipulator
+from softreach.export.clouds import path_csv
+from softreach.inverse.path import PathStatus
+from softreach.inverse.request import positions_in
+from softreach.schema import activation_symbols
+from softreach.studio.captions import place_text, tip_text
+from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
+from softreach.studio.figures import track_picture
+from softreach.studio.files import LARGEST
+from softreach.studio.found import Found
+from softreach.studio.jobs.move import at_point
+from softreach.studio.scene.drag import DragBall
+from softreach.studio.scene.scene import MOST_BUNDLES
+from softreach.studio.session import Session
+from softreach.studio.state import MOST_POINTS, MOUSE, StudioState, TipPath, rod_of, solvable_rod
+from softreach.studio.widgets import TypedField, vector_kind
+from softreach.support.errors import InvalidInput
+from softreach.support.files.text import text_of
+from softreach.support.units import LengthUnit
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from viser import UploadedFile
+
+    from softreach.inverse import Solution
+
+# The tip, dragged
+
+_DRAG_HINT = (
+    "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
+    "solutions."
+)
+_ABOUT_MOUSE = (
+    "Use of the mouse in the scene, which it turns besides; a click is on a reached place"
+)
+
+
+def drag(panel: Fields) -> None:
+    """Use of the mouse in the scene, and the ball on the tip that it may drag."""
+    session = panel.session
+    eye = lambda: np.array(session.camera.actual().position)
+    ball = DragBall(session.client.scene, session.drag_to, eye)
+    panel.dropdown("mouse", MOUSE, attribute("appearance.mouse"), _ABOUT_MOUSE)
+
+    def place(state: StudioState, found: Found) -> None:
+        arm, look, lag = state.design, state.appearance, found.lag
+        grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
+        grasped = grasped and found.sample is None  # a marker may be on the tip
+        radius = float(arm.profile.radius(arm.length)) / arm.length
+        clear = state.path is not None
+        ball.move(found.tip if grasped else None, radius, dark=look.dark, clear=clear)
+        if lag is None:
+            ball.show_lag(None, None)
+        else:
+            ball.show_lag(lag.wanted, lag.dragged.tip / arm.length, _gap(state, found))
+
+    def text(state: StudioState, found: Found) -> list[str]:
+        gap = _gap(state, found)
+        if gap or not state.appearance.handle:
+            return [f"This branch ends {gap} short of the pointer."] if gap else []
+        return [_DRAG_HINT]
+
+    follows = "design", "appearance", "path", "found.tip", "found.sample", "found.lag"
+    panel.follow(*follows, show=place)
+    panel.text("design", "appearance.mouse", "found.lag", content=text)
+
+
+def _gap(state: StudioState, found: Found) -> str:
+    """How far the arm lags behind the pointer; "" where it does not."""
+    short = found.lag.dragged.gap if found.lag is not None else 0.0
+    return state.design.length_unit.rounded(short, digits=".3g") if short else ""
+
+
+# Activations
+
+_KINDS = {"N": "tension", "Pa": "pressure"}
+"""Kinds of inputs by their units."""
+_MOST = 40  # sliders: a page with hundreds takes minutes to build
+
+
+def activation(panel: Fields) -> None:
+    """Activations of the bundles within their bounds, and the place of the tip."""
+    follows = "design", "found.tip", "found.pointing", "found.posture"
+    panel.text(*follows, content=lambda state, found: tip_text(found, state.design))
+    with panel.folder("activation") as folder:
+        ends = lambda state, _: _slider_ends(state.design)
+        panel.anew(folder, "design", key=ends, build=_sliders)
+    rest = "Sets every activation to 0, or the nearest to it"
+    panel.change("Rest", lambda state: state.replace(activation=()), rest, **GRAY)
+
+
+def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
+    for bundle, (label, low, high) in enumerate(ends[:_MOST]):
+        room = 1e-6 * max(1.0, abs(low))
+        upper = max(high, low + room)  # a slider needs room; the state keeps to the bounds
+        hint = f"{label}: activation of a bundle, from {low:g} to {upper:g}; 0 is at rest"
+        step = 10.0 ** (math.floor(math.log10(upper - low)) - 3)  # round
+        panel.slider(label, (low, upper), step, _activation(bundle), hint)
+    if (hidden := len(ends) - _MOST) > 0:
+        drawn = "" if len(ends) <= MOST_BUNDLES else "; no bundle is drawn"
+        panel.say(f"{hidden} more bundles have no slider here{drawn}.")
+
+
+def _activation(bundle: int) -> Attribute:
+    def write(state: StudioState, value: float) -> StudioState:
+        before = state.activation
+        return state.replace(activation=(*before[:bundle], value, *before[bundle + 1 :]))
+
+    return Attribute(lambda state: state.activation[bundle], write)
+
+
+def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
+    """Label and bounds of every bundle."""
+    symbols, units = activation_symbols(arm.input_units), arm.input_units
+    kinds = [_KINDS.get(unit) for unit in units]
+    labels = [
+        (f"{kind} of {name}" if kind else f"{symbol} {name}") + (unit != "1") * f" [{unit}]"
+        for kind, symbol, name, unit in zip(kinds, symbols, arm.input_names, units, strict=True)
+    ]
+    return [(label, *ends) for label, ends in zip(labels, rod_of(arm).box.bounds, strict=True)]
+
+
+# A target, and every activation that reaches it
+
+_TARGET_HINT = "Every activation that reaches a place: drag the tip there, type it, or click."
+_HERE = "\N{CHECK MARK} "
+_NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
+
+
+def target(panel: Fields) -> None:
+    """The target, and the activations that reach it, in the unit of the design."""
+    with panel.folder("reach a place") as folder:
+        unit = lambda state, _: state.design.length_unit
+        panel.anew(folder, "design", key=unit, build=_target)
+
+
+def _target(panel: Fields, unit: LengthUnit) -> None:
+    session, arm = panel.session, panel.session.state.design
+    panel.text("found.answer", content=lambda state, found: [_answer_text(found.answer, state)])
+    kind = vector_kind(unit.name, lambda: session.state.design.length)
+    straight = tuple(unit.of(arm.base.to_world([0.0, 0.0, arm.length])).tolist())
+    field = TypedField(panel.gui, unit.label("target"), straight, "Where the tip should go", kind)
+    aim = lambda _: attempt(session, lambda: session.aim(unit.size * np.array(field.value)))
+    panel.kept(field).on_update(aim)
+
+    def follow(state: StudioState, _: Found) -> None:
+        if state.target is not None:
+            field.value = tuple(unit.of(np.array(state.target)).tolist())
+
+    panel.follow("target", show=follow)
+    some = lambda _, found: found.answer is not None and len(found.answer) > 0
+    with panel.folder("activations that reach it", some) as solutions:
+        panel.anew(solutions, "found.answer", build=_solutions)
+    panel.change(
+        "Clear the target",
+        lambda state: state.replace(target=None),
+        "Takes target and solutions away",
+        lambda state, _: state.target is not None,
+        **GRAY,
+    )
+
+
+def _solutions(panel: Fields, _: object) -> None:
+    """A button for each solution; that of the one that the arm is in is green."""
+    answer = panel.session.found.answer
+    for row in answer.activations if answer is not None else ():
+        text = ", ".join(f"{value:.4g}" for value in row)
+        act = lambda row=row: take(panel.session, row)
+        button = panel.button(text, act, "Moves the arm to this solution")
+
+        def mark(state: StudioState, _: Found, row: Any = row, button: Any = button) -> None:
+            label = button.label.removeprefix(_HERE)
+            is_here = _is_near(row, state)
+            button.color, button.label = "green" * is_here or None, _HERE * is_here + label
+
+        panel.follow("design", "activation", show=mark)
+
+
+def take(session: Session, activation: Any) -> None:
+    """Move the arm to a solution."""
+    there = tuple(activation.tolist())
+    session.update(lambda state: state.replace(activation=there))
+
+
+def _is_near(activation: Any, state: StudioState) -> bool:
+    scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
+    if len(scales) != len(activation):  # of a design before
+        return False
+    return bool((np.abs(activation - state.activation) <= _NEAR * scales).all())
+
+
+def _answer_text(answer: Solution | None, state: StudioState) -> str:
+    if answer is None:
+        return _TARGET_HINT
+    arm, unit = state.design, state.design.length_unit
+    place = place_text(answer.target / arm.length, arm)
+    if not len(answer):
+        certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
+        near = place_text(answer.nearest / arm.length, arm)
+        gap = unit.rounded(answer.gap, digits=".3g")
+        return f"{place} is {certain}. Nearest: {near}, {gap} away."
+    count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
+    return (
+        f"{count} {place} to {unit.rounded(answer.residuals.max(), digits='.1e')}. Press one "
+        f"({', '.join(arm.input_names)}) to move the arm there, or click its shape; the one with a "
+        "check mark is where it is."
+    )
+
+
+# A path
+
+_PATH_HINT = "The tip follows a path as far as its branch of solutions goes: load one, or click it."
+_POINTS = 24  # of the straight line to each place that is clicked
+
+
+def path(panel: Fields) -> None:
+    """A path of the tip: loaded or clicked, followed, played and saved."""
+    session = panel.session
+    with panel.folder("follow a path"):
+        panel.say(_PATH_HINT)
+        read = lambda file: _read_path(session, file)
+        panel.upload("Load a path (CSV)", read, "columns x, y, z [m]", mime_type=".csv,text/csv")
+        panel.change(
+            "Remove the path",
+            lambda state: state.replace(path=None),
+            "and what was found along it",
+            lambda state, _: state.path is not None,
+            **GRAY,
+        )
+        panel.text("design", "path", "found.track", content=_path_text)
+        with panel.folder("along it", lambda state, found: _followed(state, found) > 0):
+            plays = {"Play": lambda: session.follow("play"), "Stop": lambda: session.stop("play")}
+            panel.choices("", plays, "the arm along the path, from the point that is chosen")
+            panel.steps(
+                "point",
+                "path",
+                "found.track",
+                at=lambda s, found: (s.path.at if s.path else 0, max(_followed(s, found) - 1, 0)),
+                move=lambda point: _step_to(session, point),
+                hint="point of the path where the arm is",
+            )
+            with panel.folder("activations along the path") as graph:
+                pass
+            panel.picture(graph, "found.track", image=_timeline)
+            panel.button("Save the path (CSV)", lambda: _save(session), "with its activations")
+
+
+def _track(state: StudioState, found: Found) -> xr.Dataset | None:
+    """What was found along the path that there is now."""
+    track, path = found.track, state.path
+    return (
+        track if track is not None and path and track.sizes["point"] == len(path.points) else None
+    )
+
+
+def _followed(state: StudioState, found: Found) -> int:
+    """Number of points of the path that are followed."""
+    track = _track(state, found)
+    return 0 if track is None else int((track.status == PathStatus.FOLLOWED).sum())
+
+
+def _path_text(state: StudioState, found: Found) -> list[str]:
+    if state.path is None:
+        return []
+    track = _track(state, found)
+    return ["following ..." if track is None else end_text(track, state.design)]
+
+
+def end_text(track: xr.Dataset, arm: Manipulator) -> str:
+    """End of a path that `track_path` followed, and the reason for it, in words."""
+    count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
+    end, way = track.attrs["end"], arm.length_unit.rounded(float(track.end_length))
+    if end == "no_start":
+        return "The first point is not reached: out of reach, or not from this activation."
+    if not end:
+        return f"All {points} points are followed: {way} of path."
+    reasons = {
+        "fold": "the branch turns back (a fold)",
+        "snaps": "the arm snaps to another posture",
+        "bound": "{end_bundle} is at its {end_bound} bound",
+    }
+    reason = reasons[end].format(**track.attrs)
+    return f"{count} of {points} points are followed, {way} of path: there {reason}."
+
+
+def _timeline(state: StudioState, found: Found) -> Any:
+    track, count = _track(state, found), _followed(state, found)
+    return None if track is None or count < 2 else track_picture(track, state.design).image
+
+
+def extend_path(session: Session, point: np.ndarray) -> None:
+    """Lead the path straight on to a place [m]; the first begins at the tip."""
+    state, path = session.state, session.state.path
+    before = np.array(path.points) if path is not None else _tip(state)[None]
+    start = state.activation if path is None else path.start
+    more = np.linspace(before[-1], point, _POINTS + 1)[1:]
+    longer = TipPath.through(np.concatenate([before, more]), start)
+    session.update(lambda state: state.replace(path=longer))
+
+
+def _read_path(session: Session, file: UploadedFile) -> None:
+    points = positions_in(text_of("file", file.name, file.content, LARGEST), file.name)
+    if not 2 <= len(points) <= MOST_POINTS:
+        raise InvalidInput(file.name, f"{len(points)} points", f"2 to {MOST_POINTS} points")
+    state = session.state
+    near = np.linalg.norm(_tip(state) - points[0]) < 1e-3 * state.design.length
+    read = TipPath.through(points, state.activation if near else None)
+    session.update(lambda state: state.replace(path=read))
+
+
+def _step_to(session: Session, point: int) -> None:
+    track = _track(session.state, session.found)
+    if track is not None:
+        session.update(lambda state: at_point(state, track.activation.values, point))
+
+
+def _save(session: Session) -> None:
+    track = _track(session.state, session.found)
+    if track is not None:
+        session.send("path.csv", path_csv(track).encode())
+
+
+def _tip(state: StudioState) -> np.ndarray:
+    """Place of the tip [m]; an arm without equilibrium is refused."""
+    tip = solvable_rod(state.design).tips(np.array([state.activation]))[0]
+    if not np.isfinite(tip).all():
+        raise InvalidInput("activation", state.activation, "one with an equilibrium")
+    return tip
