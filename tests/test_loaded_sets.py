@@ -15,7 +15,7 @@ from softreach.arm import Loads, Manipulator, designs
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held
 from softreach.workspace import ReachableSolid, ReachableSurface, reachable_set
-from softreach.workspace.lifted_grid import LiftedGrid
+from softreach.workspace.grid import LiftedGrid
 from softreach.workspace.reach import rasterized_set
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -280,7 +280,8 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     arm = rules.arm
     try:
         with no_warnings():
-            solutions = solve_inverse(prepared_map(arm, TOL, cells=_CELLS), places)
+            prepared = prepared_map(arm, TOL, cells=_CELLS)
+            solutions = solve_inverse(prepared, places, from_rest=True)
     except InvalidInput as error:
         if error.name != "loads":
             raise

@@ -199,7 +199,7 @@ class Postures:
         return begin, start
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
-        """Postures of an arm that is in one at an activation (1, bundles), of known frame."""
+        """Postures of an arm that is in one of some at activations (k, bundles)."""
         return ContinuedPostures(
             self.solver, self.box, self.side, origin=self, at=gamma, frame=frame
         )
@@ -293,13 +293,13 @@ class FloodedPostures(Postures):
 
 @dataclass(frozen=True, eq=False)
 class ContinuedPostures(Postures):
-    """The same along straight lines from a posture that the arm is in, as if it were at rest."""
+    """The same along straight lines from the nearest posture that the arm may be in."""
 
     origin: Postures = field(kw_only=True)
     at: Array = field(kw_only=True)
-    """Its activation, shape (1, bundles)."""
+    """Activations, shape (k, bundles)."""
     frame: Array = field(kw_only=True)
-    """How it sees the world, shape (1, component)."""
+    """How the arm sees the world there, shape (k, component)."""
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
         return replace(self, at=gamma, frame=frame)
@@ -311,16 +311,26 @@ class ContinuedPostures(Postures):
     def rest_activation(self) -> Array:
         return self.at
 
+    def followed(self, gamma: Array) -> Followed:
+        """Branches of the twin from the nearest of the postures that it has."""
+        from scipy.spatial import KDTree
+
+        twin, rest, good = self._begun
+        some, scales = np.flatnonzero(good | ~good.any()), self.box.scales
+        near = some[np.atleast_1d(KDTree(self.at[some] / scales).query(gamma / scales)[1])]
+        return follow(twin, self.at[near], gamma, rest.of(near))
+
     @lazy
-    def _begun(self) -> tuple[Solver, Equilibria]:
-        """The twin that has this posture, and it; of two that have it that of the side."""
+    def _begun(self) -> tuple[Solver, Equilibria, Mask]:
+        """The twin that has most of these postures, on it, and which; of two that of the side."""
+        sides = []
         for postures in (self.origin, self.origin.mirrored):
-            twin = postures.twin
-            rest = twin.search(self.at, self.frame)
+            rest = postures.twin.search(self.at, self.frame)
             near = turn_between(rest.frame, self.frame) < _POLISHED
-            if (rest.is_stable & near)[0]:
+            sides.append((postures.twin, rest, rest.is_stable & near))
+            if sides[-1][2].all():
                 break
-        return twin, rest
+        return max(sides, key=lambda side: side[2].sum())
 
     @lazy
     def twin(self) -> Solver:
