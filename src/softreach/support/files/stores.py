@@ -23,7 +23,7 @@ import google_crc32c
 from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
 
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.files.atomic import place_to_read, sync
+from softreach.support.files.atomic import sync
 
 if TYPE_CHECKING:
     import zarr
