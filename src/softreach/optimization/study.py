@@ -15,7 +15,6 @@ import numpy as np
 
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.support.arguments import as_one_of, as_path
 from softreach.support.errors import InvalidInput, MissingExtra, in_short
 from softreach.support.lazy import lazy
 
@@ -53,8 +52,7 @@ class Study:
             MissingExtra: Optuna is not installed.
         """
         self.problem, self._first = problem, first
-        self._sampler = as_one_of("sampler", sampler, SAMPLERS)
-        self.seed = seed
+        self._sampler, self.seed = sampler, seed
         self.candidates: list[Candidate] = []
         """All designs that were judged, in their order."""
         self._kept: dict[str, Candidate] = {}  # in the storage, by what was asked
@@ -154,7 +152,7 @@ class Study:
 
     def _opened(self, place: str) -> optuna.Study:
         try:
-            study = self._created(_storage(as_path("storage", place)))
+            study = self._created(_storage(place))
             noted = study.user_attrs.get(_PROBLEM)
             if noted is None:
                 study.set_user_attr(_PROBLEM, self.problem.digest)
