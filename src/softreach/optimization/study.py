@@ -178,20 +178,18 @@ class Study:
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
     def _made_sampler(self) -> Any:
-        samplers, seed = self._optuna.samplers, self.seed
-        population = max(8, min(self._first, 48))
-        return {
-            "cma": lambda: samplers.CmaEsSampler(seed=seed, warn_independent_sampling=False),
-            "tpe": lambda: samplers.TPESampler(
-                seed=seed, multivariate=True, constant_liar=True, n_startup_trials=self._first
-            ),
-            "nsga2": lambda: samplers.NSGAIISampler(seed=seed, population_size=population),
-            "nsga3": lambda: samplers.NSGAIIISampler(seed=seed, population_size=population),
-            "sobol": lambda: samplers.QMCSampler(
-                seed=seed, scramble=True, warn_independent_sampling=False
-            ),
-            "random": lambda: samplers.RandomSampler(seed=seed),
-        }[self.kind]()
+        samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
+        population = {"population_size": max(8, min(self._first, 48))}
+        after = {"multivariate": True, "constant_liar": True, "n_startup_trials": self._first}
+        make, options = {
+            "cma": (samplers.CmaEsSampler, quiet),
+            "tpe": (samplers.TPESampler, after),
+            "nsga2": (samplers.NSGAIISampler, population),
+            "nsga3": (samplers.NSGAIIISampler, population),
+            "sobol": (samplers.QMCSampler, {"scramble": True, **quiet}),
+            "random": (samplers.RandomSampler, {}),
+        }[self.kind]
+        return make(seed=self.seed, **options)
 
     @lazy
     def _space(self) -> dict[str, Any]:
