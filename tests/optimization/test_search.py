@@ -242,6 +242,7 @@ def test_an_objective_that_no_design_has_is_said_in_one_line():
         (dict(free=FREE, maximize="coverage"), "the requirements have no regions"),
         (dict(free=FREE, maximize="mass", minimize="mass"), "given once"),
         (dict(free=FREE, designs=0), "whole number"),
+        (dict(free=FREE, sampler="luck"), "one of auto, cma"),
     ],
 )
 def test_what_cannot_be_searched_is_refused_in_one_line(arguments, said):

@@ -287,7 +287,7 @@ def checked(
     choose: Chooser = chosen,
 ) -> Check:
     """As `check`, with reachable sets to its accuracy, and poses that are chosen for places."""
-    payloads = needs.payloads or (None,)
+    payloads = tuple(needs.payloads) or (None,)
     keeps = tuple(keep for keep in needs.keeps if keep.when == "targets" and needs.targets)
     every: list[PoseRules] = []
     posed: list[Posed] = []
@@ -373,16 +373,16 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
             continue
         gap, number = float(gaps[load, place]), int(np.flatnonzero(own)[place])
         excess = max(gap - target.within, TOL * length) / length
-        where = ", ".join(f"{x / unit.size:.4g}" for x in target.places[place])
+        where = ", ".join(f"{x / unit.size:.4g}" for x in target.points[place])
         text = f"{met} reached; place {place + 1} at ({where}) {unit.name}"
         more, laden = "", _under(made.payloads[load])
-        away = float(np.linalg.norm(target.places[place] - made.arm.base.position))
+        away = float(np.linalg.norm(target.points[place] - made.arm.base.position))
         if gap > length + away - 1e-9:
             text += f" is not held{laden}: no stable equilibrium"
         else:
             text += f" is missed by {unit.rounded(gap - target.within)}{laden}"
             pose = made.poses[load, number]
-            more = advice(rules[int(load)].arm, target.places[place], pose, unit)
+            more = advice(rules[int(load)].arm, target.points[place], pose, unit)
         pairs = zip(made.payloads, reached, strict=True)
         held = [payload for payload, row in pairs if payload is not None and row.all()]
         if held:

@@ -209,8 +209,8 @@ def needs_parts(needs: Requirements, unit: LengthUnit) -> dict[str, Callable[[],
     parts: dict[str, Callable[[], Requirements]] = {}
     for target in needs.targets:
         where = ""
-        if target.places is not None and len(target.places) == 1:
-            where = f" ({', '.join(f'{x / unit.size:.4g}' for x in target.places[0])}) {unit.name}"
+        if len(target.points) == 1:
+            where = f" ({', '.join(f'{x / unit.size:.4g}' for x in target.points[0])}) {unit.name}"
         parts[target.name + where] = without("targets", target)
     for keep in needs.keeps:
         parts[f"{keep.name}, to {keep.kind.replace('_', ' ')}"] = without("keeps", keep)
