@@ -15,8 +15,6 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.memory import peak_bytes, reset_peak
 from softreach import plot
 from softreach.arm import designs

@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import as_numbers
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.versions import SCHEMA_VERSION, versions
 
 if TYPE_CHECKING:
@@ -193,11 +193,16 @@ def _faults(cloud: xr.Dataset) -> Iterator[tuple[str, Any, Any]]:
     if not 0 < cloud.attrs["tol"] < np.inf:
         yield "attrs['tol']", cloud.attrs["tol"], "a finite number > 0"
     frame_of(cloud)
-    arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
-    for what, given, wanted in _disagreements(cloud, arm):
-        yield what, given, f"{wanted}, as its design says"
     if "status" in cloud.coords and not np.isin(cloud["status"].values, np.arange(5)).all():
         yield "status", "another number", f"one of {_STATUS}"
+    try:
+        arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
+    except InvalidDesign as error:
+        if all(fault.path.endswith(".kind") for fault in error.faults):
+            return  # classes that are not imported: the points can be used without them
+        raise
+    for what, given, wanted in _disagreements(cloud, arm):
+        yield what, given, f"{wanted}, as its design says"
 
 
 def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[tuple[str, Any, Any]]:
@@ -302,6 +307,15 @@ def storable(dataset: xr.Dataset) -> xr.Dataset:
     names = {name: each for name, each in dataset.coords.items() if each.dtype.kind == "U"}
     texts = np.dtypes.StringDType()
     return dataset.assign_coords({name: each.astype(texts) for name, each in names.items()})
+
+
+def stored_names(dataset: xr.Dataset) -> xr.Dataset:
+    """The inverse of `storable`: names that xarray can fill, join and pickle."""
+    names = {name: each for name, each in dataset.coords.items() if each.dtype.kind == "T"}
+    texts = {name: np.array(each.values.tolist(), dtype=str) for name, each in names.items()}
+    return dataset.assign_coords(
+        {name: (each.dims, texts[name], each.attrs) for name, each in names.items()}
+    )
 
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:

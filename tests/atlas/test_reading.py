@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from softreach.atlas import (
     over_length,
 )
 from softreach.atlas.executor import begin_design
+from softreach.atlas.metrics import METRIC_GROUPS
 from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command
@@ -30,7 +32,7 @@ from softreach.cli.app import run
 from softreach.picture.projection import view_axes
 from softreach.plot import plot_metric_map
 from softreach.plot.sheets import box_over_length, hull_over_length, panel_extent
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import (
     SMALL,
     TINY,
@@ -50,6 +52,58 @@ def test_stored_clouds_are_those_of_the_cloud_alone_to_half_a_step(paper):
     assert stored.activation.equals(alone.activation)
     assert np.abs(stored.tip.values - alone.tip.values).max() <= 0.5e-5 * (1 + 1e-9)
     assert stored.attrs == alone.attrs
+
+
+EVERYDAY = {
+    "where": lambda data, dim: data.where(data[dim] == data[dim]),
+    "where drop": lambda data, dim: data.where(data[dim] > data[dim][0], drop=True),
+    "reindex": lambda data, dim: data.reindex({dim: [*data[dim].values, 1e3]}),
+    "merge": lambda data, dim: xr.merge([data, data], compat="override", join="outer"),
+    "fillna": lambda data, dim: data.fillna(0.0),
+    "max": lambda data, dim: data.max(),
+    "mean": lambda data, dim: data.mean(dim),
+    "diff": lambda data, dim: data.diff(dim),
+    "sel": lambda data, dim: data.sel({dim: data[dim][-1]}),
+    "sortby": lambda data, dim: data.sortby(dim, ascending=False),
+    "concat": lambda data, dim: xr.concat([data, data], "again"),
+    "to_dataframe": lambda data, dim: data.drop_dims("sample").to_dataframe(),
+    "pickle": lambda data, dim: pickle.loads(pickle.dumps(data.load())),
+}
+
+
+@pytest.mark.parametrize("operation", EVERYDAY.values(), ids=EVERYDAY)
+def test_an_atlas_that_was_read_is_a_dataset_like_any_other(whole, operation):
+    operation(whole, "taper")._repr_html_()
+
+
+@pytest.mark.parametrize("name", ["where", "where drop", "reindex", "max", "diff", "pickle"])
+def test_so_is_a_cloud(tmp_path, trunk, name):
+    sr.save_cloud(sr.compute_cloud(trunk, 50), tmp_path / "cloud.zarr")
+    cloud = sr.open_cloud(tmp_path / "cloud.zarr")
+    numbered = cloud.assign_coords(sample=np.arange(50.0))
+    EVERYDAY[name](numbered, "sample")._repr_html_()
+    assert cloud.reindex(axis=["z", "none"]).tip.isnull().any()
+
+
+def test_a_metric_that_a_later_version_has_does_not_stop_an_atlas(tmp_path, monkeypatch):
+    settings = {**TINY, "metrics": ["extent"], "keep_clouds": False}
+    with monkeypatch.context() as older:
+        older.setattr("softreach.atlas.command.version", lambda _: "0.0.9")
+        older.setitem(METRIC_GROUPS, "extent", METRIC_GROUPS["extent"][:-1])
+        begun = build_atlas(small_space(), tmp_path / "a.zarr", **settings).load()
+    with pytest.warns(SoftreachWarning, match=r"begun by softreach 0\.0\.9"):
+        atlas = build_atlas(small_space(), tmp_path / "a.zarr", **settings)
+    assert_same(atlas, begun)
+
+
+def test_a_cloud_of_somebodys_own_actuator_opens_without_its_module(tmp_path, trunk):
+    cloud = sr.compute_cloud(trunk, 50)
+    cloud.attrs["design"] = cloud.attrs["design"].replace('kind = "fiber"', 'kind = "Magnets"')
+    sr.save_cloud(cloud, tmp_path / "cloud.zarr")
+    found = sr.open_cloud(tmp_path / "cloud.zarr")
+    assert sr.convex_hull(found.tip).volume == sr.convex_hull(cloud.tip).volume
+    with pytest.raises(sr.InvalidDesign, match=r"Magnets.*--import"):
+        sr.cloud.design_of(found)
 
 
 def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
@@ -253,6 +307,12 @@ def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
     assert run(["atlas", "best", store, "volume", "--where", "taper_deg<=1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["taper_deg"] == [0.0]
+    design = tmp_path / "best.toml"
+    assert run(["atlas", "best", store, "volume", "--out", str(design)]) == 0
+    best = best_designs(open_atlas(store), "volume")
+    taper = float(best.taper[0])
+    assert sr.Manipulator.load(design) == sr.designs.minimal_trunk(taper=taper)
+    assert run(["atlas", "best", store, "volume", "--where", "volume>=9", "--out", "a.toml"]) == 2
 
 
 def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
@@ -325,7 +385,7 @@ def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
     atlas = varied(tmp_path / "a.zarr")
     across, up = sheet_axes(atlas)
     assert across.label == "E of rings[0].material (Pa)"
-    assert up.label == "$Z_1/L$ of left"
+    assert up.label == "Z₁/L of left"
     assert plot_metric_map(atlas, "reach_height").get_xlabel() == across.label
 
 

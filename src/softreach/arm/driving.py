@@ -40,8 +40,8 @@ class Lengths(Protocol):
         """∂s/∂γ at activations with tensions [m per unit], shape (n or 1, tendon, bundle)."""
         ...
 
-    def continued_from(self, inner: Array) -> Self:
-        """Those of the arm in its posture at activations with tensions, shape (1, bundles)."""
+    def continued_from(self, inner: Array, frames: Array | None = None) -> Self:
+        """Those of the arm in its posture at activations with tensions, shape (k, bundles)."""
         ...
 
 

@@ -139,6 +139,8 @@ def best(
     smallest: bool = False,
     where: list[str] | None = None,
     count: Whole = 1,
+    out: options.Out = None,
+    overwrite: options.Overwrite = False,
     json: options.AsJson = False,
 ) -> None:
     """Find the designs with the largest metric, under constraints.
@@ -150,11 +152,21 @@ def best(
         smallest: Prefer small values.
         where: A constraint, unreachability<=0.4 or taper_deg>=1. May be repeated.
         count: Number of designs.
+        out: Design file (.toml) for the best of them.
     """
-    from softreach.atlas import best_designs, open_atlas
+    from softreach.arm.design_file import DESIGN_FILE
+    from softreach.atlas import atlas_design, best_designs, open_atlas
+    from softreach.atlas.reading import command_of
 
+    options.check_output(out, DESIGN_FILE, overwrite)
     atlas = open_atlas(store)
     designs = best_designs(atlas, metric, smallest=smallest, where=where or (), count=count)
+    if out is not None:
+        if not designs.sizes["rank"]:
+            raise NotPossible(f"no design of {store} meets {' and '.join(where or ())}")
+        parameters = command_of(atlas).space.names
+        first = {name: float(designs[name][0]) for name in parameters}
+        atlas_design(atlas, **first).save(out, overwrite=overwrite)
     console.rows(f"best {metric} of {store}", rows_of(designs), json)
 
 
