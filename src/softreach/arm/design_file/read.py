@@ -104,7 +104,7 @@ class _Reader(FaultReader):
         super().__init__()
         self.places: dict[str, Place] = {}
         self._document = document
-        self._materials: dict[str, Material | None] = {}
+        self._materials: dict[str, Any] = {}
 
     def fields(self) -> dict[str, Any]:
         """Fields of the arm, without what is faulty, nor drives of actuators that may be."""
@@ -130,7 +130,7 @@ class _Reader(FaultReader):
         self._check_keys(display, "display", ["unit"])
         self.places["display_unit"] = Place("display.unit")
         fields["display_unit"], fields["point"] = display.get("unit"), self._document.get("point")
-        return {name: value for name, value in fields.items() if value is not None}
+        return {name: x for name, x in fields.items() if x is not None and x is not WRONG}
 
     def _alone(self, name: str, kind: type[Part]) -> Any:
         raw = self._document.get(name)
@@ -140,7 +140,7 @@ class _Reader(FaultReader):
         """The sound parts of a list of tables, and where they stand by their paths in the arm."""
         tables = self._tables(self._document, name)
         each = [(path, self._any(kind, raw, path)) for raw, path in tables]
-        sound = [(self.places[path], part) for path, part in each if part is not None]
+        sound = [(self.places[path], part) for path, part in each if part is not WRONG]
         parts = [part for _, part in sound]
         names = [each.name for each in named_actuators(parts)] if kind is Actuator else []
         names += [f"markers.{each.name}" for each in parts] if kind is Marker else []
@@ -157,7 +157,7 @@ class _Reader(FaultReader):
             return self._part(KINDS[kind][named], raw, path)
         own = own_kind(kind, named) if isinstance(named, str) else None
         if own is None:
-            return self._refuse(f"{path}.kind", named, _kinds_text(kind, named), None)
+            return self._refuse(f"{path}.kind", named, _kinds_text(kind, named))
         # A class outside softreach: fields as they are in Python, in SI units.
         values = {
             key: self._plain(value, f"{path}.{key}") for key, value in raw.items() if key != "kind"
@@ -165,7 +165,7 @@ class _Reader(FaultReader):
         try:
             return self._made(own, Place(path), values)
         except TypeError as error:
-            return self._refuse(path, own.__name__, f"has other fields: {error}", None)
+            return self._refuse(path, own.__name__, f"has other fields: {error}")
 
     def _part(
         self, kind: type[Part], raw: Any, path: str, without: tuple[str, ...] = (), **others: Any
@@ -204,40 +204,38 @@ class _Reader(FaultReader):
         values: Mapping[str, Any],
         wrong: Set[str] = frozenset(),
     ) -> Any:
-        """A part, which judges its values; None, and its faults, where they are wrong.
+        """A part, which judges its values; `WRONG`, and its faults, where they are wrong.
 
         Fields that no value can be given are None, so that the part can judge the others.
         """
         self.places[place.path] = place
         if "" in wrong:
-            return None
+            return WRONG
         required = {key.field for key in keys_of(kind).values() if key.required} if wrong else set()
         try:
             part = kind(**{**dict.fromkeys(wrong & required), **values})
         except InvalidDesign as error:
             sure = [f for f in error.faults if wrong.isdisjoint(f.path.split(", "))]
             self.faults += in_file_terms(InvalidDesign(sure), "", {**self.places, "": place}).faults
-            return None
-        return None if wrong else part
+            return WRONG
+        return WRONG if wrong else part
 
     def _value(self, kind: type[Part], key: Key, raw: Any, path: str) -> Any:
         """Value of a field in SI units; what it may be is for the part to judge."""
         if key.number is not None:
             return self._number(key.number, raw, path)
         if key.field in ("material", "core"):
-            made = self._material(raw, path, of="core" if key.field == "core" else path)
-        elif key.field == "measured":
-            made = self._part(Measured, raw, path)
-        elif key.of_names and not isinstance(raw, str):
+            return self._material(raw, path, of="core" if key.field == "core" else path)
+        if key.field == "measured":
+            return self._part(Measured, raw, path)
+        if key.of_names and not isinstance(raw, str):
             return self._refuse(path, raw, "must be text")
-        elif key.field == "point_loads":
-            if not isinstance(raw, list):
-                return self._refuse(path, raw, "must be a list")
-            each = [self._part(PointLoad, one, f"{path}[{k}]") for k, one in enumerate(raw)]
-            made = None if None in each else tuple(each)
-        else:
+        if key.field != "point_loads":
             return raw
-        return WRONG if made is None else made
+        if not isinstance(raw, list):
+            return self._refuse(path, raw, "must be a list")
+        each = [self._part(PointLoad, one, f"{path}[{k}]") for k, one in enumerate(raw)]
+        return WRONG if WRONG in each else tuple(each)
 
     def _number(self, number: Number, raw: Any, path: str) -> Any:
         if isinstance(raw, str) and number.named:  # which for the part is the name of a station
@@ -261,10 +259,9 @@ class _Reader(FaultReader):
         values, wrong = self._values(kind, raw, path)
         if isinstance(values.get("values"), list):
             values["values"] = self._number(number, values["values"], f"{path}.values")
-        made = self._made(kind, Place(path, field_keys(kind), raw), values, wrong)
-        return WRONG if made is None else made
+        return self._made(kind, Place(path, field_keys(kind), raw), values, wrong)
 
-    def _material(self, raw: Any, path: str, of: str) -> Material | None:
+    def _material(self, raw: Any, path: str, of: str) -> Any:
         if isinstance(raw, dict):
             made = self._part(Material, raw, path)
             self.places[of] = self.places[path]
@@ -277,18 +274,18 @@ class _Reader(FaultReader):
             return named_material(raw)
         if not isinstance(raw, str):
             allowed = "must be the name of a material, or a table of its values"
-            return self._refuse(path, raw, allowed, None)
-        return self._refuse(path, raw, _materials_text(raw, [*self._materials]), None)
+            return self._refuse(path, raw, allowed)
+        return self._refuse(path, raw, _materials_text(raw, [*self._materials]))
 
-    def _section(self) -> Section | None:
+    def _section(self) -> Any:
         rings = [self._part(Ring, raw, path) for raw, path in self._tables(self._document, "rings")]
         for k in range(len(rings)):
             path = f"rings[{k}].material"
             self.places.setdefault(path, Place(path, field_keys(Material)))
         table = self._table(self._document, "section")
         values, wrong = self._values(Section, table, "section")
-        if not rings or None in rings:
-            return None
+        if not rings or WRONG in rings:
+            return WRONG
         place = Place("section", field_keys(Section), table)
         return self._made(Section, place, values | {"rings": tuple(rings)}, wrong)
 
@@ -303,12 +300,7 @@ class _Reader(FaultReader):
         if self._document.get("rings") == []:
             self._refuse("rings", [], "must not be empty")
         for key in (key for key in self._document if key not in LAYOUT):
-            home = _home(key)
-            said = (
-                f"unknown key; {home}"
-                if home
-                else unknown_key(key, {name: name for name in LAYOUT})
-            )
+            said = _home(key) or unknown_key(key, {name: name for name in LAYOUT})
             self._refuse(key_text(key), self._document[key], said)
 
     def _plain(self, value: Any, path: str) -> Any:
@@ -328,11 +320,11 @@ def _in_radians(value: Any) -> Any:
 
 def _home(key: str) -> str:
     if (kind := key.removesuffix("s")) in KINDS[Actuator]:
-        return f'write [[actuators]] with kind = "{kind}"'
+        return f'unknown key; write [[actuators]] with kind = "{kind}"'
     homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
     homes |= {"[materials.NAME]": Material, "[loads]": Loads}
     home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
-    return f"it belongs in {home}" if home else ""
+    return f"unknown key; it belongs in {home}" if home else ""
 
 
 def _materials_text(name: str, own: list[str]) -> str:
