@@ -199,10 +199,17 @@ class Postures:
         return begin, start
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
-        """Postures of an arm that is in one at an activation (1, bundles), of known frame."""
-        return ContinuedPostures(
-            self.solver, self.box, self.side, origin=self, at=gamma, frame=frame
-        )
+        """Postures of an arm that is in one at an activation (1, bundles), of known frame.
+
+        Of two twins that have this posture that of the same side is followed.
+        """
+        for side in (self, self.mirrored):
+            rest = side.twin.search(gamma, frame)
+            if (rest.is_stable & (turn_between(rest.frame, frame) < _POLISHED))[0]:
+                break
+        continued = ContinuedPostures(self.solver, self.box, side.side, origin=self)
+        vars(continued).update(twin=side.twin, rest_activation=gamma, rest=rest)
+        return continued
 
     def is_uncut(self, gamma: Array) -> Mask:
         """Mask of activations in cells of the flooded grid that are on one branch."""
@@ -296,39 +303,12 @@ class ContinuedPostures(Postures):
     """The same along straight lines from a posture that the arm is in, as if it were at rest."""
 
     origin: Postures = field(kw_only=True)
-    at: Array = field(kw_only=True)
-    """Its activation, shape (1, bundles)."""
-    frame: Array = field(kw_only=True)
-    """How it sees the world, shape (1, component)."""
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
-        return replace(self, at=gamma, frame=frame)
+        return self.origin.continued_from(gamma, frame)
 
     def direct(self, gamma: Array, rows: slice, equilibria: Equilibria) -> None:
         """Nothing: all are followed."""
-
-    @lazy
-    def rest_activation(self) -> Array:
-        return self.at
-
-    @lazy
-    def _begun(self) -> tuple[Solver, Equilibria]:
-        """The twin that has this posture, and it; of two that have it that of the side."""
-        for postures in (self.origin, self.origin.mirrored):
-            twin = postures.twin
-            rest = twin.search(self.at, self.frame)
-            near = turn_between(rest.frame, self.frame) < _POLISHED
-            if (rest.is_stable & near)[0]:
-                break
-        return twin, rest
-
-    @lazy
-    def twin(self) -> Solver:
-        return self._begun[0]
-
-    @lazy
-    def rest(self) -> Equilibria:
-        return self._begun[1]
 
     @property
     def is_held_at_rest(self) -> bool:
