@@ -8,7 +8,6 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-
 UNEVEN = 1e3
 """Roughness of cells beside one that is cut."""
 

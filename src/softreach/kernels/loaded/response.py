@@ -44,7 +44,6 @@ from softreach.kernels.loaded.unloaded_frames import (
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.vector import back, combination, cross, plus, times, turned
 
-
 TRACE = 19
 """Numbers kept of a section: G, H, M, y, the turn of the unloaded arm as a quaternion, and the
 force that follows the tip, along G, H, K."""

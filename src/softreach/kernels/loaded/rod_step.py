@@ -30,7 +30,6 @@ import math
 from softreach.kernels.compiler import inline
 from softreach.kernels.vector import combination, cross, dot, plus, times
 
-
 _NO_DRIVE = (0.0, 0.0, (0.0, 0.0, 0.0))
 _S = math.sqrt(21)
 NODES = (0.0, (7 - _S) / 14, 0.5, (7 + _S) / 14, 1.0)

@@ -51,7 +51,6 @@ from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, rest_frame
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.vector import back, combination, cross, dot, plus, turned
 
-
 # Rows of the workspace behind those of the section.
 DONE, LEFT, SIZE = (SECTION + k * LANES for k in range(3))
 # Rows of a node.

@@ -16,7 +16,6 @@ from softreach.kernels.loaded.rod_step import NODES
 from softreach.kernels.rod.magnus import exponent
 from softreach.kernels.vector import dot, times
 
-
 # A step is a row of a table: η dZ, d1, d2, d3, ζ̂ dZ of each of its nodes, tip first, LANES numbers
 # each.
 NODE_ROWS = 5

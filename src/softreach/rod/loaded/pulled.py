@@ -24,8 +24,6 @@ from softreach.support.arrays import Array, Index, Mask, rows
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
-__all__ = ["LoadedLengths"]
-
 _BLOCK = 256
 _PIECES = 8  # of the arm, on which its strains are smooth
 _MOST_STEPS = 40
