@@ -8,8 +8,6 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["UNEVEN", "interpolate"]
-
 UNEVEN = 1e3
 """Roughness of cells beside one that is cut."""
 

@@ -11,16 +11,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.lanes import LANES, copy, get, get_four, load_all, put, put_four, turn_at
-from softreach.kernels.loaded.explicit_rk8 import at_stages
-from softreach.kernels.loaded.frames import (
-    along,
-    inverse_rows,
-    missing_turn,
-    orthonormal,
-    put_world,
-    world,
-)
-from softreach.kernels.loaded.rod_step import column_step, frame_tip
+from softreach.kernels.loaded.rod_step import at_stages, column_step, frame_tip
 from softreach.kernels.loaded.section import (
     FORCE,
     MOMENT,
@@ -30,10 +21,16 @@ from softreach.kernels.loaded.section import (
     G,
     M,
     Y,
+    along,
     begin_tangents,
     begin_tip,
     frame_nodes,
+    inverse_rows,
+    missing_turn,
+    orthonormal,
     push,
+    put_world,
+    world,
 )
 from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.shooting import node_world
@@ -46,8 +43,6 @@ from softreach.kernels.loaded.unloaded_frames import (
 )
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.vector import back, combination, cross, plus, times, turned
-
-__all__ = ["TRACE", "respond"]
 
 TRACE = 19
 """Numbers kept of a section: G, H, M, y, the turn of the unloaded arm as a quaternion, and the

@@ -4,6 +4,9 @@ A section is the world as it sees it, the moment and the tip. Walks with tangent
 world too, at the tip end of a segment along the axes of that, and what they change. Where all
 forces are along G a turn about it changes nothing: it is left out, and H is any direction normal to
 G.
+
+Frames of the world as sections see them are two directions G, H, with G × H as third axis. A matrix
+is a tuple of its three columns.
 """
 
 from __future__ import annotations
@@ -12,19 +15,13 @@ import math
 
 from softreach.kernels.compiler import inline
 from softreach.kernels.lanes import LANES, get, put, turn_at
-from softreach.kernels.loaded.explicit_rk8 import at_stages
-from softreach.kernels.loaded.frames import (
-    adjugate_rows,
-    along,
-    missing_direction,
-    missing_turn,
-    put_three,
-    size_of,
-    three,
-    unit,
-    world,
+from softreach.kernels.loaded.rod_step import (
+    at_stages,
+    direction_tip,
+    direction_walk,
+    frame_tip,
+    frame_walk,
 )
-from softreach.kernels.loaded.rod_step import direction_tip, direction_walk, frame_tip, frame_walk
 from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
 from softreach.kernels.vector import combination, cross, dot, minus, plus, times
 
@@ -34,6 +31,108 @@ THETA, MOMENT, FORCE = (15 * LANES + 9 * k * LANES for k in range(3))  # three t
 TURNS = 42 * LANES  # of the section by the tangents, along G, H, K, 3 x 3
 CARRIED = 51 * LANES  # the same of the tip where the segment began, 2 x 2 of size 1
 MARGIN, SHARE, SIZE = (55 * LANES + k * LANES for k in range(3))
+_SINGULAR = 1e-12
+
+
+@inline
+def unit(v):
+    """v / |v|."""
+    return times(1.0 / math.sqrt(dot(v, v)), v)
+
+
+@inline
+def normal_to(g):
+    """A unit vector normal to g."""
+    s = math.copysign(1.0, g[2])
+    a = -1.0 / (s + g[2])
+    return 1.0 + s * g[0] * g[0] * a, s * g[0] * g[1] * a, -s * g[0]
+
+
+@inline
+def world(w, at, i):
+    """G, H and G × H."""
+    g, h = get(w, at, i), get(w, at + 3 * LANES, i)
+    return g, h, cross(g, h)
+
+
+@inline
+def orthonormal(g, h):
+    """G, H and G × H made of G, and of an H that may lean a little."""
+    g = unit(g)
+    h = unit(minus(h, times(dot(g, h), g)))
+    return g, h, cross(g, h)
+
+
+@inline
+def put_world(w, at, i, g, h):
+    """Write G, and H normal to it."""
+    axes = orthonormal(g, h)
+    put(w, at, i, axes[0])
+    put(w, at + 3 * LANES, i, axes[1])
+
+
+@inline
+def three(w, at, i):
+    """Three vectors of one lane: a matrix by its columns."""
+    return get(w, at, i), get(w, at + 3 * LANES, i), get(w, at + 6 * LANES, i)
+
+
+@inline
+def put_three(w, at, i, s):
+    """Write three vectors of one lane."""
+    put(w, at, i, s[0])
+    put(w, at + 3 * LANES, i, s[1])
+    put(w, at + 6 * LANES, i, s[2])
+
+
+@inline
+def product(columns, c):
+    """Columns of a matrix times those of another."""
+    return combination(c[0], columns), combination(c[1], columns), combination(c[2], columns)
+
+
+@inline
+def along(axes, v):
+    """Components of v along three axes."""
+    return dot(axes[0], v), dot(axes[1], v), dot(axes[2], v)
+
+
+@inline
+def adjugate_rows(a):
+    """Rows of det(A) A⁻¹ for a matrix of columns a."""
+    return cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])
+
+
+@inline
+def size_of(a):
+    """Frobenius norm of a matrix."""
+    return math.sqrt(dot(a[0], a[0]) + dot(a[1], a[1]) + dot(a[2], a[2]))
+
+
+@inline
+def inverse_rows(a):
+    """Rows of the inverse; of a singular matrix, where a conjugate point is, of one near it."""
+    rows = adjugate_rows(a)
+    determinant = dot(rows[0], a[0])
+    least = _SINGULAR * size_of(a) * size_of(rows)
+    scale = 1.0 / math.copysign(max(abs(determinant), least), determinant)
+    return times(scale, rows[0]), times(scale, rows[1]), times(scale, rows[2])
+
+
+@inline
+def missing_turn(now, wanted):
+    """The rotation from one frame to another, along their axes."""
+    twice = plus(cross(now[0], wanted[0]), plus(cross(now[1], wanted[1]), cross(now[2], wanted[2])))
+    sine = 0.5 * math.sqrt(dot(twice, twice))
+    cosine = 0.5 * (dot(now[0], wanted[0]) + dot(now[1], wanted[1]) + dot(now[2], wanted[2]) - 1.0)
+    scale = 0.5 * (math.atan2(sine, cosine) / sine if sine > 1e-9 else 1.0)
+    return times(scale, along(now, twice))
+
+
+@inline
+def missing_direction(now, wanted):
+    """The same of the first axes alone, as the sine of the angle between them."""
+    return 0.0, -dot(now[2], wanted[0]), dot(now[1], wanted[0])
 
 
 @inline

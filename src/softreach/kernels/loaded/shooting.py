@@ -18,17 +18,6 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.lanes import LANES, get, load_all, put, turn_at
-from softreach.kernels.loaded.frames import (
-    along,
-    inverse_rows,
-    normal_to,
-    product,
-    put_three,
-    put_world,
-    three,
-    unit,
-    world,
-)
 from softreach.kernels.loaded.section import (
     ALONG_ONE,
     FORCE,
@@ -42,18 +31,25 @@ from softreach.kernels.loaded.section import (
     H,
     M,
     Y,
+    along,
     begin_tangents,
     begin_tip,
     carry_normal,
+    inverse_rows,
+    normal_to,
+    product,
     push,
     push_tangents,
+    put_three,
+    put_world,
+    three,
+    unit,
+    world,
 )
 from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.unloaded_frames import STEP_ROWS, TURN, rest_frames
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.vector import back, combination, cross, dot, plus, turned
-
-__all__ = ["FOUND", "node_world", "solve_directions", "solve_frames"]
 
 # Rows of the workspace behind those of the section.
 DONE, LEFT, SIZE = (SECTION + k * LANES for k in range(3))

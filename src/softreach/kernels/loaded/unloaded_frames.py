@@ -12,11 +12,9 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.lanes import LANES
-from softreach.kernels.loaded.explicit_rk8 import NODES
+from softreach.kernels.loaded.rod_step import NODES
 from softreach.kernels.rod.magnus import exponent
 from softreach.kernels.vector import dot, times
-
-__all__ = ["NODE_ROWS", "STEP_ROWS", "TURN", "TURN_ROWS", "WORK", "pack_lengths", "rest_frames"]
 
 # A step is a row of a table: η dZ, d1, d2, d3, ζ̂ dZ of each of its nodes, tip first, LANES numbers
 # each.

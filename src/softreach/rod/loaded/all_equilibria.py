@@ -41,13 +41,12 @@ from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, Mask, as_floats
 from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 _SMALL = 1e-9  # of a length, below which it is shown as 0, in L
 
@@ -74,7 +73,7 @@ class AllEquilibria:
     signs: NDArray[np.int8]
     """Sense of rotation of the map of directions there: kept (1), or turned over (-1) where the
     ways to fall are odd in number; 0 of rings; shape (n,)."""
-    is_ring: NDArray[np.bool_]
+    is_ring: Mask
     """Mask of those that stand for a ring, all around the direction of gravity; shape (n,)."""
     followed: int | None
     """The posture, which is that of the tip map; None where the arm snaps before."""
@@ -157,7 +156,7 @@ class _Roots(NamedTuple):
     directions: Array
     signs: NDArray[np.int8]
     """As in `AllEquilibria`, but of a ring that of the move outward."""
-    is_ring: NDArray[np.bool_]
+    is_ring: Mask
     complete: bool
 
 
@@ -234,7 +233,6 @@ def _crossing(loads: Loads, direction: Array) -> list[str]:
 def _one_of(
     rod: ArmMap, gamma: Array, directions: Array, margin: Array, *, complete: bool
 ) -> AllEquilibria:
-    """The posture alone."""
     return AllEquilibria(
         rod=rod,
         solver=None,
@@ -317,7 +315,6 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
 
 
 def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
-    """The same with other steps."""
     if roots.is_ring.any():
         return _search(solver, gamma, roots.directions[1:])
     image, axis = solver.base_map(gamma), solver.tables.axes[0]
@@ -360,7 +357,6 @@ def _judged(
 
 
 def _nearest(roots: _Roots, known: Array, axis: Array) -> int | None:
-    """Index of the posture, if there is one."""
     if not len(known) or not len(roots.directions):
         return None
     apart = np.linalg.norm(roots.directions - known[0], axis=1)

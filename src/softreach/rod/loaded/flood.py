@@ -27,8 +27,6 @@ _CORRECTION, _CORRECTION_OF_NODES = 0.12, 0.03  # [rad], of one segment and of s
 _TIP = 3.0  # weight of the correction of a tip [rad/L]
 _SHORTEST = 2.0**-20  # of a path, below which its branch has ended
 _MOST_STEPS = 3000
-_NODES = {1: 33, 2: 33, 3: 17}
-"""Nodes per free bundle: at most a few thousand postures."""
 _SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
 CUT = 1e6
@@ -106,14 +104,6 @@ def _judged(
     good = found.is_stable & (change < np.where(is_first, 2.0, 1.0) * allowed)
     shorter = np.where(wanted > 0.1, 0.4, 0.25)
     return good, np.where(good, np.clip(wanted, 0.5, 4.0), shorter)
-
-
-def grid_sizes(box: ActivationBox) -> tuple[int, ...] | None:
-    """Nodes for every bundle, or None for more free bundles than a grid can hold."""
-    nodes = _NODES.get(box.dimension)
-    if nodes is None:
-        return None
-    return tuple(nodes if free else 1 for free in box.is_free)
 
 
 @dataclass(frozen=True, eq=False)

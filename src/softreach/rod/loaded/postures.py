@@ -22,7 +22,7 @@ from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.kernels.lanes import LANES
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded.flood import CUT, PARTS, Flood, Flooding, Followed, follow, grid_sizes
+from softreach.rod.loaded.flood import CUT, PARTS, Flood, Flooding, Followed, follow
 from softreach.rod.loaded.shooting import Equilibria, turn_between
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
@@ -36,6 +36,7 @@ NEUTRAL = 1e-5
 SYMMETRIC = 1e-6
 """Of the directions that the base of an axisymmetric arm would have to see [rad]."""
 _AT_ONCE, _BY_LINE = BLOCK // 8, 32 * LANES  # samples per task
+_NODES = {1: 33, 2: 33, 3: 17}  # of the grid for each free bundle: at most a few thousand postures
 _TWIST = 1e-4  # [rad], of the twin over its length
 _OF_TWIN = 1e-3  # [L], its tolerance, as postures are polished on the arm
 _DOUBTFUL = 0.02  # margin below which what is found from the unloaded arm may not be its posture
@@ -219,9 +220,10 @@ class Postures:
 
     def with_flood(self) -> Postures:
         """The same, with starts from a grid over the box where that is worth it."""
-        sizes = grid_sizes(self.box)
-        if sizes is None or not self.is_held_at_rest:
+        nodes = _NODES.get(self.box.dimension)
+        if nodes is None or not self.is_held_at_rest:
             return self
+        sizes = tuple(nodes if free else 1 for free in self.box.is_free)
         grid = Flooding(self.twin, self.box, sizes)
         flood = grid.run(self.rest_activation, self.rest)
         on_arm = polished(self.solver, grid.gamma, flood.held, _BESIDE)
@@ -302,7 +304,7 @@ class ContinuedPostures(Postures):
     """How the arm sees the world there, shape (k, component)."""
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
-        return replace(self, at=gamma, frame=frame)
+        return self.origin.continued_from(gamma, frame)
 
     def direct(self, gamma: Array, rows: slice, equilibria: Equilibria) -> None:
         """Nothing: all are followed."""

@@ -13,7 +13,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.number import fields_of
 from softreach.arm.tables import quadrature
@@ -21,13 +20,9 @@ from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.rod.free import ArmRod
 from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.support import parallel
-from softreach.support.arrays import rows
+from softreach.support.arrays import Array, Index, Mask, rows
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
-
-__all__ = ["LoadedLengths"]
-
-Array = NDArray[np.float64]
 
 _BLOCK = 256
 _PIECES = 8  # of the arm, on which its strains are smooth
@@ -117,7 +112,7 @@ class LoadedLengths:
             left, state = left[kept], rows(state, kept)
         return Tensions(tension, taut)
 
-    def _lowered(self, state: _State, bundles: Array) -> tuple[_State, NDArray[np.intp]]:
+    def _lowered(self, state: _State, bundles: Array) -> tuple[_State, Index]:
         """Tensions that have an equilibrium to start with, halves of the first; and their rows."""
         for _ in range(_HALVINGS):
             lost = np.flatnonzero(_has_nan(state.shortening))
@@ -135,7 +130,7 @@ class LoadedLengths:
         excess += np.einsum("nij,nj->ni", state.slopes, state.tension)
         return self.law.complementary(state.slopes + np.diag(self.law.compliance), excess)
 
-    def _is_solved(self, state: _State, pulled: Array) -> NDArray[np.bool_]:
+    def _is_solved(self, state: _State, pulled: Array) -> Mask:
         """Samples whose tendons are as long as they are to be, or slack."""
         law = self.law
         left = state.tension * law.compliance + state.shortening - pulled
@@ -143,9 +138,7 @@ class LoadedLengths:
         miss = np.abs(np.minimum(left, own * state.tension)).max(axis=1)
         return miss <= _CONVERGED * law.arm.length
 
-    def _stepped(
-        self, state: _State, aimed: Array, bundles: Array
-    ) -> tuple[_State, NDArray[np.bool_]]:
+    def _stepped(self, state: _State, aimed: Array, bundles: Array) -> tuple[_State, Mask]:
         """The state after a step, halved where it has no equilibrium, and where there is one."""
         step = aimed - state.tension
         shortening = np.full_like(state.shortening, np.nan)
@@ -189,7 +182,7 @@ class LoadedLengths:
             ends = [inner.copy(), inner.copy()]
             ends[0][:, k] -= widths[k]
             ends[1][:, k] += widths[k]
-            s = [self._in_blocks(each) for each in ends]
+            s = [self.shortening(each) for each in ends]
             slopes[..., k] = (s[1] - s[0]) / (2.0 * widths[k])
         return slopes
 
@@ -206,13 +199,8 @@ class LoadedLengths:
         loads = np.concatenate([moment, force[:, None]], axis=1)
         return table, loads.reshape(*table.stations.shape, *loads.shape[1:])
 
-    def _in_blocks(self, inner: Array) -> Array:
-        blocks = parallel.blocks(len(inner), _BLOCK)
-        none = np.empty((0, len(self.law.columns)))
-        return np.concatenate([none, *(self.shortening(inner[block]) for block in blocks)])
 
-
-def _has_nan(values: Array) -> NDArray[np.bool_]:
+def _has_nan(values: Array) -> Mask:
     return np.asarray(np.isnan(values).any(axis=1))
 
 

@@ -20,8 +20,6 @@ from softreach.rod.tip_map import TipStatus, position_slopes
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 
-__all__ = ["PushingTip", "TipResponse"]
-
 _MOST_STEPS = 256
 _SHORTEST = 2.0**-12  # part of a force by which it is raised
 _MOST_TURN = 0.2  # [rad], of what a node sees

@@ -67,8 +67,7 @@ _SIDES = 1e-3  # [rad], between postures of two sides
 _SAFETY = 2.0
 _FEWEST_STEPS, _MOST_STEPS = 4, 256
 _FINER = 8  # times as many as let one end at every breakpoint are tried
-_UNJUDGED = 0
-"""Instead of a number of steps: no activation can judge any."""
+_UNJUDGED = 0  # instead of a number of steps
 _CRITICAL = 0.02
 _BULK, _OUTLYING = 0.99, 10.0
 _FEW = 64
@@ -129,10 +128,14 @@ class LoadedRod(ArmRod):
         """Steps with which `tol` holds all along the arm, if any are enough."""
         return self.fixed_steps or self._fewest(self.steps, shape_differences)
 
-    def _fewest(self, steps: int, differences: Differences) -> int | None:
-        gamma = pilot_activations(self.arm, self.box)
-        enough = _fewest_steps(self._solver_of, gamma, steps, differences)
-        return max(steps, self.unloaded_steps) if enough == _UNJUDGED else enough
+    def _fewest(self, least: int, differences: Differences) -> int | None:
+        pilot, steps = pilot_activations(self.arm, self.box), max(least, _FEWEST_STEPS)
+        others = pilot[_FEW:]  # behind the first, which are corners
+        few = np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
+        enough = _enough(self._solver_of, few, steps, differences)
+        if enough is not None:
+            enough = _enough(self._solver_of, pilot, enough or steps, differences)
+        return max(least, self.unloaded_steps) if enough == _UNJUDGED else enough
 
     @lazy
     def unloaded_steps(self) -> int:
@@ -333,32 +336,10 @@ class _ContinuedRod(LoadedRod):
         return self.origin._shape_solver
 
 
-def _fewest_steps(
-    solver_of: Callable[[int], Solver], pilot: Array, steps: int, differences: Differences
-) -> int | None:
-    """The fewest steps for the tolerance of the solvers.
-
-    Args:
-        solver_of: A solver of so many steps.
-        pilot: Activations to judge by, shape (n, bundles).
-        steps: The fewest to try.
-        differences: Differences that must be within the tolerance.
-
-    Returns:
-        Steps; None where even the most are too few, `_UNJUDGED` where nothing can be judged.
-    """
-    steps = max(steps, _FEWEST_STEPS)
-    others = pilot[_FEW:]  # behind the first, which are corners
-    few = np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
-    enough = _enough(solver_of, few, steps, differences)
-    if enough is None:
-        return None
-    return _enough(solver_of, pilot, enough or steps, differences)
-
-
 def _enough(
     solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
 ) -> int | None:
+    """The fewest steps, `_UNJUDGED` where nothing judges any; None where the most are too few."""
     tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
     known: Equilibria | None = None
     while steps <= max(_MOST_STEPS, _FINER * at_all):
@@ -407,11 +388,6 @@ def _distances(a: Array, b: Array) -> Array:
 
 
 def _check_steps(arm: Manipulator, phase: LoadPhase) -> None:
-    """Refuse loads that turn tangents more often than any number of steps can tell.
-
-    Raises:
-        InvalidInput: Too heavy loads.
-    """
     if phase.fewest_steps > _MOST_STEPS:
         load, most = f"of load number {load_number(arm):.3g}", f"at most {_MOST_STEPS} allowed"
         allowed = f"lighter: they need {phase.fewest_steps:,} steps, {most}"
@@ -419,11 +395,6 @@ def _check_steps(arm: Manipulator, phase: LoadPhase) -> None:
 
 
 def _checked(steps: int | None, tol: float) -> int:
-    """The steps that a tolerance needs.
-
-    Raises:
-        InvalidInput: None are enough.
-    """
     if steps is None:
         raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
     return steps

@@ -32,13 +32,6 @@ class Equilibria(NamedTuple):
     """First axis of the world at the nodes, tip first, as the base of the unloaded arm sees it,
     (n, 3 node); with loads of several directions also the second one, (n, 6 node)."""
 
-    @classmethod
-    def empty(cls, n: int, components: int) -> Equilibria:
-        """Room for n."""
-        status = np.full(n, TipStatus.UNDECIDED, np.int8)
-        nowhere, unknown = np.full((n, 3), np.nan), np.full(n, np.nan)
-        return cls(nowhere, status, unknown, np.zeros((n, components)))
-
     @property
     def is_found(self) -> Mask:
         """Mask of those that are equilibria, stable or not, shape (n,)."""

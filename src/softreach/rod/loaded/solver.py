@@ -74,7 +74,8 @@ class Solver:
 
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
-        return Equilibria.empty(n, self.tables.frame_size)
+        tips, frame = np.full((n, 3), np.nan), np.zeros((n, self.tables.frame_size))
+        return Equilibria(tips, np.full(n, TipStatus.UNDECIDED, np.int8), np.full(n, np.nan), frame)
 
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""

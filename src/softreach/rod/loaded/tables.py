@@ -17,7 +17,7 @@ from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, compliance, ends_over, tables
 from softreach.kernels.loaded import unloaded_frames as rest_frames
-from softreach.kernels.loaded.explicit_rk8 import NODES
+from softreach.kernels.loaded.rod_step import NODES
 from softreach.kernels.rod import magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.steps import edges_between, ends_of_steps
