@@ -75,6 +75,7 @@ def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
 
 def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
     rows, bars = dict[str, SliderField](), dict[str, Line]()
+    before = panel.session.found.ends  # of a design with other sliders
     for each in shown:
         at = of_design(each.read, each.write)
         rows[each.name] = panel.slider(each.label, each.limits, each.step, at, each.hint)
@@ -82,7 +83,7 @@ def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
             bars[each.name] = panel.kept(Line(panel.gui))
 
     def end(_: StudioState, found: Found) -> None:
-        for name, row in rows.items():
+        for name, row in rows.items() if found.ends is not before else ():
             low, high = found.ends.get(name, row.ends)
             if (low, high) != row.ends and low < high:
                 row.ends = low, high
