@@ -57,13 +57,6 @@ def test_a_sweep_of_a_design_on_the_same_curve_computes_its_own_volume_alone(mon
 # Paths of the tip as values: kept in a state, refused
 
 
-def test_a_state_keeps_its_path_and_its_plots():
-    path = TipPath.through([[0, 0, 1.0], [0.1, 0, 0.9]], (-0.5, 0.0, 0.0))
-    state = StudioState(design=designs.minimal_trunk(), path=path)
-    state = state.showing(section=True, swept="taper")
-    assert StudioState.from_json(state.to_json()) == state
-
-
 @pytest.mark.parametrize(
     "points",
     [

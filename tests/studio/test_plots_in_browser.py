@@ -41,7 +41,7 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     cut = Slice(axis="z", center=0.5, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut))
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
-    assert tab.page.locator("img").first.get_attribute("src") != before
+    tab.wait(lambda: tab.page.locator("img").first.get_attribute("src") != before, "it follows")
     area = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
     tab.page.get_by_text(f"{area:.4g} m²").wait_for()
     tab.open("Design")

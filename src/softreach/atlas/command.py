@@ -129,6 +129,10 @@ def _faults(command: Command) -> Iterator[InvalidInput]:
         if metric.name in _RESERVED or metric.name in space.names:
             allowed = "a name that the atlas does not use itself"
             yield InvalidInput("name of a metric", metric.name, allowed)
+    for name in space.names:
+        if {"/", "\\"} & {*name}:
+            allowed = "without / and \\, which would name folders of the store"
+            yield InvalidInput("parameter", name, allowed, "rename the part")
     if not space.bundles:
         why = next(iter(space.gaps.values()))
         designs = counted(space.size, "design")

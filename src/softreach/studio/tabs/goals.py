@@ -22,7 +22,7 @@ from softreach.studio.files import LARGEST
 from softreach.studio.found import Bench, Found, Sample
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.scene.needs import COLORS, draw_needs
+from softreach.studio.scene.scene import VERDICTS
 from softreach.studio.session import Session
 from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import number_of
@@ -100,7 +100,7 @@ _SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided"
 
 
 def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
-    mark, sign = Swatch(COLORS[finding.verdict]), _SIGNS[finding.verdict]
+    mark, sign = Swatch(VERDICTS[finding.verdict]), _SIGNS[finding.verdict]
     text = _reach_text(check, finding) if finding.kind == "reach" else finding.text
     return mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"
 
@@ -406,15 +406,11 @@ def _check(given: Given) -> Results:
     yield Learned({"check": made})
 
 
-def _draw_needs(given: Given) -> None:
-    draw_needs(given.scene, given.found.check)
-
-
 CHECK_NEEDS = Job(
     "needs",
     "design needs",
     _check,
-    _draw_needs,
+    lambda given: given.scene.draw_needs(given.found.check),
     wanted="needs",
     makes="check",
     draws="/needs",
