@@ -366,9 +366,8 @@ def _solve(given: Given) -> Results:
         return
     solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
-    answer = solve_inverse(state.design, [state.target], near=near, family=_FAMILY, from_rest=True)[
-        0
-    ]
+    answers = solve_inverse(state.design, [state.target], near=near, family=_FAMILY, from_rest=True)
+    answer = answers[0]
     if given.found.takes_nearest and len(answer):
         distance = np.linalg.norm(answer.activations - state.activation, axis=1)
         best = tuple(answer.activations[int(np.argmin(distance))].tolist())
