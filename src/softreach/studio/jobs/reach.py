@@ -7,7 +7,7 @@ from typing import Any
 
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
 from softreach.studio.job import Given, Job, Learned, Results
-from softreach.studio.reach import Reach, count_activations, shown_rows, stages, uncounted
+from softreach.studio.reach import Reach, count_activations, shown_samples, stages, uncounted
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.shown_parameters import slider_ends
@@ -137,7 +137,7 @@ def _count(reach: Reach, given: Given) -> None:
     look = given.state.appearance
     if not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
         return
-    missing, done = uncounted(reach, shown_rows(reach, look.level)), 0
+    missing, done = uncounted(reach, shown_samples(reach, look.level)), 0
 
     def progress(more: int) -> None:
         nonlocal done
