@@ -183,8 +183,8 @@ def shown_samples(reach: Reach, level: int) -> NDArray[np.int64]:
     return rows[has_tip(reach.status[rows])]
 
 
+def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int64]:
     """Places of the nearest to points [m] among `shown_samples(reach, 15)`, shape (n, k)."""
-    """Places among `shown_samples(reach, 15)` of the samples nearest to points [m], shape (n, k)."""
     from scipy.spatial import KDTree
 
     tips = reach.cloud.tip.values[shown_samples(reach, _LEVEL)]
